@@ -21,6 +21,7 @@ REACH = 3.0  # standard deviations of the farthest robots of a worst case: one o
 TRIED, STRETCH = 48, 1.25  # robots that are tried, so far off that their farthest ones are as far as those of 200
 ADDED = 2  # most of them that are added
 LARGER, ALIKE = 1.05, 0.5  # least error of those added over the largest known, and least distance over their own
+NEAR = 0.6  # least error, over the largest one, of robots that are tried once more: others are taken in in between
 _SEED = 20190705
 LEAST = 0.05  # weight of the nominal robot in a mean, where the rule would give it less
 
@@ -62,30 +63,43 @@ def chosen_scenarios(
     )
 
 
+def tried_robots(parameters: Sequence[Parameter]) -> Array:
+    """Random robots on which curves may be tried, in standard deviations of the parameters, shape [n, d].
+
+    They are not those on which curves are measured.
+    """
+    return np.asarray(STRETCH * np.random.default_rng(_SEED).standard_normal((TRIED, len(parameters))))
+
+
 def worse_robots(
     shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], parameters: Sequence[Parameter],
-    scenarios: Sequence[Scenario],
-) -> tuple[Scenario, ...]:  # fmt: skip
-    """Some random robots on which curves leave larger errors than on the known ones.
-
-    The random ones are not those on which curves are measured.
+    scenarios: Sequence[Scenario], points: Array,
+) -> tuple[tuple[Scenario, ...], Array]:  # fmt: skip
+    """Those of some robots on which curves leave larger errors than on the known ones, and those that are near it.
 
     Args:
         shot, options, parameters: As of `chosen_scenarios`.
-        tracks: Curves with the smallest largest error on the robots.
+        tracks: Curves with the smallest largest error on the known robots.
         scenarios: The known robots, the nominal one first.
+        points: The robots to try, in standard deviations of the parameters, shape [n, d].
+
+    Returns:
+        Some of them, to be known as well; and the points of others that are to be tried on the next curves, shape
+        [m, d].
     """
-    points = STRETCH * np.random.default_rng(_SEED).standard_normal((TRIED, len(parameters)))
     tried = [scenario_at(parameters, x) for x in points]
     errors = largest_weighted(shot, errors_on(shot, options, {"": tracks}, (*scenarios[1:], *tried))[""])
     known, found = errors[: len(scenarios) - 1], errors[len(scenarios) - 1 :]
+    found = np.where(np.isfinite(found), found, 0.0)
     picked: list[int] = []
-    for k in np.argsort(-np.where(np.isfinite(found), found, 0.0)):
+    for k in np.argsort(-found):
         if found[k] <= LARGER * known.max() or len(picked) == ADDED:
             break
         if all(np.linalg.norm(points[k] - points[j]) > ALIKE * np.linalg.norm(points[j]) for j in picked):
             picked.append(int(k))
-    return tuple(tried[k] for k in picked)
+    near = found > NEAR * max(known.max(), found.max(initial=0.0))
+    near[picked] = False
+    return tuple(tried[k] for k in picked), points[near]
 
 
 def largest_weighted(shot: CompiledShot, errors: Array) -> Array:

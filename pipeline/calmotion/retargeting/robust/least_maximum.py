@@ -84,7 +84,9 @@ class LinearErrors:
 
     def moved(self, d: Array) -> Array:
         """The change of the errors, shape [S, T, G, 3]."""
-        return np.asarray(self.changes @ d.astype(np.float32), float)
+        # as one matrix: three times as fast as a product for each instant
+        flat = self.changes.reshape(-1, len(d)) @ d.astype(np.float32)
+        return flat.reshape(self.errors.shape).astype(float)
 
 
 def _products(changes: NDArray[np.float32]) -> Array:

@@ -15,6 +15,7 @@ from calmotion.retargeting.robust.choice import (
     beyond_simulation,
     chosen_scenarios,
     largest_weighted,
+    tried_robots,
     worse_robots,
 )
 from calmotion.retargeting.robust.measure import errors_on, silent
@@ -95,8 +96,10 @@ def _minimize(
     """The smallest largest error over some robots, and those on which it turns out larger."""
     parameters = uncertainties_of(shot)
     worst.minimize(allowed, progress)
+    points = tried_robots(parameters)
     for _ in range(SEARCHES - 1):
-        added = worse_robots(shot, options, worst.tracks, parameters, worst.scenarios)
+        with worst.work.timed():
+            added, points = worse_robots(shot, options, worst.tracks, parameters, worst.scenarios, points)
         if not (added and worst.take_in(added)):
             break
         worst.minimize(allowed, progress)

@@ -53,6 +53,7 @@ ROUNDS = 16  # most linear models and trust regions for one allowed error
 FACTORS, MET = 5, (0.9, 1.05)  # most minima by which f is found, and what they have to meet of the allowed error
 FIRST_FACTOR = 0.4  # of the largest error over the allowed one: the others' errors fall as well
 FALLING, AS_PREDICTED = 0.1, 0.25  # a smaller relative decrease of the merit ends, a smaller share of it is refused
+FORETOLD = 0.05  # relative error of a predicted decrease after which the linear model still serves
 DAMPED = 10.0  # growth of the damping after a refused step
 _LARGEST, _SHARE = 3000, 0.5  # most unknowns, and most of the free memory
 
@@ -174,7 +175,8 @@ class WorstCase:
                 damping, eased = max(DAMPED * damping, before / max(rest.squared(d), 1e-300)), 1.0
                 continue
             self._x, small = self._x + d, gained < FALLING * before
-            linear, rest = self._moved(linear) if small else self._linearized()
+            right = abs(gained - (before - predicted)) < FORETOLD * (before - predicted)
+            linear, rest = self._moved(linear) if small or right else self._linearized()
             if small and np.all(_largest(linear.errors[0]) <= MET[1] * most) and not problem.tighten():
                 break
             damping, eased, orders = damping * eased, 1.0 / DAMPED, ORDERS[-1:]
