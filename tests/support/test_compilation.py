@@ -5,6 +5,7 @@ from typing import ClassVar
 import numba
 import numpy as np
 import pytest
+from calmotion.errors import ShotError
 from calmotion.support import compilation, interrupts
 from calmotion.support.compilation import kernel, kernel_folder, kernel_key
 from calmotion.support.kernel_compiler import with_entrance_for_python
@@ -45,6 +46,12 @@ def test_the_key_changes_with_the_optimisation_level(package, monkeypatch):
     before = kernel_key(package)
     monkeypatch.setattr(numba.config, "OPT", 3)
     assert kernel_key(package) != before
+
+
+def test_where_numba_is_told_not_to_compile_the_variable_is_named(monkeypatch):
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", 1)
+    with pytest.raises(ShotError, match="NUMBA_DISABLE_JIT"):
+        kernel(lambda x: x)
 
 
 def test_kernels_are_kept_under_the_key():

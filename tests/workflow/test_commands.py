@@ -218,6 +218,20 @@ def test_a_cancelled_run_raises(shot_file):
         cm.simulate(shot_file, step="4ms", progress=progress, cancel=stop.is_set)
 
 
+@pytest.mark.parametrize("hook", ["progress", "cancel", "on_operator"])
+@pytest.mark.parametrize("error", [ValueError, SystemExit])
+def test_what_a_callback_raises_reaches_its_owner(shot_file, tmp_path, hook, error):
+    calls = []
+
+    def wrong(*told):
+        calls.append(told)
+        raise error("the panel is closed")
+
+    with pytest.raises(error, match="the panel is closed"):
+        cm.optimize(shot_file, outputs=cm.OutputPaths(layer=tmp_path / "calm.usda"), **{hook: wrong})
+    assert len(calls) == 1 and not list(tmp_path.glob("calm*"))
+
+
 def test_an_inspection_reports_what_is_there(shot_file):
     report = cm.inspect(shot_file).report()
     assert report["motors"][0]["path"] == HINGE and report["targets"][0]["path"] == TIP

@@ -7,7 +7,7 @@ from calmotion.workflow import run
 def test_the_time_left_follows_from_the_share_that_is_done(monkeypatch):
     now, seen = [100.0], []
     monkeypatch.setattr(run.time, "perf_counter", lambda: now[0])
-    listen = run._listener(run.Hooks(progress=seen.append))
+    listen = run._listener(run.Hooks(progress=seen.append), [])
     for seconds, stage, fraction in (
         (0, "search", 0.0),
         (10, "search", 0.25),

@@ -21,6 +21,7 @@ import numba
 import numpy as np
 from numba import config, njit
 
+from calmotion.errors import ShotError
 from calmotion.support import references  # noqa: F401
 from calmotion.support.caching.cache_folder import KERNELS, cache_folder
 from calmotion.support.caching.caches import mark_used, prune
@@ -101,6 +102,13 @@ def allocating_kernel(function: Function) -> Function:
 
 
 def _compile(function: Function, **options: Any) -> Function:
+    if config.DISABLE_JIT:
+        raise ShotError(
+            "simulations are compiled by numba, which is told not to compile",
+            attribute="NUMBA_DISABLE_JIT",
+            found=os.environ.get("NUMBA_DISABLE_JIT", "numba.config.DISABLE_JIT is set"),
+            remedy="Unset this variable of the environment.",
+        )
     # numba picks the folder when a function is decorated; other users of numba keep theirs
     before = config.CACHE_DIR
     if not os.environ.get("NUMBA_CACHE_DIR"):

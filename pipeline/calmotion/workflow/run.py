@@ -44,7 +44,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Hooks:
-    """Callbacks of a run, and how the caller stops it.
+    """Callbacks of a run, and how the caller stops it. What one of them raises ends the run, and reaches the caller.
 
     Attributes:
         progress: Called often with a `Progress`.
@@ -128,6 +128,7 @@ def carry_out(
     Raises:
         SettingError: A setting, an operator's name or an output does not fit.
         PlanError: The operators cannot make what is wanted.
+        Exception: What a hook raised.
     """
     start, host, hooks = time.perf_counter(), shot.host, hooks or Hooks()
     source = replace(source or Source("", ""), path=shot.path, command=command, motion=shot.motion)
@@ -138,8 +139,9 @@ def carry_out(
     _refuse_unknown_methods(source)
     _refuse_unreadable_motion(source, host)
     given = merge([shot.settings, settings or {}])
+    raised: list[BaseException] = []
     run = host.run(
-        [*known, source, outputs], kinds, optional=optional, settings=given, progress=_listener(hooks),
+        [*known, source, outputs], kinds, optional=optional, settings=given, progress=_listener(hooks, raised),
         reuse=shot.reuse,
     )  # fmt: skip
     prepare_outputs(shot.inputs, outputs)
@@ -157,18 +159,32 @@ def carry_out(
     except KeyboardInterrupt:
         interrupts.answer()
         interrupted = True
+    if raised:
+        raise raised[0]
     if writes:  # other commands also accept a shot in which nothing moves
         shot.keep(run.data)
     problems = [Problem(ShotError("interrupted"))] if interrupted else problems_of(run, kinds)
     return Outcome(shot, run, tuple(problems), interrupted, cancelled, time.perf_counter() - start, given)
 
 
-def _listener(hooks: Hooks) -> Callable[[str, float, str], None]:
-    """The host's progress callback that asks `cancel` and estimates the time left."""
+def _listener(hooks: Hooks, raised: list[BaseException]) -> Callable[[str, float, str], None]:
+    """The host's progress callback that asks `cancel` and estimates the time left.
+
+    What a callback of the caller raises is no fault of the plugin that runs: it is added to `raised`, and the run stops.
+    """
     began: dict[str, float] = {}
 
     def listen(stage: str, fraction: float, message: str) -> None:
         interrupts.check()
+        if raised:
+            raise _Stop
+        try:
+            tell(stage, fraction, message)
+        except (Exception, SystemExit) as error:
+            raised.append(error)
+            raise _Stop from error
+
+    def tell(stage: str, fraction: float, message: str) -> None:
         if hooks.cancel and hooks.cancel():
             raise _Stop
         now = time.perf_counter()

@@ -36,6 +36,8 @@ def test_what_is_wrong_has_a_remedy(tmp_path, monkeypatch):
     assert found["memory"].state == NOTE and found["rerun viewer"].state == NOTE
     assert found["numpy"].state == WRONG and "pip install" in found["numpy"].remedy
     assert found["nowhere"].state == WRONG and "x" not in found
+    monkeypatch.setattr("numba.config.DISABLE_JIT", 1)
+    assert "NUMBA_DISABLE_JIT" in by_name(examine())["compiler"].remedy
 
 
 def test_a_look_that_fails_is_a_finding(monkeypatch):

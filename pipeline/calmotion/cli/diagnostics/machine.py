@@ -175,8 +175,11 @@ def _disk() -> Iterator[Finding]:
 
 def _kernels() -> Iterator[Finding]:
     """Compile a kernel, which fails where numba or LLVM is broken."""
-    from numba import njit
+    from numba import config, njit
 
+    if config.DISABLE_JIT:
+        yield Finding("compiler", WRONG, "numba is told not to compile", "Unset NUMBA_DISABLE_JIT")
+        return
     value = njit(lambda x: x + 1.0)(1.0)
     yield Finding(
         "compiler", OK if value == 2.0 else WRONG, "numba compiles", "" if value == 2.0 else "Reinstall numba"
