@@ -263,15 +263,14 @@ def _omitted_modes(basis: Basis, body: Body, load_envelope: LoadEnvelope | None)
     """The linear modes that the basis omits, with the estimated error."""
     if load_envelope is None or basis.cut_error_m is None:
         return ()
-    kept = len(basis.omega_squared)
-    return (
-        Simplification(
-            f"{body.path}: only {kept} linear mode{'' if kept == 1 else 's'}",
-            "the loads of this shot excite the others by less than the tolerance",
-            basis.cut_error_m,
-            REDUCTION,
-        ),
-    )
+    kept, flexible = len(basis.omega_squared), body.flexible
+    why = "the loads of this shot excite the others by less than the tolerance"
+    if flexible is not None and flexible.mode_count >= 0:
+        why = "modeCount is authored"
+    elif flexible is not None and flexible.max_frequency >= 0.0:
+        why = f"maxFrequency of {flexible.max_frequency:.4g} Hz is authored"
+    what = f"{body.path}: only {kept} linear mode{'' if kept == 1 else 's'}"
+    return (Simplification(what, why, basis.cut_error_m, REDUCTION),)
 
 
 def _omitted_strain(law: Elasticity, body: Body) -> tuple[Simplification, ...]:

@@ -170,7 +170,7 @@ def carry_out(
 def _listener(hooks: Hooks, raised: list[BaseException]) -> Callable[[str, float, str], None]:
     """The host's progress callback that asks `cancel` and estimates the time left.
 
-    What a callback of the caller raises is no fault of the plugin that runs: it is added to `raised`, and the run stops.
+    What a callback of the caller raises is no fault of a plugin: it is added to `raised`, and the run stops.
     """
     began: dict[str, float] = {}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from calmotion.errors import ShotError
 from calmotion.reduction.elements.assembly import quadratic_mesh
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches, spans_a_plane
 
@@ -42,6 +43,18 @@ def test_patches_never_share_a_node_and_anchors_at_one_place_share_a_patch(beam,
     assert first.attachments == (0, 3) and second.attachments == (2,)
     assert not np.intersect1d(first.nodes, second.nodes).size
     assert (beam.nodes[first.nodes, 0] <= 0.3 + 1e-12).all() and (beam.nodes[second.nodes, 0] >= 0.3 - 1e-12).all()
+
+
+def test_a_radius_that_leaves_nothing_to_bend_is_refused_with_the_size_of_the_body(beam, attachment, helpers):
+    ends = [attachment("/a", 0.0, 0.0, 0.0), attachment("/b", 0.1, 0.0, 0.0)]
+    size = float(np.linalg.norm(np.ptp(beam.nodes, axis=0)))
+    with pytest.raises(ShotError, match="smaller radius") as wrong:
+        interface_patches(beam, ends, 5.0, "/Arm/link")
+    assert wrong.value.attribute == "calm:flexible:interfaceRadius" and f"{size:.4g} m" in (wrong.value.found or "")
+    cube = quadratic_mesh(*helpers.box((4, 4, 4), (0.1, 0.1, 0.1), origin=(0.0, -0.05, -0.05)))
+    with pytest.raises(ShotError, match="nothing of the body is left"):
+        interface_patches(cube, ends, 0.15, "/Arm/link")
+    assert len(interface_patches(cube, ends, 0.05, "/Arm/link")) == 2
 
 
 def test_a_radius_finer_than_the_mesh_takes_the_triangle_that_is_touched(beam, attachment):

@@ -81,9 +81,12 @@ def interface_patches(
             mesh.
 
     Raises:
-        ShotError: A patch carries no moment, or two named patches overlap.
+        ShotError: A patch carries no moment, two named patches overlap, or patches of a given radius hold all of the
+            surface.
     """
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    if radius >= size:
+        raise _nothing_left(body, radius, size)
     groups: list[list[int]] = []
     for index, attachment in enumerate(attachments):
         if attachment.kind != "interface":
@@ -137,6 +140,8 @@ def interface_patches(
         patch = _patch(mesh, candidates, free, place, attachments[group[0]].path, group, radius, body)
         taken |= np.isin(surface, patch.nodes)
         patches.append(patch)
+    if patches and radius >= 0.0 and np.all(taken):
+        raise _nothing_left(body, radius, size)
     return patches
 
 
@@ -181,6 +186,14 @@ def overlapping(surface: InterfaceSurface, joint: str) -> ShotError:
     return ShotError(
         f"this interface overlaps that of {joint}",
         path=surface.path, attribute="indices", remedy="Leave a face between the two, or join them by one",
+    )  # fmt: skip
+
+
+def _nothing_left(body: str, radius: float, size: float) -> ShotError:
+    return ShotError(
+        "the interfaces of the joints are so large that nothing of the body is left to bend",
+        path=body, attribute="calm:flexible:interfaceRadius", found=f"{radius:.4g} m, on a body of {size:.4g} m",
+        remedy="Author a smaller radius, in the units of the stage; or remove it: it is then measured",
     )  # fmt: skip
 
 
@@ -253,7 +266,8 @@ def _patch(
         raise ShotError(
             f"the surface near the attachment frame of {path} is too small to carry a joint",
             path=body, attribute="calm:flexible:interfaceRadius", found=f"{len(nodes)} nodes within {radius:.4g} m",
-            remedy="Author a larger interfaceRadius or a smaller elementSize, or move the joints apart",
+            remedy="Move the joints apart, or author a smaller elementSize or "
+            "another interfaceRadius",
         )  # fmt: skip
     return InterfacePatch(nodes=nodes.astype(np.int32), attachments=tuple(group), radius=radius, center=center)
 

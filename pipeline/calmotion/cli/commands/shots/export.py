@@ -24,7 +24,11 @@ def add_to(commands: Commands) -> None:
     )
     command.add_argument("--rate", metavar="HZ", type=_rate, default=100.0, help="commands a second (default: 100)")
     file_argument(
-        command, "-o", "--output", metavar="FILE", help="file to write (default: named after the shot, in this folder)"
+        command,
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="file to write; replaces one of that name (default: named after the shot, in this folder)",
     )
     command.add_argument(
         "--start-delay", metavar="TIME", type=quantity("s"), default=0.0,
