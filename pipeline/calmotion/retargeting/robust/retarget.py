@@ -95,14 +95,14 @@ def _minimize(
 ) -> None:  # fmt: skip
     """The smallest largest error over some robots, and those on which it turns out larger."""
     parameters = uncertainties_of(shot)
-    worst.minimize(allowed, progress)
     points = tried_robots(parameters)
-    for _ in range(SEARCHES - 1):
-        with worst.work.timed():
-            added, points = worse_robots(shot, options, worst.tracks, parameters, worst.scenarios, points)
-        if not (added and worst.take_in(added)):
-            break
+    with worst.work.timed():
         worst.minimize(allowed, progress)
+        for _ in range(SEARCHES - 1):
+            added, points = worse_robots(shot, options, worst.tracks, parameters, worst.scenarios, points)
+            if not (added and worst.take_in(added)):
+                break
+            worst.minimize(allowed, progress)
 
 
 def _of_least_maximum(

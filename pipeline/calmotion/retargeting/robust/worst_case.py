@@ -53,7 +53,7 @@ ROUNDS = 16  # most linear models and trust regions for one allowed error
 FACTORS, MET = 5, (0.9, 1.05)  # most minima by which f is found, and what they have to meet of the allowed error
 FIRST_FACTOR = 0.4  # of the largest error over the allowed one: the others' errors fall as well
 FALLING, AS_PREDICTED = 0.1, 0.25  # a smaller relative decrease of the merit ends, a smaller share of it is refused
-FORETOLD = 0.05  # relative error of a predicted decrease after which the linear model still serves
+FORETOLD = 0.25  # relative error of a predicted decrease up to which the linear model serves once more
 DAMPED = 10.0  # growth of the damping after a refused step
 _LARGEST, _SHARE = 3000, 0.5  # most unknowns, and most of the free memory
 
@@ -79,17 +79,14 @@ class WorstCase:
         self._prepared, self._options = prepared, options
         self._motors = len(shot.character.motors)
         self._problem = problem.for_robots(self._robots(problem, scenarios))
-        self._fixed = locked_coefficients(
-            shot.animation, problem.space.basis, problem.space.motors, prepared.grid.end
-        )  # fmt: skip
-        self._inertia = rigid_response(
-            problem.model, problem.grid, curves, problem.world, problem.space.coupling
-        ).inertia  # fmt: skip
-        self._weighted = WeightedErrors.of_objective(
-            problem.objective, problem.grid, len(scenarios), problem.size
-        )  # fmt: skip
+        space = problem.space
+        self._fixed = locked_coefficients(shot.animation, space.basis, space.motors, prepared.grid.end)
+        self._inertia = rigid_response(problem.model, problem.grid, curves, problem.world, space.coupling).inertia
+        self._weighted = WeightedErrors.of_objective(problem.objective, problem.grid, len(scenarios), problem.size)
         self._factors = np.ones((len(scenarios), len(self._weighted.places)))
         self._linear: tuple[LinearErrors, RestOfMerit] | None = None
+        self._made_at: Array = np.zeros(0)  # the point of its derivatives
+        self._damping = 0.0  # that it needed last
         self.work = Work()
         self._own: Array = np.zeros(0)  # errors of the nominal robot where it began, shape [G]
         self._performed: Array = np.zeros(0)  # the point that all robots performed last
@@ -113,22 +110,21 @@ class WorstCase:
 
     def take_in(self, scenarios: Sequence[Scenario]) -> bool:
         """Take in further robots: only their linear models are made. False, without them, where this cannot be."""
-        with self.work.timed():
-            known, _ = self._linearized()
-            robots = self._robots(self._problem, scenarios)
-            problem = self._problem.for_robots([*self._problem.robots, *robots])
-            if not (self._fit(len(problem.robots)) and np.isfinite(problem.value(self._x))):
-                return False
-            in_parallel(Robot.linearize, robots)
-            if not all(robot.simulator.can_be_blocked() for robot in robots):
-                return False
-            self.scenarios, self._problem = (*self.scenarios, *scenarios), problem
-            self._performed = self._x.copy()
-            self._factors = np.concatenate([self._factors, np.ones((len(robots), self._factors.shape[1]))])
-            linear = known.with_robots(self._errors(), self._changes(robots))
-            self._start_limits(linear)
-            self._moved(linear)
-            return True
+        known, _ = self._linearized()
+        robots = self._robots(self._problem, scenarios)
+        problem = self._problem.for_robots([*self._problem.robots, *robots])
+        if not (self._fit(len(problem.robots)) and np.isfinite(problem.value(self._x))):
+            return False
+        in_parallel(Robot.linearize, robots)
+        if not all(robot.simulator.can_be_blocked() for robot in robots):
+            return False
+        self.scenarios, self._problem = (*self.scenarios, *scenarios), problem
+        self._performed = self._x.copy()
+        self._factors = np.concatenate([self._factors, np.ones((len(robots), self._factors.shape[1]))])
+        linear = known.with_robots(self._errors(), self._changes(robots))
+        self._start_limits(linear)
+        self._moved(linear)
+        return True
 
     def _robots(self, problem: RetargetProblem, scenarios: Sequence[Scenario]) -> list[Robot]:
         """The robots of scenarios, of equal weights."""
@@ -147,11 +143,7 @@ class WorstCase:
             allowed: Error of the position of a target on the nominal robot [m]; where it began with more, as much.
             progress: Called with a fraction and a message.
         """
-        with self.work.timed():
-            self._minimize(allowed, progress)
-
-    def _minimize(self, allowed: float, progress: Progress) -> None:
-        problem, damping, orders = self._problem, 0.0, ORDERS
+        problem, damping, orders = self._problem, self._damping, ORDERS
         eased = 1.0 / DAMPED  # the next model has a smaller damping unless this one needed it
         linear, rest = self._linearized()
         if not len(self._own):
@@ -163,23 +155,27 @@ class WorstCase:
             progress(number / ROUNDS, f"largest weighted error on {len(self.scenarios)} robots: {now:.3f} mm")
             rest = replace(rest, damping=damping)
             d = self._minimum(linear, rest, most, orders)
-            before, predicted = (self._merit(linear, linear.at(c), rest.value(c)) for c in (np.zeros_like(d), d))
-            kept = problem.limits is None or problem.limits.kept(rest.limited)
-            if not np.any(d) or before - predicted < FALLING * before and kept:
+            before, after = (self._merit(linear, linear.at(c), rest.value(c)) for c in (np.zeros_like(d), d))
+            kept, foretold = problem.limits is None or problem.limits.kept(rest.limited), before - after
+            if not np.any(d) or foretold < FALLING * before and kept:
                 break
             gained = 0.0
             self.work.evaluations += 1
             if self._performs(self._x + d):
                 gained = before - self._merit(linear, self._errors(), self._rest(damping, d))
-            if gained < AS_PREDICTED * (before - predicted) or gained <= 0.0:
-                damping, eased = max(DAMPED * damping, before / max(rest.squared(d), 1e-300)), 1.0
+            if gained < AS_PREDICTED * foretold or gained <= 0.0:
+                damping = max(DAMPED * damping, before / max(rest.squared(d), 1e-300))
+                if eased == 1.0 and foretold > FALLING * before and not np.array_equal(self._made_at, self._x):
+                    linear, rest = self._linearize()  # damped, the model of other curves misleads as well
+                eased = 1.0
                 continue
             self._x, small = self._x + d, gained < FALLING * before
-            right = abs(gained - (before - predicted)) < FORETOLD * (before - predicted)
+            right = abs(gained - foretold) < FORETOLD * foretold
             linear, rest = self._moved(linear) if small or right else self._linearized()
             if small and np.all(_largest(linear.errors[0]) <= MET[1] * most) and not problem.tighten():
                 break
-            damping, eased, orders = damping * eased, 1.0 / DAMPED, ORDERS[-1:]
+            self._damping = damping = damping * eased
+            eased, orders = 1.0 / DAMPED, ORDERS[-1:]
 
     def least_possible(self, allowed: float) -> float:
         """A bound below which no curves can bring the largest weighted error on these robots [m] (`least_possible`).
@@ -258,18 +254,22 @@ class WorstCase:
 
     def _linearized(self) -> tuple[LinearErrors, RestOfMerit]:
         """The errors and the rest of the merit about the curves found so far."""
-        problem = self._problem
         if self._linear is None or not np.array_equal(self._linear[1].x, self._x):
-            self._linear = None  # its memory is needed
-            if not problem.linearized_at(self._x):
-                self._performs(self._x)
-                problem.linearize()
-            self.work.linearizations += 1
-            self.work.sweeps += round(2.0 * COST * problem.size)
-            linear = LinearErrors.of(self._errors(), self._changes(problem.robots), self._weighted.scale)
-            self._start_limits(linear)
-            return self._moved(linear)
+            return self._linearize()
         return self._linear
+
+    def _linearize(self) -> tuple[LinearErrors, RestOfMerit]:
+        """The same with derivatives made here."""
+        problem = self._problem
+        self._linear, self._made_at = None, self._x.copy()  # the memory of the model before is needed
+        if not problem.linearized_at(self._x):
+            self._performs(self._x)
+            problem.linearize()
+        self.work.linearizations += 1
+        self.work.sweeps += round(2.0 * COST * problem.size)
+        linear = LinearErrors.of(self._errors(), self._changes(problem.robots), self._weighted.scale)
+        self._start_limits(linear)
+        return self._moved(linear)
 
     def _changes(self, robots: Sequence[Robot]) -> NDArray[np.float32]:
         """The derivatives of the errors of robots where they are linearised, shape [S, t, G, 3, n]."""
