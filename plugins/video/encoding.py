@@ -1,4 +1,4 @@
-"""Writing of videos, one frame in memory at a time.
+"""Writing of videos, from frames that are drawn while they are written.
 
 Pillow writes animated WebP, which browsers play. It comes under a permissive licence and in a wheel. MP4 needs ffmpeg,
 whose wheels are all GPL, so it is run as a program of its own where the user has installed one.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from PIL import Image
 WEBP, MP4 = ".webp", ".mp4"
 METHOD = 4  # effort of WebP's encoder, 0 to 6
 BETWEEN_KEYS = (40, 80)  # frames: all others hold differences alone
-Draw = Callable[[int], Image.Image]
+Frames = Iterator[Image.Image]
 
 
 def refuse_unknown_kind(path: str) -> None:
@@ -41,12 +41,12 @@ def refuse_unknown_kind(path: str) -> None:
         )  # fmt: skip
 
 
-def encode(path: str, draw: Draw, count: int, rate: float, quality: int) -> None:
+def encode(path: str, frames: Frames, count: int, rate: float, quality: int) -> None:
     """Write a video atomically.
 
     Args:
         path: A .webp or .mp4 file.
-        draw: Draws a frame by its number; frames are drawn in order, each once.
+        frames: In order; each is asked for when those before are written.
         count: Number of frames.
         rate: Frames per second.
         quality: Of WebP, 1 to 100.
@@ -58,29 +58,29 @@ def encode(path: str, draw: Draw, count: int, rate: float, quality: int) -> None
     write = _write_webp if Path(path).suffix.lower() == WEBP else _write_mp4
     try:
         with replaced(path) as temporary:
-            write(temporary, draw, count, rate, quality)
+            write(temporary, frames, count, rate, quality)
     except OSError as error:
         raise ShotError(f"the video cannot be written: {error}", path=path, remedy="Choose another --video.") from error
 
 
 class _Following:
-    """The frames after the first, as Pillow asks for them: a picture with frames that are drawn when it is sought.
+    """The frames after the first, as Pillow asks for them: a picture that has them when they are sought.
 
     Args:
-        draw, count: As for `encode`; the first frame is not counted.
+        frames, count: As for `encode`, without the first frame.
         first: Frame.
         unseen: Differences of levels that the encoder leaves out.
     """
 
     mode = "RGB"
 
-    def __init__(self, draw: Draw, count: int, first: Image.Image, unseen: int):
-        self._draw, self.n_frames, self._unseen = draw, count, unseen
+    def __init__(self, frames: Frames, count: int, first: Image.Image, unseen: int):
+        self._frames, self.n_frames, self._unseen = frames, count, unseen
         self._frame = first
 
     def seek(self, frame: int) -> None:
-        """Draw a frame; the one before is dropped."""
-        self._frame = steady(self._draw(frame + 1), self._frame, self._unseen)
+        """Take the next frame; the one before is dropped."""
+        self._frame = steady(next(self._frames), self._frame, self._unseen)
 
     def getim(self) -> Any:
         """Pixels of the frame."""
@@ -112,9 +112,9 @@ def unseen_levels(quality: int) -> int:
     return int(31.0 * (1.0 - share) + share + 0.5)
 
 
-def _write_webp(path: Path, draw: Draw, count: int, rate: float, quality: int) -> None:
-    first = draw(0)
-    following: list[Any] = [_Following(draw, count - 1, first, unseen_levels(quality))] if count > 1 else []
+def _write_webp(path: Path, frames: Frames, count: int, rate: float, quality: int) -> None:
+    first = next(frames)
+    following: list[Any] = [_Following(frames, count - 1, first, unseen_levels(quality))] if count > 1 else []
     near, far = BETWEEN_KEYS
     first.save(
         path, format="WEBP", save_all=True, append_images=following, duration=round(1000.0 / rate), loop=0,
@@ -122,8 +122,7 @@ def _write_webp(path: Path, draw: Draw, count: int, rate: float, quality: int) -
     )  # fmt: skip
 
 
-def _write_mp4(path: Path, draw: Draw, count: int, rate: float, quality: int) -> None:
-    frames = (draw(k) for k in range(count))
+def _write_mp4(path: Path, frames: Frames, count: int, rate: float, quality: int) -> None:
     first = next(frames)
     width, height = (side - side % 2 for side in first.size)  # yuv420p halves both
     command = [

@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -138,10 +139,32 @@ def test_no_frame_is_kept_after_the_next_one(tmp_path, video):
 
     gc.collect()
     before = pictures()
-    video.encoding.encode(str(tmp_path / "a.webp"), draw, 30, 25.0, 50)
+    video.encoding.encode(str(tmp_path / "a.webp"), map(draw, range(30)), 30, 25.0, 50)
     assert drawn == list(range(30)), "each frame is drawn once, in order"
     assert max(alive) <= 3, alive
     assert len(Image.open(tmp_path / "a.webp").getexif()) == 0
+
+
+def test_frames_are_drawn_in_threads_and_written_in_order(tmp_path, video, monkeypatch):
+    """Few at once, however many processors there are: each frame takes memory while it is drawn."""
+    together, most, drawn, lock = 0, [], [], threading.Lock()
+
+    def draw(film, moment):
+        nonlocal together
+        with lock:
+            together += 1
+            most.append(together)
+            drawn.append(moment)
+        picture = Image.new("RGB", (32, 32), (moment, 0, 0))
+        with lock:
+            together -= 1
+        return picture
+
+    monkeypatch.setattr(video.film, "draw_frame", draw)
+    told = []
+    frames = list(video.film._drawn(None, range(10), lambda fraction, message: told.append(fraction)))
+    assert [frame.getpixel((0, 0))[0] for frame in frames] == list(range(10)) and sorted(drawn) == list(range(10))
+    assert max(most) <= video.film.AT_ONCE and told == sorted(told) and 0.0 == told[0] < told[-1] < 1.0
 
 
 def test_an_interrupted_video_leaves_nothing(tmp_path, video):
@@ -151,7 +174,7 @@ def test_an_interrupted_video_leaves_nothing(tmp_path, video):
         return Image.new("RGB", (32, 32), (number, 0, 0))
 
     with pytest.raises(KeyboardInterrupt):
-        video.encoding.encode(str(tmp_path / "a.webp"), draw, 9, 25.0, 50)
+        video.encoding.encode(str(tmp_path / "a.webp"), map(draw, range(9)), 9, 25.0, 50)
     assert os.listdir(tmp_path) == []
 
 
@@ -172,19 +195,19 @@ def test_mp4_is_what_ffmpeg_makes_of_the_frames_and_its_failure_is_reported(tmp_
     program.write_text('#!/bin/sh\nfor last; do :; done\ncat > "$last"\n')
     program.chmod(0o755)
     frames = [Image.new("RGB", (5, 4), (k, 1, 2)) for k in range(3)]
-    video.encoding.encode(str(tmp_path / "a.mp4"), frames.__getitem__, 3, 25.0, 50)
+    video.encoding.encode(str(tmp_path / "a.mp4"), iter(frames), 3, 25.0, 50)
     expected = b"".join(frame.crop((0, 0, 4, 4)).tobytes() for frame in frames)
     assert (tmp_path / "a.mp4").read_bytes() == expected, "widths are even, frames in order"
     program.write_text("#!/bin/sh\necho 'Unknown encoder' >&2\nexit 3\n")
     with pytest.raises(ShotError, match="Unknown encoder"):
-        video.encoding.encode(str(tmp_path / "b.mp4"), frames.__getitem__, 3, 25.0, 50)
+        video.encoding.encode(str(tmp_path / "b.mp4"), iter(frames), 3, 25.0, 50)
     assert not (tmp_path / "b.mp4").exists()
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_ffmpeg_reads_what_it_wrote(tmp_path, video):
     frames = [Image.new("RGB", (64, 48), (80 * k, 0, 0)) for k in range(3)]
-    video.encoding.encode(str(tmp_path / "a.mp4"), frames.__getitem__, 3, 25.0, 50)
+    video.encoding.encode(str(tmp_path / "a.mp4"), iter(frames), 3, 25.0, 50)
     command = ["ffmpeg", "-v", "error", "-i", str(tmp_path / "a.mp4"), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
     raw = subprocess.run(command, capture_output=True, check=True).stdout
     assert len(raw) == 3 * 64 * 48 * 3
@@ -204,7 +227,7 @@ def test_slow_changes_are_not_left_out_for_long(tmp_path, video):
         return Image.fromarray(np.repeat(np.tile(shade.astype(np.uint8), (64, 1))[:, :, None], 3, axis=2))
 
     quality, count = 60, 40
-    video.encoding.encode(str(tmp_path / "shade.webp"), draw, count, 25.0, quality)
+    video.encoding.encode(str(tmp_path / "shade.webp"), map(draw, range(count)), count, 25.0, quality)
     with Image.open(tmp_path / "shade.webp") as shown:
         shown.seek(shown.n_frames - 1)  # frames that differ in nothing are one
         off = np.abs(np.asarray(shown.convert("RGB"), dtype=int) - np.asarray(draw(count - 1), dtype=int))
