@@ -1,5 +1,6 @@
 """Independent pieces of work in threads."""
 
+import multiprocessing
 import threading
 import time
 
@@ -55,3 +56,22 @@ def test_progress_is_reported_in_the_thread_that_waits_and_may_end_the_work():
 
 def test_work_within_work_does_not_wait_for_itself():
     assert in_parallel(lambda n: sum(in_parallel(lambda k: k * n, range(3))), range(4)) == [0, 3, 6, 9]
+
+
+def _of_a_child(pipe):
+    pipe.send(in_parallel(lambda n: n * n, range(4)))
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork on this system")
+def test_a_forked_process_has_threads_of_its_own():
+    assert in_parallel(lambda n: n, range(4)) == [0, 1, 2, 3]
+    context = multiprocessing.get_context("fork")
+    here, there = context.Pipe()
+    child = context.Process(target=_of_a_child, args=(there,), daemon=True)
+    child.start()
+    try:
+        assert here.poll(60.0), "the child waits for threads that only its parent has"
+        assert here.recv() == [0, 1, 4, 9]
+    finally:
+        child.kill()
+        child.join()
