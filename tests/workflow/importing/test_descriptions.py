@@ -70,7 +70,13 @@ def test_a_package_stands_beside_a_folder_above_or_is_named(read, tmp_path):
 REFUSED = {
     "a mesh that is missing": (urdf(mesh("b.stl")), "b.stl of b"),
     "a xacro": (urdf().replace("<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"').replace(
-        '<link name="a"/>', '<xacro:arm/><link name="a"/>'), "xacro"),
+        '<link name="a"/>', '<xacro:arm/><link name="a"/>'), "<xacro:arm>"),
+    "what xacro has not found": (urdf(mesh("$(find arm)/b.stl")), "Run `xacro"),
+    "a link that no joint ties": (urdf().replace("</robot>", '<link name="c"/></robot>'), "a, c"),
+    "a joint that follows itself": (urdf(joint=JOINT.replace("<limit", '<mimic joint="j"/><limit')), "j -> j"),
+    "joints that follow each other": (
+        urdf(joint=JOINT.replace("<limit", '<mimic joint="k"/><limit') + JOINT.replace('"j"', '"k"').replace(
+            '"b"', '"c"').replace("<limit", '<mimic joint="j"/><limit') + '<link name="c"/>'), "j -> k -> j"),
     "another file": ("<svg/>", "neither a URDF nor an MJCF"),
     "no XML": ("hello", "no XML file"),
 }  # fmt: skip

@@ -16,6 +16,7 @@ from calmotion.workflow.importing.repairs import (
     PACKAGE,
     faults,
     in_package,
+    leader,
     parsed,
     repaired_copy,
     root_joints,
@@ -69,10 +70,10 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
             "this is neither a URDF nor an MJCF robot", path=path, found=f"<{root.tag}>",
             remedy="Name a .urdf file, an .xml file of MuJoCo, or a USD file",
         )  # fmt: skip
-    macros = next((node.tag for node in root.iter() if "xacro" in str(node.tag) or "${" in str(node.attrib)), None)
-    if macros is not None:
+    macro = next((text for node in root.iter() if (text := _macro(node))), None)
+    if macro is not None:
         raise ShotError(
-            "this is a xacro, from which a URDF is made first", path=path, found=macros,
+            "this is a xacro, from which a URDF is made first", path=path, found=macro,
             remedy=f"Run `xacro {os.path.basename(path)} > robot.urdf`, and import robot.urdf",
         )  # fmt: skip
     if root.find("link") is None:
@@ -81,6 +82,8 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
             remedy="Name the file that describes the whole robot; from a .xacro, `xacro FILE > robot.urdf` makes it",
         )  # fmt: skip
     _refuse_other_joints(root, path)
+    _refuse_several_roots(root, path)
+    _refuse_circular_followers(root, path)
     found = _packages(root, path, packages)
     _refuse_missing_meshes(root, path, found)
     links = root.findall("link")
@@ -110,6 +113,13 @@ def repaired(description: Description, folder: str, broken_meshes: Sequence[str]
     return replace(description, path=repaired_copy(root, description.path, folder, file))
 
 
+def _macro(node: xml.Element) -> str | None:
+    """What of an element a xacro has and a URDF has not: its own tag, or an expression in an attribute."""
+    if "xacro" in str(node.tag):
+        return f"<xacro:{str(node.tag).rpartition('}')[2].rpartition(':')[2]}>"
+    return next((f'{name}="{value}"' for name, value in node.items() if "${" in value or "$(" in value), None)
+
+
 def _refuse_other_joints(root: xml.Element, path: str) -> None:
     """Refuse joints that no motor of Calmotion can be, and which a converter drops."""
     loose = root_joints(root)
@@ -122,6 +132,33 @@ def _refuse_other_joints(root: xml.Element, path: str) -> None:
         if joint.get("type") not in _JOINTS and joint not in loose
     ]  # fmt: skip
     raise_all(problems)
+
+
+def _refuse_several_roots(root: xml.Element, path: str) -> None:
+    """Refuse links that no joint ties to the first root, and which a converter drops with all that they carry."""
+    children = {child.get("link") for child in root.findall("joint/child")}
+    roots = [name for link in root.findall("link") if (name := link.get("name", "")) not in children]
+    if len(roots) > 1:
+        raise ShotError(
+            "the robot has several roots, of which only one would be kept", path=path, attribute="link",
+            found=", ".join(roots[:_SHOWN]) + (", ..." if len(roots) > _SHOWN else ""),
+            remedy="Tie them to each other by fixed joints, or write a file for each robot",
+        )  # fmt: skip
+
+
+def _refuse_circular_followers(root: xml.Element, path: str) -> None:
+    """Refuse joints that follow (mimic) themselves, directly or by others: nothing would move them."""
+    leaders = {joint.get("name"): leader(joint) for joint in root.findall("joint")}
+    for name in leaders:
+        chain = [name]
+        while (following := leaders.get(chain[-1])) is not None and following not in chain:
+            chain.append(following)
+        if following == name:
+            raise ShotError(
+                "joints follow each other in a circle", path=path, attribute="mimic",
+                found=" -> ".join(str(joint) for joint in (*chain, name)),
+                remedy="Remove the <mimic> of the joint that the others follow",
+            )  # fmt: skip
 
 
 def _root(path: str) -> tuple[xml.Element, tuple[str, ...]]:

@@ -128,16 +128,17 @@ def _late_followers(root: xml.Element) -> list[xml.Element]:
     """Joints that follow one further down in the file."""
     joints = root.findall("joint")
     place = {joint.get("name"): k for k, joint in enumerate(joints)}
-    return [joint for k, joint in enumerate(joints) if place.get(_leader(joint), -1) > k]
+    return [joint for k, joint in enumerate(joints) if place.get(leader(joint), -1) > k]
 
 
 def _followers_of_none(root: xml.Element) -> list[xml.Element]:
     """Joints that follow one that the robot does not have."""
     names = {joint.get("name") for joint in root.findall("joint")}
-    return [joint for joint in root.findall("joint") if joint.find("mimic") is not None and _leader(joint) not in names]
+    return [joint for joint in root.findall("joint") if joint.find("mimic") is not None and leader(joint) not in names]
 
 
-def _leader(joint: xml.Element) -> str | None:
+def leader(joint: xml.Element) -> str | None:
+    """The joint that one follows (mimics); None where it moves by itself."""
     mimic = joint.find("mimic")
     return None if mimic is None else mimic.get("joint")
 
@@ -152,7 +153,7 @@ def _leaders_first(root: xml.Element) -> Iterator[xml.Element]:
         while node is not None and id(node) not in done:
             chain.append(node)
             done.add(id(node))
-            node = joints.get(_leader(node))
+            node = joints.get(leader(node))
         yield from reversed(chain)
 
 
