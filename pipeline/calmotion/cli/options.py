@@ -208,6 +208,25 @@ def run_arguments(args: argparse.Namespace, display: ProgressDisplay) -> dict[st
     }
 
 
+def progress_display(args: argparse.Namespace, quiet: bool | None = None) -> ProgressDisplay:
+    """What shows the progress of a command on a shot, as its options ask for it.
+
+    Args:
+        args: Of a command that `shot_command` made.
+        quiet: Whether nothing is shown to a person; None: as `--quiet` says.
+
+    Raises:
+        SettingError: The log cannot be written, or is another output.
+    """
+    from calmotion.cli.progress import ProgressDisplay
+    from calmotion.workflow.outputs import refuse_overwriting
+
+    files = {"-o": getattr(args, "output", None), "--figures": getattr(args, "figures", None), "--log": args.log}
+    refuse_overwriting({}, {option: path for option, path in files.items() if path})
+    quiet = args.quiet if quiet is None else quiet
+    return ProgressDisplay(quiet, args.progress, args.log, args.openjd, getattr(args, "verbose", False))
+
+
 def simulation_arguments(args: argparse.Namespace) -> dict[str, Any]:
     """The keyword arguments of the workflow's functions that `simulation_options` added."""
     names = ("tolerance", "step", "integrator", "pre_roll", "motors", "keep", "leave_out")

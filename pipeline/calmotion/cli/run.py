@@ -9,9 +9,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import assignments, opened_shot, run_arguments, simulation_arguments
+from calmotion.cli.options import opened_shot, progress_display, run_arguments, simulation_arguments
 from calmotion.cli.output import FAILED, INTERRUPTED, Output, conclude
-from calmotion.cli.progress import ProgressDisplay
 from calmotion.shot.run import OutputPaths
 from calmotion.support import interrupts
 from calmotion.workflow.results import SimulationResult
@@ -41,7 +40,7 @@ def run_shot(
     shot = opened_shot(args)
     paths = OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures, video=args.video)
     _refuse_files(shot, args, paths)
-    with ProgressDisplay(args.quiet, args.progress, args.log, args.openjd, args.verbose) as display:
+    with progress_display(args) as display:
         result = function(
             shot,
             verify=args.verify,
@@ -54,6 +53,11 @@ def run_shot(
     if manifest := _write_manifest(result, args):
         report["manifest"] = manifest
     conclude(report, result.problems, output, None if args.quiet else partial(print_run, verbose=args.verbose))
+    return _status(result, report, args)
+
+
+def _status(result: SimulationResult, report: dict[str, Any], args: argparse.Namespace) -> int:
+    """The exit status of a run."""
     if result.interrupted:
         return INTERRUPTED
     unlike = any(row["unlike_ground"] for row in report["contacts"])
@@ -120,10 +124,13 @@ def watch_shot(args: argparse.Namespace, output: Output) -> int:
 
     def run(shot: Shot) -> SimulationResult:
         function = optimize if args.optimize else simulate
-        options = {"operators": args.run, "settings": assignments(args), **simulation_arguments(args)}
-        return function(shot, verify=args.verify, outputs=paths, **options)
+        with progress_display(args, quiet=True) as display:  # a run has one line
+            options = run_arguments(args, display) | simulation_arguments(args)
+            return function(shot, verify=args.verify, outputs=paths, **options)
 
-    watch, done, status = Watch(opened_shot(args), run), 0, 0
+    shot = opened_shot(args)
+    _refuse_files(shot, args, paths)
+    watch, done, status = Watch(shot, run), 0, 0
     if not args.quiet:
         notice(f"watching {args.shot}; Ctrl-C ends it")
     while args.runs is None or done < args.runs:
@@ -141,25 +148,25 @@ def watch_shot(args: argparse.Namespace, output: Output) -> int:
             print_error(error, output)
             status = FAILED
         else:
-            status = FAILED if result.problems else 0
-            _tell(result, watch, time.perf_counter() - begin, args, output)
+            status = _tell(result, watch, time.perf_counter() - begin, args, output)
             if result.interrupted:
-                return INTERRUPTED
+                return status
         done += 1
     return status
 
 
-def _tell(result: SimulationResult, watch: Watch, seconds: float, args: argparse.Namespace, output: Output) -> None:
-    """Print one line for a run."""
+def _tell(result: SimulationResult, watch: Watch, seconds: float, args: argparse.Namespace, output: Output) -> int:
+    """Print one line for a run; the exit status that it has alone."""
     from calmotion.cli.quantities import length
     from calmotion.workflow.watch import largest_error
 
     report: dict[str, Any] = result.report()
+    status = _status(result, report, args)
     if output.json:
         output.object(report | {"reused": watch.reused, "made": watch.made, "seconds": seconds})
-        return
+        return status
     if args.quiet:
-        return
+        return status
     path, error, moment = largest_error(result)
     verdict = "tolerance kept" if report["tolerance_kept"] else "tolerance missed"
     what = "optimised" if args.optimize else "simulated"
@@ -174,3 +181,4 @@ def _tell(result: SimulationResult, watch: Watch, seconds: float, args: argparse
     )  # fmt: skip
     for problem in result.problems:
         print(f"  {problem.error}", file=output.stream, flush=True)
+    return status

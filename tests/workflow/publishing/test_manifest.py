@@ -81,3 +81,14 @@ def test_the_command_line_writes_it(calmotion, tmp_path):
     run = calmotion("simulate", tmp_path / "shot.usda", "--step", "10ms", "--manifest", path, "--json", "--quiet")
     assert run.returncode == 0 and json.loads(run.stdout)["manifest"] == str(path)
     assert read_manifest(path)["command"] == "simulate" and read_manifest(path)["outputs"] == []
+
+
+@pytest.mark.parametrize("name", ["shot.usda", "calm.usda", "calm_root.usda"])
+def test_it_is_never_written_over_what_is_read_or_another_output(tmp_path, name):
+    shot = tmp_path / "shot.usda"
+    shot.write_text(ONE_HINGE)
+    result = cm.simulate(shot, step="10ms", outputs=OutputPaths(layer=str(tmp_path / "calm.usda")))
+    before = (tmp_path / name).read_bytes()
+    with pytest.raises(cm.SettingError, match="overwritten|output"):
+        cm.write_manifest(result, tmp_path / name)
+    assert (tmp_path / name).read_bytes() == before

@@ -65,8 +65,14 @@ def write_manifest(result: SimulationResult, path: str | os.PathLike[str]) -> st
     """Write the manifest of a result; returns the path.
 
     Raises:
+        SettingError: The file is read as the shot, or is another output of the result.
         ShotError: It cannot be written.
     """
+    from calmotion.workflow.exporting.result_files import no_input
+    from calmotion.workflow.outputs import refuse_overwriting
+
+    no_input(result.outcome, path)
+    refuse_overwriting({}, {role: file for file, role in _outputs(result)} | {"manifest": os.fspath(path)})
     content = json.dumps(manifest_of(result, Path(path).parent), indent=2, allow_nan=False) + "\n"
     try:
         write_text(Path(path), content)

@@ -6,7 +6,7 @@ import argparse
 import shlex
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.options import Commands, file_argument, opened_shot, run_arguments, shot_command
+from calmotion.cli.options import Commands, file_argument, opened_shot, progress_display, run_arguments, shot_command
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -29,12 +29,11 @@ def add_to(commands: Commands) -> None:
 
 def _run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import conclude
-    from calmotion.cli.progress import ProgressDisplay
     from calmotion.workflow.commands import rig
     from calmotion.workflow.report import rig_report
 
     shot = opened_shot(args)
-    with ProgressDisplay(args.quiet, args.progress, args.log, args.openjd) as display:
+    with progress_display(args) as display:
         made = rig(shot, args.output, **run_arguments(args, display))
     conclude(rig_report(made), (), output, None if args.quiet else _print)
     return 0

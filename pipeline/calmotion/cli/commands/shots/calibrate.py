@@ -5,7 +5,15 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, quantity, shot_command
+from calmotion.cli.options import (
+    Commands,
+    assignments,
+    file_argument,
+    opened_shot,
+    progress_display,
+    quantity,
+    shot_command,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -84,13 +92,12 @@ def parameter_arguments(args: argparse.Namespace) -> dict[str, Any]:
 
 def _run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import conclude
-    from calmotion.cli.progress import ProgressDisplay
     from calmotion.workflow.calibration.calibrate import calibrate
     from calmotion.workflow.exporting.export import with_shot
 
     args.shot = with_shot(args.shot)
     shot = opened_shot(args)
-    with ProgressDisplay(args.quiet, args.progress, args.log) as display:
+    with progress_display(args) as display:
         made = calibrate(
             shot, args.recording, layer=args.output, **parameter_arguments(args), validate=not args.no_validation,
             tolerance=args.tolerance, step=args.step, integrator=args.integrator,

@@ -6,7 +6,15 @@ import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.commands.shots.calibrate import parameter_arguments, prior_option
-from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, quantity, shot_command
+from calmotion.cli.options import (
+    Commands,
+    assignments,
+    file_argument,
+    opened_shot,
+    progress_display,
+    quantity,
+    shot_command,
+)
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -46,11 +54,10 @@ def add_to(commands: Commands) -> None:
 
 def _run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import conclude
-    from calmotion.cli.progress import ProgressDisplay
     from calmotion.workflow.calibration.excite import SENSORS, excite
 
     shot = opened_shot(args)
-    with ProgressDisplay(args.quiet, args.progress, args.log) as display:
+    with progress_display(args) as display:
         made = excite(
             shot, layer=args.output, sensors=args.sensor or SENSORS, **parameter_arguments(args),
             duration=args.duration, amplitude=args.amplitude or "10deg",

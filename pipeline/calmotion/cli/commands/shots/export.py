@@ -5,7 +5,15 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, quantity, shot_command
+from calmotion.cli.options import (
+    Commands,
+    assignments,
+    file_argument,
+    opened_shot,
+    progress_display,
+    quantity,
+    shot_command,
+)
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -61,12 +69,11 @@ def _rate(text: str) -> float:
 
 def _run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import FAILED, conclude
-    from calmotion.cli.progress import ProgressDisplay
     from calmotion.workflow.exporting.export import export, with_shot
 
     args.shot = with_shot(args.shot)
     shot = opened_shot(args)
-    with ProgressDisplay(args.quiet, args.progress, args.log, args.openjd) as display:
+    with progress_display(args) as display:
         made = export(
             shot, args.output, to=args.to, rate=args.rate, start_delay=args.start_delay, tolerance=args.tolerance,
             search=not args.no_search, operators=args.run, settings=assignments(args), progress=display,

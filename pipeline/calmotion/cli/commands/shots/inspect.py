@@ -9,6 +9,7 @@ from calmotion.cli.options import (
     Commands,
     file_argument,
     opened_shot,
+    progress_display,
     run_arguments,
     shot_command,
     simulation_arguments,
@@ -38,11 +39,10 @@ def add_to(commands: Commands) -> None:
 def _run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.inspect_tables import print_inspection
     from calmotion.cli.output import FAILED, INTERRUPTED, conclude
-    from calmotion.cli.progress import ProgressDisplay
     from calmotion.workflow.commands import inspect
 
     shot = opened_shot(args)
-    with ProgressDisplay(args.quiet, args.progress, args.log, args.openjd) as display:
+    with progress_display(args) as display:
         inspection = inspect(
             shot,
             strict=args.strict,

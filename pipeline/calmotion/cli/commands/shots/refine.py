@@ -6,7 +6,15 @@ import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.commands.shots.calibrate import parameter_arguments, prior_option
-from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, quantity, shot_command
+from calmotion.cli.options import (
+    Commands,
+    assignments,
+    file_argument,
+    opened_shot,
+    progress_display,
+    quantity,
+    shot_command,
+)
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -36,13 +44,12 @@ def add_to(commands: Commands) -> None:
 
 def _run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import conclude
-    from calmotion.cli.progress import ProgressDisplay
     from calmotion.workflow.calibration.refine import refine
     from calmotion.workflow.exporting.export import with_shot
 
     args.shot = with_shot(args.shot)
     shot = opened_shot(args)
-    with ProgressDisplay(args.quiet, args.progress, args.log) as display:
+    with progress_display(args) as display:
         made = refine(
             shot, args.recording, layer=args.output, **parameter_arguments(args),
             tolerance=args.tolerance, step=args.step, operators=args.run,
