@@ -63,6 +63,16 @@ def test_a_dash_is_no_name_of_an_output(tmp_path, monkeypatch):
     assert names(tmp_path) == []
 
 
+def test_a_home_folder_that_no_shell_has_replaced_is_no_place_of_an_output(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(OSError, match="home folder"):
+        try_writing("~/out.csv")
+    assert names(tmp_path) == []
+    try_writing("~out.csv")
+    (tmp_path / "~").mkdir()
+    try_writing("~/out.csv")
+
+
 def test_temporary_files_have_random_names_and_are_private(tmp_path):
     seen = []
     for _ in range(3):

@@ -158,6 +158,9 @@ def try_writing(path: str | Path) -> None:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
     if target.name == "-":
         raise OSError(errno.EINVAL, "This would be a file named -, not the standard output", str(path))
+    if len(target.parts) > 1 and target.parts[0].startswith("~") and not os.path.isdir(target.parts[0]):
+        reason = f"This would be a folder named {target.parts[0]}, not the home folder; write the whole path"
+        raise OSError(errno.EINVAL, reason, str(path))
     refuse_special(target)
     _refuse_system(target)
     target.parent.mkdir(parents=True, exist_ok=True)

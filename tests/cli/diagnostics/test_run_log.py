@@ -59,7 +59,11 @@ def test_the_display_logs_operators_notes_and_the_end_also_of_a_quiet_run(tmp_pa
 
 def test_a_log_that_cannot_be_written_is_refused_before_the_run(tmp_path, calmotion, repository):
     os.mkfifo(tmp_path / "pipe")
-    for path in (tmp_path, tmp_path / "missing" / "log", tmp_path / "pipe"):
+    with (tmp_path / "output").open("w") as output:  # `--log /dev/stdout > output`: report and log would mix
+        (tmp_path / "stdout").symlink_to(f"/proc/self/fd/{output.fileno()}")
+        with pytest.raises(SettingError, match="never replaced"):
+            RunLog(str(tmp_path / "stdout"))
+    for path in (tmp_path, tmp_path / "pipe" / "log", tmp_path / "pipe"):
         with pytest.raises(SettingError) as caught:
             RunLog(str(path))
         assert caught.value.path == "--log" and str(path) in str(caught.value.found)

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from calmotion.host import OperatorResult, SettingError
-from calmotion.support.files import is_special
+from calmotion.support.files import try_writing
 from calmotion.support.memory import peak_memory, resident_memory
 from calmotion.version import __version__
 from calmotion.workflow.run import Progress
@@ -51,8 +51,7 @@ class RunLog:
         self._begin = self._last = time.perf_counter()
         self._shown = ("", "", 0.0)
         try:
-            if is_special(path):
-                raise OSError(0, "it is not a regular file")
+            try_writing(path)
             if not _is_log(path):
                 raise OSError(0, "it is a file of another kind, which is never changed")
             self._file = open(path, "a", encoding="utf-8")  # closed by `end`
