@@ -63,6 +63,12 @@ def test_a_dash_is_no_name_of_an_output(tmp_path, monkeypatch):
     assert names(tmp_path) == []
 
 
+def test_what_ends_in_a_slash_is_no_file(tmp_path):
+    with pytest.raises(IsADirectoryError):
+        try_writing(f"{tmp_path}/out/")
+    assert names(tmp_path) == []
+
+
 def test_a_home_folder_that_no_shell_has_replaced_is_no_place_of_an_output(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(OSError, match="home folder"):

@@ -154,7 +154,7 @@ def try_writing(path: str | Path) -> None:
         OSError: The file could not be written.
     """
     target = Path(path)
-    if target.is_dir():
+    if target.is_dir() or os.fspath(path).endswith(("/", os.sep)):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
     if target.name == "-":
         raise OSError(errno.EINVAL, "This would be a file named -, not the standard output", str(path))

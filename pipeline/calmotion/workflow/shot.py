@@ -38,7 +38,7 @@ class Shot:
         self.path = os.fspath(path)
         self.motion = None if motion is None else os.fspath(motion)
         self.settings = read_settings(settings)
-        self._settings_file = None if settings is None or isinstance(settings, Mapping) else os.fspath(settings)
+        self.settings_file = None if settings is None or isinstance(settings, Mapping) else os.fspath(settings)
         self.host: Host = open_host([os.fspath(folder) for folder in plugins])
         self._read: dict[type, object] = {}
         self.reuse: Reuse | None = None  # values of an earlier run for the next ones, see `watch.Watch`
@@ -49,7 +49,7 @@ class Shot:
     @property
     def inputs(self) -> dict[str, str]:
         """Files that the user named to be read, by what they are."""
-        named = {"the shot": self.path, "the motion": self.motion, "the settings": self._settings_file}
+        named = {"the shot": self.path, "the motion": self.motion, "the settings": self.settings_file}
         return {what: path for what, path in named.items() if path is not None}
 
     @property

@@ -83,6 +83,18 @@ def test_the_command_line_writes_it(calmotion, tmp_path):
     assert read_manifest(path)["command"] == "simulate" and read_manifest(path)["outputs"] == []
 
 
+def test_a_file_of_settings_is_an_input(tmp_path):
+    shot, settings = tmp_path / "shot.usda", tmp_path / "settings.toml"
+    shot.write_text(ONE_HINGE)
+    settings.write_text('["retarget.simulate"]\n')
+    result = cm.simulate(cm.open_shot(shot, settings=settings), step="10ms")
+    manifest = read_manifest(cm.write_manifest(result, tmp_path / "m.json"))
+    assert changed_files(manifest, tmp_path) == []
+    settings.write_text('["fe.mesh"]\nelement_size = 0.01\n')
+    (error,) = changed_files(manifest, tmp_path)
+    assert "file of settings has changed" in error.message()
+
+
 @pytest.mark.parametrize("name", ["shot.usda", "calm.usda", "calm_root.usda"])
 def test_it_is_never_written_over_what_is_read_or_another_output(tmp_path, name):
     shot = tmp_path / "shot.usda"

@@ -170,6 +170,8 @@ def _inputs(result: SimulationResult) -> Iterator[tuple[str, str, str | None]]:
         yield os.path.join(folder, layer.path), "layer of the shot" if number else "shot", layer.sha256
     if result.shot.motion:
         yield result.shot.motion, "motion", None
+    if result.shot.settings_file:
+        yield result.shot.settings_file, "file of settings", None
     for body in character.bodies:
         if body.flexible is not None and body.flexible.mesh_file:
             yield body.flexible.mesh_file, "mesh", None
