@@ -1,9 +1,13 @@
 """Errors for users: where they are, and what the machine lacks, which is no fault of the program."""
 
 import errno
+import pickle
 
 import pytest
-from calmotion.errors import ShotError, failure_of_machine
+from calmotion.errors import ShotError, ShotErrors, each, failure_of_machine
+from calmotion.host import SettingError
+from calmotion.workflow.importing.converters import BrokenMeshes
+from calmotion.workflow.problems import Problem, RunError
 
 
 @pytest.mark.parametrize(
@@ -28,6 +32,26 @@ def test_a_failure_of_the_machine_has_a_problem_and_a_remedy(error, problem):
 @pytest.mark.parametrize("error", [ValueError("x"), OSError("without a number"), ShotError("a shot"), ImportError("x")])
 def test_other_exceptions_are_none(error):
     assert failure_of_machine(error) is None
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        ShotError("bad", path="/Arm", attribute="a", found=ValueError("x"), remedy="Correct it"),
+        SettingError("bad", path="--step", found=1.0, remedy="Write another"),
+        ShotErrors([ShotError("one", path="/a"), ShotError("two", path="/b")]),
+        RunError([Problem(ShotError("one", path="/a"), "usd.read", "usd_reader"), Problem(ShotError("two"))]),
+        BrokenMeshes("robot.urdf", ["a.obj", "b.obj"]),
+    ],
+)
+def test_errors_travel_between_processes(error):
+    back = pickle.loads(pickle.dumps(error))
+    assert type(back) is type(error) and str(back) == str(error) and back.as_dict() == error.as_dict()
+    assert [str(one) for one in each(back)] == [str(one) for one in each(error)]
+    assert getattr(back, "files", ()) == getattr(error, "files", ())
+    assert [row.as_dict() for row in getattr(back, "problems", ())] == [
+        row.as_dict() for row in getattr(error, "problems", ())
+    ]
 
 
 @pytest.mark.parametrize(

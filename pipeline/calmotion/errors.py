@@ -6,6 +6,7 @@ import errno
 import os
 import re
 from collections.abc import Sequence
+from typing import Any
 
 
 class ShotError(Exception):
@@ -30,6 +31,11 @@ class ShotError(Exception):
         self.remedy = remedy
         super().__init__(self.message())
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Errors travel between processes with all their fields; what was found, as its text."""
+        fields = self.__dict__ | {"found": None if self.found is None else str(self.found)}
+        return _restored, (type(self), self.args, fields)
+
     @property
     def place(self) -> str:
         """Where: prim path and attribute, as far as they are known; an option of the command stands first."""
@@ -53,6 +59,12 @@ class ShotError(Exception):
             "found": "" if self.found is None else str(self.found),
             "remedy": self.remedy,
         }
+
+
+def _restored(cls: type[ShotError], args: tuple[object, ...], fields: dict[str, Any]) -> ShotError:
+    error = cls.__new__(cls, *args)
+    error.__dict__.update(fields)
+    return error
 
 
 # Parts of messages with which libraries say that memory or threads ran out, under exceptions of other kinds.

@@ -1,7 +1,8 @@
 import math
 
+import numpy as np
 import pytest
-from calmotion.host import SettingError, has_no_unit, parse_quantity
+from calmotion.host import SettingError, has_no_unit, parse_quantity, quantity_of
 
 
 @pytest.mark.parametrize(
@@ -59,3 +60,29 @@ def test_a_number_that_no_computer_holds_is_refused_briefly(text):
     with pytest.raises(SettingError, match="beyond what can be represented|not a number") as error:
         parse_quantity(text, "m")
     assert len(str(error.value)) < 400
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "expected"),
+    [
+        (None, "m", None), ("1mm", "m", 1e-3), (1, "s", 1.0), (np.float32(0.5), "m", 0.5), (np.int64(2), "s", 2.0),
+        ("2", "s", 2.0), ("180deg", "rad", np.pi),
+    ],
+)  # fmt: skip
+def test_numbers_are_in_si_and_texts_have_units(value, unit, expected):
+    found = quantity_of(value, unit)
+    assert found == (None if expected is None else pytest.approx(expected, rel=1e-12))
+    assert found is None or type(found) is float
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "problem"),
+    [
+        ("1", "m", "no unit"), ("1s", "m", "unit does not fit"), (True, "s", "a number or a text"),
+        (1j, "s", "a number or a text"), (np.array(1.0), "m", "a number or a text"), (np.inf, "s", "finite"),
+        (float("nan"), "m", "finite"), ("inf", "s", "finite|not a number"),
+    ],
+)  # fmt: skip
+def test_anything_else_is_refused_by_its_name(value, unit, problem):
+    with pytest.raises(SettingError, match=problem):
+        quantity_of(value, unit, "tolerance")

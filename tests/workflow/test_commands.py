@@ -240,8 +240,13 @@ def test_an_inspection_reports_what_is_there(shot_file):
 
 
 @pytest.mark.parametrize(
-    ("given", "problem"), [({"tolerance": "1kg"}, "1kg"), ({"settings": {"no.such.thing": 1}}, "no.such")]
-)
+    ("given", "problem"),
+    [
+        ({"tolerance": "1kg"}, "1kg"), ({"settings": {"no.such.thing": 1}}, "no.such"), ({"tolerance": "1"}, "1mm"),
+        ({"pre_roll": float("inf")}, "finite"), ({"integrator": 5}, "bdf2"), ({"shaper": 5}, "zvd"),
+        ({"outputs": {"layer": "calm.usda"}}, "OutputPaths"), ({"operators": "no.such"}, "no.such"),
+    ],
+)  # fmt: skip
 def test_wrong_arguments_are_setting_errors(shot_file, given, problem):
     with pytest.raises(cm.SettingError, match=problem):
         cm.simulate(shot_file, **given)
@@ -296,3 +301,10 @@ def test_a_tolerance_that_is_no_quantity_is_an_error_of_the_caller(tmp_path, val
 
 def test_one_kind_of_simplification_may_be_named_by_itself():
     assert _forced("modes", ()) == _forced(["modes"], ()) and _forced((), "modes") == _forced((), ["modes"])
+
+
+def test_arrays_of_a_result_cannot_be_changed_by_mistake(simulated):
+    (target,), (motor, *_) = simulated.targets.values(), simulated.motors.values()
+    for array in (simulated.times, target.error, target.position, motor.output):
+        with pytest.raises(ValueError, match="read-only"):
+            array *= 1e3

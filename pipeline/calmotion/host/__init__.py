@@ -8,7 +8,7 @@ from calmotion.host.properties import Property, PropertyValues
 from calmotion.host.registry import Host, Plugin, PluginState, open_host
 from calmotion.host.run import OperatorResult, Outcome, Reuse, Run
 from calmotion.host.settings import Settings, merge, read_assignment, read_settings_file
-from calmotion.host.units import has_no_unit, parse_quantity
+from calmotion.host.units import has_no_unit, parse_quantity, quantity_of
 from calmotion.support.naming import nearest
 
 __all__ = [
@@ -37,6 +37,7 @@ __all__ = [
     "nearest",
     "open_host",
     "parse_quantity",
+    "quantity_of",
     "read_assignment",
     "read_manifest",
     "read_settings_file",

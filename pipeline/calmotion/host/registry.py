@@ -75,6 +75,17 @@ class Host:
         self.plugins: list[Plugin] = []
         self._registering: Plugin | None = None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Modules of plugins stay in their process.
+
+        Raises:
+            TypeError: Always.
+        """
+        raise TypeError(
+            "shots and results hold plugins, which do not travel between processes: open the shot there, and send the "
+            "report(), the motion or the columns() of the result"
+        )
+
     @property
     def operators(self) -> dict[str, type[Operator]]:
         """Idname to operator, of the plugins that are registered, in the order of the plugins."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from decimal import Decimal, InvalidOperation, Overflow
+from numbers import Real
 
 from calmotion.host.errors import SettingError
 from calmotion.support.naming import nearest
@@ -73,6 +74,34 @@ def parse_quantity(text: str, unit: str = "") -> float:
         raise SettingError(
             "this number is beyond what can be represented", found=_short(text), remedy=remedy
         ) from error
+
+
+def quantity_of(value: float | str | None, unit: str, name: str = "") -> float | None:
+    """A quantity in SI; None where none is given.
+
+    Args:
+        value: A number, or a text with a unit. A bare length in a text is refused, as in the command line: most are
+            meant in millimetres.
+        unit: `m`, `s` or `rad`.
+        name: Of the argument.
+
+    Raises:
+        SettingError: It is neither, not finite, or a text that does not fit.
+    """
+    if isinstance(value, str):
+        if unit == "m" and has_no_unit(value):
+            raise SettingError(
+                "this length has no unit", path=name, found=value, remedy=f"Write {value}mm or {value}m."
+            )
+        value = parse_quantity(value, unit)
+    elif value is not None and (isinstance(value, bool) or not isinstance(value, Real)):
+        raise SettingError(
+            "must be a number or a text", path=name, found=repr(value),
+            remedy=f"Write a number, in {unit}, or a text with a unit.",
+        )  # fmt: skip
+    if value is not None and not math.isfinite(value):
+        raise SettingError("must be finite", path=name, found=value, remedy="Write another number, or leave it out.")
+    return None if value is None else float(value)
 
 
 def _matched(text: str) -> re.Match[str] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -106,7 +107,8 @@ def errors_and_form(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) ->
         off = np.einsum("aq,eack->eqck", shapes, recovered[mesh.tets[some]], optimize=True) - strain
         forces = weight * np.einsum("ij,eqjk->eqik", law, off, optimize=True)
         parts[some] = np.einsum("eqik,eqik->ek", forces, off)
-        form += forces.reshape(-1, count).T @ off.reshape(-1, count)
+        rows = (math.prod(off.shape[:3]), count)  # of no displacements there is nothing from which -1 would follow
+        form += forces.reshape(rows).T @ off.reshape(rows)
         own += np.einsum("eqik,eqik->k", weight * np.einsum("ij,eqjk->eqik", law, strain, optimize=True), strain)
     return parts / own, 0.5 * (form + form.T) / own[:1]
 

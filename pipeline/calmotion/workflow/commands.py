@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from numbers import Real
 
-from calmotion.host import OperatorResult, SettingError, Settings, merge, parse_quantity
+from calmotion.host import OperatorResult, SettingError, Settings, merge, quantity_of
 from calmotion.shot.model_choice import KINDS, OFF, ON
 from calmotion.shot.outputs import Rig, Verification
 from calmotion.shot.result import Result
@@ -227,25 +226,15 @@ def _source(
         path="",
         command="",
         settings=RunSettings(
-            tolerance=_quantity(tolerance, "m"),
-            step=_quantity(step, "s"),
+            tolerance=quantity_of(tolerance, "m", "tolerance"),
+            step=quantity_of(step, "s", "step"),
             integrator=integrator,
-            pre_roll=_quantity(pre_roll, "s"),
+            pre_roll=quantity_of(pre_roll, "s", "pre_roll"),
             ideal_motors=motors == IDEAL,
         ),
         shaper=shaper,
         verify=verify,
     )
-
-
-def _quantity(value: float | str | None, unit: str) -> float | None:
-    if isinstance(value, str):
-        return parse_quantity(value, unit)
-    if value is not None and (isinstance(value, bool) or not isinstance(value, Real)):
-        raise SettingError(
-            "must be a number or a text", found=repr(value), remedy=f"Write a number, in {unit}, or a text with a unit."
-        )
-    return None if value is None else float(value)
 
 
 def _forced(keep: Sequence[str], leave_out: Sequence[str]) -> Settings:

@@ -6,8 +6,9 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from calmotion.host import SettingError
+from calmotion.host import Host, SettingError
 from calmotion.shot import Character, Provenance
+from calmotion.shot.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
 from calmotion.shot.run import OutputPaths
 from calmotion.support.files import try_writing
 
@@ -15,6 +16,10 @@ _NAMES = (("-o", "layer"), ("--csv", "csv"), ("--rrd", "rrd"), ("--figures", "fi
           ("--modes", "modes"))  # fmt: skip
 _FOLDERS = ("--figures", "--modes")
 _ROOT = "-o, its root layer"
+_KINDS = (
+    (WrittenLayer, "-o", "layer"), (CsvFile, "--csv", "csv"), (Recording, "--rrd", "rrd"),
+    (Figures, "--figures", "figures"), (Video, "--video", "video"),
+)  # fmt: skip
 
 
 def files_of(outputs: OutputPaths) -> dict[str, str]:
@@ -103,3 +108,39 @@ def _is_same(one: str, other: str) -> bool:
     if os.path.realpath(one) == os.path.realpath(other):
         return True
     return os.path.exists(one) and os.path.exists(other) and os.path.samefile(one, other)
+
+
+def refuse_other_types(outputs: object) -> None:
+    """Refuse outputs that are named in another way.
+
+    Raises:
+        SettingError: They are.
+    """
+    if not isinstance(outputs, OutputPaths):
+        raise SettingError(
+            "must be OutputPaths", path="outputs", found=repr(outputs)[:80],
+            remedy='Write calmotion.OutputPaths(layer="calm.usda").',
+        )  # fmt: skip
+
+
+def requested_files(host: Host, outputs: OutputPaths) -> list[type]:
+    """The types that the requested files are made as.
+
+    Raises:
+        SettingError: No plugin writes one of them.
+    """
+    kinds: list[type] = []
+    for kind, option, name in _KINDS:
+        path = getattr(outputs, name)
+        if path is None:
+            continue
+        if not host.providers(kind):
+            failed = "; ".join(f"{plugin.id}: {plugin.error}" for plugin in host.failures())
+            raise SettingError(
+                "no plugin writes this output",
+                path=option,
+                found=path,
+                remedy=f"Plugins that failed: {failed}" if failed else f"Install one that provides {kind.__name__}.",
+            )
+        kinds.append(kind)
+    return kinds

@@ -15,6 +15,7 @@ from calmotion.shot.character import Array
 from calmotion.shot.outputs import CsvFile, Figures, Recording, Verification, Video, WrittenLayer
 from calmotion.shot.run import OutputPaths
 from calmotion.shot.table import columns
+from calmotion.support.arrays import read_only
 from calmotion.workflow.exporting.result_files import no_input
 from calmotion.workflow.run import Outcome, again
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class TargetMotion:
-    """The motion of one target, T time steps, world axes of the stage.
+    """The motion of one target, T time steps, world axes of the stage; copy an array to change it.
 
     Attributes:
         path: Prim path.
@@ -250,8 +251,7 @@ class SimulationResult:
         options: dict[str, object] = {"bake": bake, "splines": splines}
         if samples_per_second is not None:
             options["samples_per_second"] = samples_per_second
-        outputs = OutputPaths(layer=os.fspath(layer))
-        return again(self._outcome, WrittenLayer, outputs, settings={"usd.write": options})
+        return again(self._outcome, WrittenLayer, OutputPaths(layer=os.fspath(layer)), settings={"usd.write": options})
 
     def export(
         self, path: Path, *, to: str = "csv", rate: float = 500.0, degrees: bool = False, settings: Given = None
@@ -308,25 +308,25 @@ class SimulationResult:
         targets = {
             target.path: TargetMotion(
                 target.path,
-                motion.target_positions[rows, k],
-                motion.target_rotations[rows, k],
-                reference.target_positions[rows, k],
-                reference.target_rotations[rows, k],
-                simulation.position_errors[rows, k],
-                simulation.rotation_errors[rows, k],
+                read_only(motion.target_positions[rows, k]),
+                read_only(motion.target_rotations[rows, k]),
+                read_only(reference.target_positions[rows, k]),
+                read_only(reference.target_rotations[rows, k]),
+                read_only(simulation.position_errors[rows, k]),
+                read_only(simulation.rotation_errors[rows, k]),
             )
             for k, target in enumerate(self._character.targets)
         }
         motors = {
             motor.path: MotorMotion(
                 motor.path,
-                reference.motor_values[rows, m],
-                motion.motor_values[rows, m],
-                motion.motor_efforts[rows, m],
+                read_only(reference.motor_values[rows, m]),
+                read_only(motion.motor_values[rows, m]),
+                read_only(motion.motor_efforts[rows, m]),
             )
             for m, motor in enumerate(self._character.motors)
         }
-        return RobotMotion(motion.times[rows], targets, motors)
+        return RobotMotion(read_only(motion.times[rows]), targets, motors)
 
 
 class OptimizationResult(SimulationResult):

@@ -10,19 +10,14 @@ from typing import Any, TypeVar
 from calmotion.errors import ShotError
 from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, merge, nearest
 from calmotion.shot import Character, Provenance
-from calmotion.shot.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
 from calmotion.shot.run import INTEGRATORS, SHAPERS, OutputPaths, Source
 from calmotion.support import interrupts
 from calmotion.support.foreign_files import remedy_for
-from calmotion.workflow.outputs import files_of, prepare_outputs, refuse_layers
+from calmotion.workflow.outputs import files_of, prepare_outputs, refuse_layers, refuse_other_types, requested_files
 from calmotion.workflow.problems import Cancelled, Problem, problems_of, value_of
 from calmotion.workflow.shot import Shot
 
 T = TypeVar("T")
-_FILES = (
-    (WrittenLayer, "-o", "layer"), (CsvFile, "--csv", "csv"), (Recording, "--rrd", "rrd"),
-    (Figures, "--figures", "figures"), (Video, "--video", "video"),
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -133,9 +128,10 @@ def carry_out(
     start, host, hooks = time.perf_counter(), shot.host, hooks or Hooks()
     source = replace(source or Source("", ""), path=shot.path, command=command, motion=shot.motion)
     outputs = outputs or OutputPaths()
+    refuse_other_types(outputs)
     known = shot.known if known is None else known
     writes = command in ("simulate", "optimize")
-    kinds = [*wanted, *(_requested_files(host, outputs) if writes else ()), *_made_by(host, operators)]
+    kinds = [*wanted, *(requested_files(host, outputs) if writes else ()), *_made_by(host, operators)]
     _refuse_unknown_methods(source)
     _refuse_unreadable_motion(source, host)
     given = merge([shot.settings, settings or {}])
@@ -203,7 +199,7 @@ def _made_by(host: Host, operators: Sequence[str]) -> list[type]:
         SettingError: There is no such operator.
     """
     kinds: list[type] = []
-    for idname in operators:
+    for idname in (operators,) if isinstance(operators, str) else operators:
         if idname not in host.operators:
             known = ", ".join(host.operators)
             raise SettingError(
@@ -231,7 +227,7 @@ def _refuse_unknown_methods(source: Source) -> None:
                 f"{source.command} supports only {', '.join(known)}",
                 path=option,
                 found=found,
-                remedy=f"{nearest(found, known)}Remove the option, or use one of these.",
+                remedy=f"{nearest(str(found), known)}Remove the option, or use one of these.",
             )
 
 
@@ -254,29 +250,6 @@ def _refuse_unreadable_motion(source: Source, host: Host) -> None:
         )
 
 
-def _requested_files(host: Host, outputs: OutputPaths) -> list[type]:
-    """The types that the requested files are made as.
-
-    Raises:
-        SettingError: No plugin writes one of them.
-    """
-    kinds: list[type] = []
-    for kind, option, name in _FILES:
-        path = getattr(outputs, name)
-        if path is None:
-            continue
-        if not host.providers(kind):
-            failed = "; ".join(f"{plugin.id}: {plugin.error}" for plugin in host.failures())
-            raise SettingError(
-                "no plugin writes this output",
-                path=option,
-                found=path,
-                remedy=f"Plugins that failed: {failed}" if failed else f"Install one that provides {kind.__name__}.",
-            )
-        kinds.append(kind)
-    return kinds
-
-
 def again(outcome: Outcome, wanted: type[T], *values: object, settings: Settings | None = None) -> T:
     """One more value from what a run has made.
 
@@ -292,6 +265,14 @@ def again(outcome: Outcome, wanted: type[T], *values: object, settings: Settings
     """
     host, given = outcome.shot.host, {kind: value for kind, value in outcome.run.data.items() if kind is not wanted}
     given |= {type(value): value for value in values}
+    given |= {kind: _found_again(value, outcome.shot) for kind, value in given.items() if kind in (Source, Provenance)}
     data: list[Any] = list(given.values())
     run = host.run(data, [wanted], settings=merge([outcome.shot.settings, settings or {}])).finish()
     return value_of(run, wanted)
+
+
+def _found_again(value: object, shot: Shot) -> object:
+    """A value that names the shot by its path of now: the working folder may be another one."""
+    if isinstance(value, Source):
+        return replace(value, path=shot.path, motion=shot.motion)
+    return replace(value, shot=shot.path) if isinstance(value, Provenance) else value

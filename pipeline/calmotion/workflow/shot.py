@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
@@ -35,8 +36,9 @@ class Shot:
     """
 
     def __init__(self, path: Path, motion: Path | None = None, plugins: Iterable[Path] = (), settings: Given = None):
-        self.path = os.fspath(path)
-        self.motion = None if motion is None else os.fspath(motion)
+        self._path = os.fspath(path)
+        self._motion = None if motion is None else os.fspath(motion)
+        self._folder = _working_folder()
         self.settings = read_settings(settings)
         self.settings_file = None if settings is None or isinstance(settings, Mapping) else os.fspath(settings)
         self.host: Host = open_host([os.fspath(folder) for folder in plugins])
@@ -45,6 +47,19 @@ class Shot:
 
     def __repr__(self) -> str:
         return f"Shot({self.path!r})"
+
+    @property
+    def path(self) -> str:
+        """The USD file: as it was named, and absolute once the working folder is another."""
+        return self._found(self._path)
+
+    @property
+    def motion(self) -> str | None:
+        """The file with a motion, in the same way."""
+        return None if self._motion is None else self._found(self._motion)
+
+    def _found(self, path: str) -> str:
+        return path if _working_folder() == self._folder else os.path.join(self._folder, path)
 
     @property
     def inputs(self) -> dict[str, str]:
@@ -66,6 +81,14 @@ class Shot:
         self._read = {}
         for name in ("character", "animation", "provenance"):
             self.__dict__.pop(name, None)
+
+    def unread(self, path: Path | None = None) -> Shot:
+        """The same shot, or another file in its place, with the same plugins and settings; nothing of it is read."""
+        other = copy.copy(self)
+        other.forget()
+        if path is not None:
+            other._path, other._folder = os.fspath(path), _working_folder()
+        return other
 
     def read(self) -> Shot:
         """Read the file, if that has not happened; returns itself.
@@ -116,6 +139,14 @@ class Shot:
     def notes(self) -> tuple[str, ...]:
         """What the reader noticed, as sentences."""
         return tuple(self.character.notes)
+
+
+def _working_folder() -> str:
+    """The working folder; empty where it was removed."""
+    try:
+        return os.getcwd()
+    except FileNotFoundError:
+        return ""
 
 
 def open_shot(path: Path, *, motion: Path | None = None, plugins: Sequence[Path] = (), settings: Given = None) -> Shot:

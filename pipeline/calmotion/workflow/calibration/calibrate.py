@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -10,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
-from calmotion.host import SettingError, Settings, merge, nearest, parse_quantity
+from calmotion.host import SettingError, Settings, merge, nearest, quantity_of
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion.identification.measurement import refuse_unknown_channels
 from calmotion.identification.parameters import DEFAULT, refuse_unknown
@@ -127,7 +126,9 @@ def calibrate(
     names = [os.fspath(file) for file in files]
     opened = with_sensors(shot)
     read = read_recordings(opened.host, names, merge([opened.settings, chosen]))
-    options = RunSettings(tolerance=_quantity(tolerance, "m"), step=_quantity(step, "s"), integrator=integrator)
+    options = RunSettings(
+        tolerance=quantity_of(tolerance, "m", "tolerance"), step=quantity_of(step, "s", "step"), integrator=integrator
+    )
     target = None if layer is None else os.fspath(layer)
     outcome = compiled_with_sensors(opened, read, options, target, operators, chosen, hooks)
 
@@ -185,9 +186,7 @@ def with_sensors(shot: Shot | Path) -> Shot:
         from calmotion.workflow.exporting.export import with_shot
 
         return Shot(with_shot(os.fspath(shot)))
-    opened = copy.copy(shot)
-    opened.forget()
-    return opened
+    return shot.unread()
 
 
 def _written(outcome: Outcome, calibration: Calibration, layer: str) -> WrittenLayer:
@@ -198,7 +197,3 @@ def _written(outcome: Outcome, calibration: Calibration, layer: str) -> WrittenL
 
 def _drawn(outcome: Outcome, calibration: Calibration, folder: str, settings: Settings) -> tuple[str, ...]:
     return again(outcome, CalibrationFigures, calibration, OutputPaths(figures=folder), settings=settings).paths
-
-
-def _quantity(value: float | str | None, unit: str) -> float | None:
-    return parse_quantity(value, unit) if isinstance(value, str) else value

@@ -11,7 +11,7 @@ from typing import Any
 
 from calmotion.accuracy.reduced_bodies import compiled_in
 from calmotion.errors import ShotError
-from calmotion.host import SettingError, parse_quantity
+from calmotion.host import SettingError, parse_quantity, quantity_of
 from calmotion.identification.excitation.design import ExcitationSettings, blank_recordings, excite_shot
 from calmotion.identification.parameters import DEFAULT, refuse_unknown
 from calmotion.shot import Character, Provenance
@@ -123,7 +123,7 @@ def excite(
     chosen, hooks = read_settings(settings), Hooks(progress, on_operator, cancel)
     wanted = [sensor_of(text) for text in sensors]
     named = blank_recordings([sensor for sensor in wanted if sensor.path], 1.0)
-    options = RunSettings(step=_quantity(step, "s"))
+    options = RunSettings(step=quantity_of(step, "s", "step"))
     target = None if layer is None else os.fspath(layer)
     outcome = compiled_with_sensors(with_sensors(shot), named, options, target, operators, chosen, hooks)
 
@@ -137,7 +137,7 @@ def excite(
 
     character = outcome.require(Character)
     _refuse_other_drives(character)
-    length, largest = _quantity(duration, "s"), _quantity(amplitude, "rad")
+    length, largest = quantity_of(duration, "s", "duration"), quantity_of(amplitude, "rad", "amplitude")
     assert length is not None and largest is not None
     found = excite_shot(
         compiled_in(outcome.run.get),
@@ -195,7 +195,3 @@ def _refuse_other_drives(character: Character) -> None:
                 "a test motion can be written only to drives; this motor follows the animation of bodies or a skeleton",
                 path=motor.path, attribute=motor.attribute, remedy="Apply PhysicsDriveAPI to the joint",
             )  # fmt: skip
-
-
-def _quantity(value: float | str | None, unit: str) -> float | None:
-    return parse_quantity(value, unit) if isinstance(value, str) else value

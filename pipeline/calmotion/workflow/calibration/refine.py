@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -143,9 +142,7 @@ def refine(
     )
     assert calibrated.layer is not None
     root = calibrated.layer.root
-    improved = copy.copy(opened)
-    improved.forget()
-    improved.path = root
+    improved = opened.unread(root)
     played = simulate(improved, **common)
     improved.forget()
     optimized = optimize(improved, outputs=OutputPaths(layer=target), **common)

@@ -36,7 +36,7 @@ def format_named(host: Host, name: str) -> type[CommandFormat]:
             "there is no such format",
             path="--to",
             found=name,
-            remedy=f"{nearest(name, known)}Use one of {', '.join(known)}."
+            remedy=f"{nearest(str(name), known)}Use one of {', '.join(known)}."
             + (f" Plugins that failed: {failed}" if failed else ""),
         )
     return known[name]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 
 from calmotion.control.commands import HIGHEST_RATE, LOWEST_RATE
 from calmotion.errors import ShotError
-from calmotion.host import SettingError, parse_quantity
+from calmotion.host import SettingError, quantity_of
 from calmotion.shot import Animation, Character
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.supported import refuse_unsupported
@@ -34,18 +35,17 @@ def given_export(to: str, rate: float, start_delay: float | str, tolerance: floa
     Raises:
         SettingError: One does not fit.
     """
-    if not LOWEST_RATE <= rate <= HIGHEST_RATE:
+    if not isinstance(rate, Real) or not LOWEST_RATE <= float(rate) <= HIGHEST_RATE:
         raise SettingError(
             f"the rate must be {LOWEST_RATE:g} to {HIGHEST_RATE:g} commands a second", path="--rate", found=rate,
             remedy="Use another rate.",
         )  # fmt: skip
-    delay = parse_quantity(start_delay, "s") if isinstance(start_delay, str) else float(start_delay)
-    if not 0.0 <= delay < float("inf"):
+    delay = quantity_of(start_delay, "s", "start_delay") or 0.0
+    if delay < 0.0:
         raise SettingError(
             "the start delay must not be negative", path="--start-delay", found=start_delay, remedy="Use 5ms."
         )
-    error = parse_quantity(tolerance, "m") if isinstance(tolerance, str) else tolerance
-    return GivenExport(to, float(rate), delay, error)
+    return GivenExport(to, float(rate), delay, quantity_of(tolerance, "m", "tolerance"))
 
 
 def refuse_beyond_format(highest: float, given: GivenExport) -> None:
