@@ -42,7 +42,7 @@ def read_bvh(path: str) -> BvhMotion:
         refuse_special(path)
         if reason := too_large(path, _EXPANSION):
             raise OSError(0, f"it is too large for the memory: {reason}")
-        with open(path, encoding="utf-8", errors="replace") as stream:
+        with open(path, encoding="utf-8-sig", errors="replace") as stream:
             lines = stream.read().splitlines()
     except OSError as error:
         raise ShotError(

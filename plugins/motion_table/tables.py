@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,6 +19,7 @@ _REMEDY = (
     "Write a column time_s in seconds, and one for each joint, named after it, in rad (or with a comment "
     "'# units: angle deg') or m"
 )
+_DEGREES = re.compile(r"(angle|units?)\W+deg", re.IGNORECASE)
 _EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
 _WITHOUT = "--set motion.read.rate=60Hz --set motion.read.joints=NAME,-,... with a name, or -, for each column"
 
@@ -58,7 +60,7 @@ def _csv(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
     """Columns by name, and whether angles are in degrees."""
     with open(path, encoding="utf-8-sig", newline="") as stream:
         lines = [(n, line) for n, line in enumerate(stream.read().splitlines(), 1) if line.strip()]
-    degrees = any(line.startswith("#") and "angle deg" in line for _, line in lines)
+    degrees = any(line.startswith("#") and _DEGREES.search(line) for _, line in lines)
     lines = [(n, line) for n, line in lines if not line.startswith("#")]
     if not lines:
         raise ShotError("the motion is empty", path=path, remedy=_REMEDY)
@@ -107,7 +109,8 @@ def _npz(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
     fps = float(_numbers(path, "fps", arrays.pop("fps"), 0)) if "fps" in arrays else 0.0
     if "positions" in arrays:
         positions = _numbers(path, "positions", arrays["positions"], 2)
-        own = [str(name) for name in np.atleast_1d(arrays["joint_names"])] if "joint_names" in arrays else list(names)
+        given = np.atleast_1d(arrays["joint_names"]) if "joint_names" in arrays else names
+        own = [name.decode() if isinstance(name, bytes) else str(name) for name in given]
         if positions.shape[1] != len(own):
             raise ShotError(
                 "positions must have a column for each name in joint_names", path=path, attribute="positions",
@@ -120,7 +123,7 @@ def _npz(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
         columns = {name: _numbers(path, name, array, 1) for name, array in arrays.items()}
     if TIME not in columns and fps > 0.0 and columns:
         columns[TIME] = np.arange(len(next(iter(columns.values())))) / fps
-    return columns, "deg" in unit
+    return columns, "deg" in unit.lower()
 
 
 def _refuse_repeated(path: str, names: Sequence[str]) -> None:

@@ -60,6 +60,12 @@ def test_channels_become_tracks_with_factor_and_offset(read, tmp_path):
     assert np.allclose(found.values["elbow"], np.radians(5.0))
 
 
+def test_a_byte_order_mark_is_no_part_of_the_motion(read, tmp_path):
+    path = bvh(tmp_path / "a.bvh")
+    path.write_text("\ufeff" + path.read_text(), encoding="utf-8")
+    assert np.allclose(read(path, map="Arm.Xrotation=elbow").values["elbow"], np.radians(5.0))
+
+
 def test_positions_are_lengths(read, tmp_path):
     found = read(bvh(tmp_path / "a.bvh"), map="Hips.Xposition=slide+20mm", unit="1cm")
     assert np.allclose(found.values["slide"], np.cos(TIMES) + 0.02, atol=1e-8)

@@ -271,3 +271,14 @@ def quantity(unit: str, needs_unit: bool = False, positive: bool = False) -> Cal
         return value
 
     return read
+
+
+def count_of(things: str) -> Callable[[str], int]:
+    """The type of an argument that is a number of things, 1 or more."""
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or int(text) < 1:
+            raise argparse.ArgumentTypeError(f"{text} is not a number of {things}, 1 or more")
+        return int(text)
+
+    return read

@@ -239,11 +239,20 @@ def _named(axes: Sequence[Axis], patterns: Sequence[str]) -> list[Axis]:
 
 def _moved(axes: Sequence[Axis], motion: MotorTracks | None) -> dict[str, MotorTracks]:
     """The axes of the motion by path, each with its track alone."""
-    found, problems = {}, []
+    found: dict[str, MotorTracks] = {}
+    problems: list[ShotError] = []
     for name, values in motion.values.items() if motion is not None else ():
         fitting = [axis for axis in axes if name in axis.names]
         assert motion is not None
-        if len(fitting) != 1:
+        if len(fitting) == 1 and fitting[0].path in found:
+            other = next(iter(found[fitting[0].path].values))
+            problems.append(
+                ShotError(
+                    "two columns move the same joint", path=motion.origin, found=f"{other} and {name}",
+                    remedy="Remove one of them",
+                )
+            )  # fmt: skip
+        elif len(fitting) != 1:
             names = sorted({axis.name for axis in axes})
             problems.append(
                 ShotError(

@@ -23,7 +23,7 @@ from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims
 from calmotion.usd.reading.joints import joint_prims
 from calmotion.usd.reading.motors.driven_motors import BODIES, CONSTANT, DRIVE, GIVEN, Drive, to_si
 from calmotion.usd.reading.motors.free_ranges import free_tracks
-from calmotion.usd.reading.motors.given_tracks import given_joints, given_track
+from calmotion.usd.reading.motors.given_tracks import given_joints, given_track, length_note
 from calmotion.usd.reading.motors.posed_motors import joint_motions, pose_codes, posed_track
 from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stacks, performed_on, skeletal_tracks
 from calmotion.usd.reading.motors.tracks import read_track, sample_codes
@@ -118,6 +118,8 @@ def read_stage(
         clock = shot_clock(stage, given)
         reading = Reading(stage, units, clock.start, whole=whole)
         reading.notes += animated
+        if given is not None and (note := length_note(given, clock.frame_times())):
+            reading.notes.append(note)
         skeleton = read_skeleton(reading, clock, still, given_joints(stage, given), measured)
         for warning in other_units(stage, map(stage.GetPrimAtPath, skeleton.poses)):
             reading.warn(warning)

@@ -9,6 +9,7 @@ from calmotion.cli.commands.shots.calibrate import parameter_arguments, prior_op
 from calmotion.cli.options import (
     Commands,
     assignments,
+    count_of,
     file_argument,
     opened_shot,
     progress_display,
@@ -45,7 +46,11 @@ def add_to(commands: Commands) -> None:
         help="largest excursion of a hinge from the first pose, in rad or with a unit (default: 10deg)",
     )  # fmt: skip
     command.add_argument(
-        "--tries", metavar="N", type=int, default=1000, help="number of motions that are compared (default: 1000)"
+        "--tries",
+        metavar="N",
+        type=count_of("motions"),
+        default=1000,
+        help="number of motions that are compared (default: 1000)",
     )
     command.add_argument(
         "--step", metavar="TIME", type=quantity("s", positive=True), help="time step of the simulations"
@@ -61,7 +66,7 @@ def _run(args: argparse.Namespace, output: Output) -> int:
         made = excite(
             shot, layer=args.output, sensors=args.sensor or SENSORS, **parameter_arguments(args),
             duration=args.duration, amplitude=args.amplitude or "10deg",
-            tries=max(1, args.tries), step=args.step, operators=args.run, settings=assignments(args), progress=display,
+            tries=args.tries, step=args.step, operators=args.run, settings=assignments(args), progress=display,
             on_operator=display.done,
         )  # fmt: skip
     conclude(made.report(), (), output, None if args.quiet else _print)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from calmotion.cli.options import Commands, file_argument, run_options, shot_command, simulation_options
+from calmotion.cli.options import Commands, count_of, file_argument, run_options, shot_command, simulation_options
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -31,15 +31,11 @@ def add_to(commands: Commands) -> None:
     command.add_argument(
         "--optimize", action="store_true", help="optimise instead of simulating; a search begins with the last curves"
     )
-    command.add_argument("--runs", type=_count, metavar="N", help="end after this many runs (default: until Ctrl-C)")
+    command.add_argument(
+        "--runs", type=count_of("runs"), metavar="N", help="end after this many runs (default: until Ctrl-C)"
+    )
     run_options(command)
     simulation_options(command, "as of simulate or optimize")
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text} is not a number of runs, 1 or more")
-    return int(text)
 
 
 def _run(args: argparse.Namespace, output: Output) -> int:

@@ -8,6 +8,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot import MotorTracks, Track
+from calmotion.shot.character import Array
 from calmotion.support.naming import nearest
 from calmotion.usd.reading.generic_joints import freedoms
 from calmotion.usd.reading.joints import JointPrim, joint_prims
@@ -20,12 +21,12 @@ def given_joints(stage: Usd.Stage, given: MotorTracks | None) -> tuple[str, ...]
     """Paths of the joints that are named.
 
     Raises:
-        ShotError: A name that no joint, or more than one, has.
+        ShotError: A name that no joint, or more than one, has; two names of one joint.
     """
     if given is None:
         return ()
     paths = [path for prim in joint_prims(stage) for path in _paths(prim)]
-    found = []
+    found: dict[str, str] = {}
     for name in given.values:
         named = [path for path in paths if path == name] or [path for path in paths if path.split("/")[-1] == name]
         if len(named) != 1:
@@ -36,8 +37,25 @@ def given_joints(stage: Usd.Stage, given: MotorTracks | None) -> tuple[str, ...]
                 found=name,
                 remedy=f"{likely}Use the path of a joint, such as {(named or paths or ['/Robot/joint'])[0]}",
             )
-        found += named
+        if (other := found.setdefault(named[0], name)) != name:
+            raise ShotError(
+                "two columns move the same joint", path=given.origin, found=f"{other} and {name}",
+                remedy="Remove one of them",
+            )  # fmt: skip
     return tuple(found)
+
+
+def length_note(given: MotorTracks, frames: Array) -> str:
+    """What a user should know of a motion that is longer or shorter than the shot; empty where it is neither.
+
+    Args:
+        frames: Times of the frames [s].
+    """
+    length, end = float(given.times[-1]), float(frames[-1])
+    if len(frames) < 2 or abs(length - end) < float(frames[1] - frames[0]):
+        return ""
+    said = "what comes later is not played" if length > end else "its last pose is held to the end"
+    return f"{given.origin} lasts {length:.4g} s, and the range of the shot {end:.4g} s: {said}"
 
 
 def _paths(prim: Usd.Prim) -> list[str]:
