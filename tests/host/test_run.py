@@ -1,3 +1,5 @@
+import os
+
 import pytest
 from calmotion.errors import ShotError
 from calmotion.host import Outcome, Plan, PluginError, Property, Run
@@ -61,6 +63,17 @@ def test_an_operator_that_raises_is_named_with_its_traceback_while_others_go_on(
     (failure,) = run.failures()
     assert isinstance(failure.error, ZeroDivisionError) and "in explode" in failure.traceback
     assert run.get(Coal) == Coal()
+
+
+def test_the_working_folder_stays_whatever_an_operator_does(tmp_path, monkeypatch):
+    def wander(context):
+        os.chdir(os.sep)
+        return (Iron(),)
+
+    monkeypatch.chdir(tmp_path)
+    melt = operator("smithy.melt", requires=[Ore], provides=[Iron], execute=wander)
+    assert host_of(DIG, melt).run([], [Iron]).finish().get(Iron) == Iron()
+    assert os.getcwd() == os.path.realpath(tmp_path)
 
 
 def test_a_shot_error_passes_through_as_it_is():

@@ -179,7 +179,12 @@ def tell_failed_plugins(host: Host) -> None:
     """Report plugins that could not be loaded, each with its traceback; the run continues without them."""
     for plugin in host.failures():
         print(plugin.traceback, end="", file=sys.stderr)
-        notice(f"warning: the plugin {plugin.id} is not used: {plugin.error}")
+        notice(f"warning: the plugin {plugin.id} is not used: {_named(plugin.error)}")
+
+
+def _named(error: BaseException | None) -> str:
+    """An error of a plugin; with its type, unless it is one of ours, whose text is whole."""
+    return str(error) if error is None or isinstance(error, ShotError) else f"{type(error).__name__}: {error}"
 
 
 def tell_error(error: ShotError) -> None:

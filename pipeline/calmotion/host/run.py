@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -186,7 +188,8 @@ class Run:
             self._progress(cls.label, 0.0, "")
             require_address_space(RESERVE, "a stage")
             found = self._reuse(cls, self.data)
-            values = _checked(cls, cls().execute(context) if found is None else found)
+            with _working_folder():
+                values = _checked(cls, cls().execute(context) if found is None else found)
             self._progress(cls.label, 1.0, "")
         except (Exception, SystemExit) as error:  # a plugin does not end the host
             interrupts.check()  # which it may have made of an interrupt
@@ -243,6 +246,26 @@ class Run:
     def failures(self) -> list[OperatorResult]:
         """The operators that raised."""
         return [result for result in self.results if result.outcome == Outcome.FAILED]
+
+
+@contextmanager
+def _working_folder() -> Iterator[None]:
+    """The working folder is the same afterwards, whatever a plugin does: names of outputs are relative to it."""
+    before = _folder()
+    try:
+        yield
+    finally:
+        if before and _folder() != before:
+            with suppress(OSError):
+                os.chdir(before)
+
+
+def _folder() -> str:
+    """The working folder; empty where it was removed."""
+    try:
+        return os.getcwd()
+    except OSError:
+        return ""
 
 
 def _checked(cls: type[Operator], values: object) -> dict[type, object]:

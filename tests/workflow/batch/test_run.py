@@ -149,3 +149,11 @@ def _kill_busy_worker(cluster, folder):
             os.kill(worker.process.pid, 9)
     time.sleep(0.5)
     (folder / "go").write_text("")
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"), [({"extras": "video.mp4"}, "video.mp4"), ({"workers": 1.5}, "1.5"), ({"workers": -1}, "-1")]
+)
+def test_a_text_is_one_and_not_its_letters(tmp_path, options, problem):
+    with pytest.raises(SettingError, match=problem):
+        batch(str(tmp_path / "shot.usda"), tmp_path / "out", **options)

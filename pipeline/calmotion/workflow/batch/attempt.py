@@ -24,6 +24,7 @@ from calmotion.workflow.batch.jobs import Job, is_done, mark_done
 DONE, FAILED, DIED = "done", "failed", "died"
 MARK = "=== attempt on "  # begins the lines of a log by which attempts are counted
 _INTERRUPTED = 130
+_WRONG_USAGE = 2
 _WAIT = 0.5  # between two looks at a lock that another process has [s]
 _RUNNING: set[subprocess.Popen[str]] = set()
 _GUARD = threading.Lock()
@@ -117,6 +118,9 @@ def _judged(job: Job, status: int, text: str) -> dict[str, Any]:
         return {"outcome": DONE, "problem": None, "report": report}
     if status in (1, 2) and report is not None:
         return {"outcome": FAILED, "problem": _problem(report), "report": report}
+    if status == _WRONG_USAGE:
+        wrong = {"problem": "an argument of the command does not fit", "remedy": f"See {job.log}"}
+        return {"outcome": FAILED, "problem": wrong, "report": None}
     if status == _INTERRUPTED:
         problem = "the process was asked to end"
     else:

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import contextmanager
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -72,8 +73,11 @@ def batch(
         SettingError: An argument does not fit.
     """
     target = os.path.abspath(os.fspath(folder))
+    shots, arguments, extras = (
+        (given,) if isinstance(given, (str, os.PathLike)) else given for given in (shots, arguments, extras)
+    )
     unknown = [name for name in extras if name not in EXTRAS]
-    if unknown or (workers is not None and workers < 1):
+    if unknown or (workers is not None and not (isinstance(workers, Integral) and workers > 0)):
         raise SettingError(
             "a batch does not support this", path="extras" if unknown else "--workers",
             found=unknown[0] if unknown else workers, remedy=f"Use {', '.join(EXTRAS)}" if unknown else "Use 1 or more",
