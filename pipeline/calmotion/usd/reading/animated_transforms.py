@@ -8,6 +8,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.usd.gf import matrix
+from calmotion.usd.reading.animation_codes import animation_codes
 from calmotion.usd.reading.context import Reading
 
 if TYPE_CHECKING:
@@ -48,10 +49,16 @@ def refuse_moving(reading: Reading, fixed: dict[Usd.Prim, str], others: list[Usd
 
 
 def codes_of(prim: Usd.Prim) -> list[float]:
-    """Time codes at which the local transform of a prim has samples."""
+    """Time codes at which the local transform of a prim has samples, or splines their knots and points between."""
     from pxr import UsdGeom
 
-    return list(UsdGeom.Xformable(prim).GetTimeSamples()) if prim.IsA(UsdGeom.Xformable) else []
+    xform = UsdGeom.Xformable(prim)
+    if not xform:
+        return []
+    codes = set(xform.GetTimeSamples())  # none of splines
+    if xform.TransformMightBeTimeVarying():
+        codes.update(code for one in xform.GetOrderedXformOps() for code in animation_codes(one.GetAttr()))
+    return sorted(codes)
 
 
 def carriers(prim: Usd.Prim) -> list[Usd.Prim]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from calmotion.usd.reading.animation_codes import animation_codes
 from calmotion.usd.reading.context import prims_of
 
 if TYPE_CHECKING:
@@ -23,7 +24,8 @@ _ANIMATED = (
 
 
 def hold_constants(stage: Usd.Stage) -> list[str]:
-    """Give attributes that have time samples and no default their first sample as default, in the session layer.
+    """Give attributes that have time samples or a spline, and no default, their first value as default, in the session
+    layer.
 
     Returns:
         A note for each attribute whose samples differ.
@@ -36,9 +38,10 @@ def hold_constants(stage: Usd.Stage) -> list[str]:
             continue
         for name in prim.GetAuthoredPropertyNames(lambda name: name.startswith(_PREFIXES)):
             attribute = prim.GetAttribute(name)
-            if name.endswith(_ANIMATED) or not attribute or not attribute.GetNumTimeSamples():
+            codes = animation_codes(attribute) if attribute and not name.endswith(_ANIMATED) else []
+            if not codes:
                 continue
-            values = [attribute.Get(code) for code in attribute.GetTimeSamples()]
+            values = [attribute.Get(code) for code in codes]
             default = attribute.GetResolveInfo(Usd.TimeCode.Default()).GetSource() == Usd.ResolveInfoSourceDefault
             if not default and values[0] is not None and not prim.IsInstanceProxy():
                 with Usd.EditContext(stage, stage.GetSessionLayer()):

@@ -13,6 +13,7 @@ from calmotion.shot import Body, Frame, Joint, Target, WeightTrack
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
+from calmotion.usd.reading.animation_codes import animation_codes
 from calmotion.usd.reading.context import Reading, carrying_body, is_rigid_body, prims_of, refuse_without_transform
 from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 _SCHEMA = "CalmTargetAPI"
 WEIGHTS = ("calm:target:positionWeight", "calm:target:rotationWeight")
+_PARTS = 32  # between two knots of a weight's spline
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -157,13 +159,13 @@ def outermost_target(body: Body, index: int, joints: tuple[Joint, ...]) -> Targe
 
 def _varies(prim: Usd.Prim, name: str) -> bool:
     attribute = prim.GetAttribute(name)
-    return bool(attribute) and len(attribute.GetTimeSamples()) > 1
+    return bool(attribute) and len(animation_codes(attribute)) > 1
 
 
 def _counts_later(prim: Usd.Prim, name: str) -> bool:
     """Whether a weight that varies is not zero at all samples."""
     attribute = prim.GetAttribute(name)
-    return _varies(prim, name) and any(attribute.Get(code) != 0.0 for code in attribute.GetTimeSamples())
+    return _varies(prim, name) and any(attribute.Get(code) != 0.0 for code in animation_codes(attribute))
 
 
 def weight_tracks(stage: Usd.Stage, targets: Sequence[Target], clock: Clock) -> tuple[WeightTrack, ...]:
@@ -179,7 +181,7 @@ def weight_tracks(stage: Usd.Stage, targets: Sequence[Target], clock: Clock) -> 
             continue
         for name in filter(lambda name: _varies(prim, name), WEIGHTS):
             attribute = prim.GetAttribute(name)
-            codes = np.array(attribute.GetTimeSamples(), dtype=np.float64)
+            codes = np.array(animation_codes(attribute, _PARTS), dtype=np.float64)
             values = np.array([_checked(prim, name, attribute.Get(code)) for code in codes])
             found.append(WeightTrack(index, name == WEIGHTS[1], clock.seconds(codes), values))
     return tuple(found)
