@@ -1,5 +1,6 @@
 """Attributes of Calmotion that are authored in vain are told by every run."""
 
+import pytest
 from calmotion.usd.reading import read_shot
 from calmotion.usd.reading.unread import unread_attributes
 from pxr import Usd
@@ -40,3 +41,23 @@ def test_a_shot_in_order_has_none(tmp_path):
         make_target(stage)
 
     assert notes(tmp_path, edit) == []
+
+
+@pytest.mark.parametrize("path", ["/Arm", f"{FORE}/skin"])
+def test_a_robot_that_stays_rigid_since_the_schema_is_on_another_prim_says_so(tmp_path, path):
+    def edit(stage):
+        make_flexible(stage)
+        stage.GetPrimAtPath(FORE).RemoveAppliedSchema("CalmFlexibleBodyAPI")
+        stage.GetPrimAtPath(path).AddAppliedSchema("CalmFlexibleBodyAPI")
+
+    character, _, _ = read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
+    assert not any(body.flexible for body in character.bodies)
+    (note,) = [note for note in character.notes if "CalmFlexibleBodyAPI" in note]
+    assert note.startswith(path) and "no effect" in note and "a body" in note
+
+
+def test_a_motor_s_schema_on_a_body_is_told(tmp_path):
+    character, _, _ = read_shot(
+        str(write_arm(tmp_path / "arm.usda", lambda stage: stage.GetPrimAtPath(FORE).AddAppliedSchema("CalmMotorAPI")))
+    )
+    assert any(note.startswith(FORE) and "CalmMotorAPI belongs on a joint" in note for note in character.notes)

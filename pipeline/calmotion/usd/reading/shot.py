@@ -30,7 +30,7 @@ from calmotion.usd.reading.motors.tracks import read_track, sample_codes
 from calmotion.usd.reading.motors.unused_animation import target_positions
 from calmotion.usd.reading.provenance import provenance_of
 from calmotion.usd.reading.targets import weight_tracks
-from calmotion.usd.reading.unread import unread_attributes
+from calmotion.usd.reading.unread import misplaced_schemas, unread_attributes
 from calmotion.usd.reading.well_formed import broken_transforms, wrong_types
 from calmotion.usd.units import other_units, units_of
 
@@ -83,7 +83,7 @@ def read_shot(
         provenance = provenance_of(path, stage, clock, earlier)
         weights = weight_tracks(part, character.targets, clock)
         free = free_tracks(part, character.motors, clock)
-        unread = grouped([error.message() for error in unread_attributes(part)])
+        unread = grouped([error.message() for error in (*unread_attributes(part), *misplaced_schemas(part))])
     notes = (f"{place}: {message}" for place, message in with_places(messages, part, prims_of(part)))
     character = dataclasses.replace(character, notes=(*character.notes, *unread, *notes))
     return character, Animation(clock.frame_times(), tracks, current, read.moving, weights, free), provenance

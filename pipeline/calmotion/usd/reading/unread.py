@@ -1,4 +1,4 @@
-"""Attributes of Calmotion that are authored and not read: a misspelt name, or a schema that is not applied."""
+"""What is authored of Calmotion and not read: misspelt attributes, those without their schema, misplaced schemas."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from calmotion.errors import ShotError
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
-from calmotion.usd.reading.context import prims_of
+from calmotion.usd.reading.context import is_rigid_body, prims_of
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -42,6 +42,27 @@ def unread_attributes(stage: Usd.Stage, declared: bool = False) -> Iterator[Shot
                 yield ShotError(
                     f"{problem} {owner}, which is not applied", path=prim.GetPath(), attribute=name,
                     remedy=f"Apply {owner}, or remove the attribute",
+                )  # fmt: skip
+
+
+def misplaced_schemas(stage: Usd.Stage) -> Iterator[ShotError]:
+    """Calmotion's schemas on prims of the wrong kind, where they have no effect, as warnings."""
+    from pxr import UsdGeom, UsdPhysics, UsdShade
+
+    fits = {
+        "CalmFlexibleBodyAPI": (is_rigid_body, "a body (PhysicsRigidBodyAPI)"),
+        "CalmDampingAPI": (lambda prim: prim.IsA(UsdShade.Material), "a Material"),
+        "CalmMotorAPI": (lambda prim: prim.IsA(UsdPhysics.Joint), "a joint"),
+        "CalmTargetAPI": (lambda prim: prim.IsA(UsdGeom.Xformable), "an Xform"),
+    }
+    for prim in prims_of(stage):
+        for schema in filter(fits.__contains__, map(str, prim.GetAppliedSchemas())):
+            allowed, what = fits[schema]
+            if not allowed(prim):
+                yield ShotError(
+                    f"{schema} belongs on {what}, and has no effect here", path=prim.GetPath(), attribute="apiSchemas",
+                    found=str(prim.GetTypeName()) or "a prim without a type",
+                    remedy="Move the schema there, or remove it",
                 )  # fmt: skip
 
 

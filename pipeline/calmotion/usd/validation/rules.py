@@ -9,10 +9,8 @@ import numpy as np
 
 from calmotion.errors import ShotError, each
 from calmotion.shot.outputs import ERROR, WARNING, Finding
-from calmotion.usd import schemas
-from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.reading.shot import StageReading, read_stage
-from calmotion.usd.reading.unread import unread_attributes
+from calmotion.usd.reading.unread import misplaced_schemas, unread_attributes
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -58,21 +56,7 @@ def unknown_attributes(stage: Usd.Stage) -> Iterator[Finding]:
 
 def wrong_prims(stage: Usd.Stage) -> Iterator[Finding]:
     """Calmotion's schemas on prims of the wrong kind, which USD does not check."""
-    from pxr import UsdGeom, UsdPhysics, UsdShade
-
-    fits = {
-        "CalmFlexibleBodyAPI": (is_rigid_body, "a body (PhysicsRigidBodyAPI)"),
-        "CalmDampingAPI": (lambda prim: prim.IsA(UsdShade.Material), "a Material"),
-        "CalmMotorAPI": (lambda prim: prim.IsA(UsdPhysics.Joint), "a joint"),
-        "CalmTargetAPI": (lambda prim: prim.IsA(UsdGeom.Xformable), "an Xform"),
-    }
-    for prim in prims_of(stage):
-        for schema, (allowed, what) in fits.items():
-            if schemas.is_applied(prim, schema) and not allowed(prim):
-                yield Finding(
-                    WARNING, PLACES, str(prim.GetPath()), "apiSchemas", f"{schema} belongs on {what}",
-                    str(prim.GetTypeName()) or "a prim without a type", "Move the schema there, or remove it",
-                )  # fmt: skip
+    return (finding_of(error, WARNING, PLACES) for error in misplaced_schemas(stage))
 
 
 Rule: TypeAlias = "Callable[[Usd.Stage], Iterable[Finding]]"
