@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
-from pxr import Gf, UsdPhysics, UsdShade
+from pxr import Gf, UsdGeom, UsdPhysics, UsdShade
 from small_shots import BASE, FORE, LENGTH, UPPER, WIDTH, clear_mass, set_float, write_arm
 
 VOLUME = LENGTH * WIDTH**2
@@ -167,3 +167,26 @@ def test_a_negative_density_is_refused(tmp_path):
     with pytest.raises(ShotError) as caught:
         body(tmp_path, UPPER, lambda stage: set_float(stage, CUBE, "physics:density", -2.0))
     assert (caught.value.path, caught.value.attribute) == (CUBE, "physics:density")
+
+
+def test_masses_where_they_are_not_used_are_told(tmp_path):
+    def edit(stage):
+        group = UsdGeom.Xform.Define(stage, f"{UPPER}/group").GetPrim()
+        UsdPhysics.MassAPI.Apply(group).CreateMassAttr(7.0)
+        UsdPhysics.MassAPI(stage.GetPrimAtPath(CUBE)).CreateCenterOfMassAttr(Gf.Vec3f(0.1, 0.0, 0.0))
+        UsdPhysics.MassAPI(stage.GetPrimAtPath(CUBE)).CreateDiagonalInertiaAttr(Gf.Vec3f(0.0))  # not authored
+
+    upper, notes = body(tmp_path, UPPER, edit)
+    told = [note for note in notes if "is not used here" in note]
+    assert [note.split(" is")[0] for note in told] == [f"{CUBE}: physics:centerOfMass", f"{UPPER}/group: physics:mass"]
+    assert all(note.endswith(UPPER) for note in told) and upper.mass.mass == pytest.approx(1200.0 * VOLUME, rel=1e-6)
+
+
+def test_a_mass_without_centre_or_geometry_says_where_its_centre_is(tmp_path):
+    def edit(stage):
+        stage.RemovePrim(f"{FORE}/skin")
+        stage.GetPrimAtPath(FORE).RemoveProperty("physics:centerOfMass")
+
+    fore, notes = body(tmp_path, FORE, edit)
+    assert np.allclose(fore.mass.center, 0.0) and np.allclose(fore.mass.inertia, np.diag([1e-4, 7e-3, 7e-3]))
+    assert any(note.startswith(FORE) and "its centre is at its origin" in note for note in notes)

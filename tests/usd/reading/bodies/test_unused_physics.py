@@ -2,7 +2,7 @@
 
 import numpy as np
 from calmotion.usd.reading import read_shot
-from pxr import UsdPhysics
+from pxr import Sdf, UsdPhysics
 from small_shots import ELBOW, FORE, UPPER, write_arm
 
 
@@ -33,3 +33,17 @@ def test_velocities_and_breaking_forces_are_named(tmp_path):
 def test_what_has_no_effect_anyway_is_not(tmp_path):
     for limit in (np.inf, float(np.finfo(np.float32).max)):
         assert not [note for note in notes(tmp_path, authored(0.0, limit)) if "is not used" in note]
+
+
+def test_bodies_without_weight_are_named(tmp_path):
+    def weightless(value):
+        def edit(stage):
+            prims = [stage.GetPrimAtPath(path) for path in (FORE, UPPER)]
+            prims[0].CreateAttribute("physxRigidBody:disableGravity", Sdf.ValueTypeNames.Bool).Set(bool(value))
+            prims[1].CreateAttribute("mjc:gravcomp", Sdf.ValueTypeNames.Double).Set(value)
+
+        return edit
+
+    found = [note for note in notes(tmp_path, weightless(1.0)) if "gravity acts on the body" in note]
+    assert [note.split(":")[0] for note in found] == [UPPER, FORE]
+    assert not [note for note in notes(tmp_path, weightless(0.0)) if "gravity acts on the body" in note]

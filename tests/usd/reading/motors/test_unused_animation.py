@@ -4,7 +4,7 @@ import pytest
 from calmotion.errors import ShotError
 from calmotion.usd.reading import read_shot
 from one_hinge import HINGE, ONE_HINGE
-from pxr import Sdf
+from pxr import Sdf, UsdPhysics
 from small_shots import ELBOW, write_arm
 
 FIXED = ("transX", "transY", "transZ", "rotX", "rotY")
@@ -87,3 +87,26 @@ def test_directions_with_no_play_to_speak_of_are_locked(tmp_path, low, high):
 def test_a_little_play_is_not_locked(tmp_path):
     character, _, _ = read(tmp_path, generic(low="-0.1", high="0.1"))
     assert len(character.joints) == 6 and [motor.path for motor in character.motors] == [f"{HINGE}.rotZ"]
+
+
+def test_a_second_drive_that_moves_nothing_is_told(tmp_path):
+    def edit(stage):
+        drive = UsdPhysics.DriveAPI.Apply(stage.GetPrimAtPath(ELBOW), "linear").CreateTargetPositionAttr()
+        for code in (0.0, 24.0):
+            drive.Set(0.01 * code, code)
+
+    character, _, _ = read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
+    assert any(note.startswith(f"{ELBOW}: drive:linear:") and "not used" in note for note in character.notes)
+
+
+def test_an_animation_by_a_connection_is_refused(tmp_path):
+    def edit(stage):
+        source = stage.DefinePrim("/Arm/control").CreateAttribute("angle", Sdf.ValueTypeNames.Float)
+        source.Set(3.0, 0.0)
+        position = stage.GetPrimAtPath(ELBOW).GetAttribute("drive:angular:physics:targetPosition")
+        position.Clear()
+        position.SetConnections([source.GetPath()])
+
+    with pytest.raises(ShotError, match="connection") as error:
+        read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
+    assert error.value.path == ELBOW and "/Arm/control.angle" in error.value.found

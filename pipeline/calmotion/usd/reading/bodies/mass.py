@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from calmotion.usd.schemas import is_applied
 from calmotion.usd.transforms import Pose, rotation_from_quaternion
 
 if TYPE_CHECKING:
-    from pxr import Usd
+    from pxr import Sdf, Usd
 
 _DEFAULT_DENSITY = 1000.0  # kg/m^3: what UsdPhysics assumes for a collider without any density
 
@@ -151,6 +151,7 @@ def _from_geometry(
 ) -> MassProperties | None:
     """Mass properties from geometry and densities, scaled to the authored mass of the body where there is one."""
     _note_unread_colliders(reading, prim)
+    _note_unread_masses(reading, prim, {shape.prim.GetPath() for shape in shapes})
     colliders = [s for s in shapes if s.collider]
     solids = colliders or [s for s in shapes if s.surface.visible]
     density = _authored(prim, "physics:density", "density")
@@ -188,6 +189,8 @@ def _from_geometry(
         return None
     # A mass without geometry: a ball of the density of water, unless an inertia is authored.
     radius2 = (3.0 * body_mass / (4.0 * np.pi * _DEFAULT_DENSITY)) ** (2.0 / 3.0)
+    if _center(prim) is None:
+        reading.note(f"{prim.GetPath()}: it has neither a centre of mass nor geometry; its centre is at its origin")
     if _inertia(prim) is None:
         reading.note(
             f"{prim.GetPath()}: it has a mass but neither inertia nor geometry; the inertia of a ball of 1000 kg/m^3 "
@@ -207,6 +210,18 @@ def _note_unread_colliders(reading: Reading, prim: Usd.Prim) -> None:
                 f"{below.GetPath()}: a collider of type {kind} gives no mass; author physics:mass on its body where it "
                 "should count"
             )
+
+
+def _note_unread_masses(reading: Reading, prim: Usd.Prim, solids: set[Sdf.Path]) -> None:
+    """Note what PhysicsMassAPI says below a body and is not used: that of a group, centre and inertia of a collider."""
+    for below in prims_below(prim, is_rigid_body):
+        if below == prim or not is_applied(below, "PhysicsMassAPI"):
+            continue
+        said: dict[str, Any] = {"physics:centerOfMass": _center(below), "physics:diagonalInertia": _inertia(below)}
+        if below.GetPath() not in solids:
+            said |= {name: _authored(below, name, name[8:]) for name in ("physics:mass", "physics:density")}
+        for name in (name for name, value in said.items() if value is not None):
+            reading.note(f"{below.GetPath()}: {name} is not used here; author it on the body, {prim.GetPath()}")
 
 
 def _hull_moments(reading: Reading, shape: Shape) -> Moments:

@@ -1,4 +1,5 @@
-"""What UsdPhysics can say of a shot that is not simulated: velocities at the start, joints that break."""
+"""What a shot can say of its physics that is not simulated: velocities at the start, bodies without weight, joints that
+break."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from pxr import Usd
 
 _VELOCITIES = ("physics:velocity", "physics:angularVelocity")
+_WEIGHTLESS = ("physxRigidBody:disableGravity", "mjc:gravcomp")  # of PhysX and of MuJoCo: gravity is taken from a body
 _NEVER = 1e30  # and more stands for no limit: some programs author the largest float
 _BREAKS = ("physics:breakForce", "physics:breakTorque")
 
@@ -28,6 +30,9 @@ def tell_what_is_not_used(reading: Reading, bodies: Iterable[Usd.Prim], joints: 
         for name in _VELOCITIES:
             if any(value != 0.0 for value in _authored(prim, name, reading.start)):
                 reading.note(f"{prim.GetPath()}: {name} is not used: a shot starts at rest, or eases into its motion")
+        for name in _WEIGHTLESS:
+            if any(value != 0.0 for value in _authored(prim, name, reading.start)):
+                reading.note(f"{prim.GetPath()}: {name} is not used: gravity acts on the body")
     prims = {joint.prim_path: joint.prim for joint in joints if joint.prim is not None}
     for path, prim in prims.items():
         for name in _BREAKS:

@@ -25,7 +25,7 @@ from calmotion.usd.reading.motors.gears.gearing import Gear, read_gear, resolve
 from calmotion.usd.reading.motors.motor_limits import calmotion_limit, effort_limit, velocity_limit
 from calmotion.usd.reading.motors.tracks import sample_codes
 from calmotion.usd.reading.motors.undriven_joints import note_or_refuse_no_motors
-from calmotion.usd.reading.motors.unused_animation import refuse_unused_animation
+from calmotion.usd.reading.motors.unused_animation import refuse_connection, refuse_unused_animation
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:
@@ -259,6 +259,8 @@ def _drive(
     attribute = prim.GetAttribute(name)
     if has_drive and attribute and len(sample_codes(attribute)):
         return Drive(joint, DRIVE)
+    if has_drive and attribute:
+        refuse_connection(joint.path, attribute)
     if attribute and len(sample_codes(attribute)):
         raise ShotError(
             "the target position is animated, but the joint has no drive",

@@ -61,6 +61,22 @@ def refuse_unused_animation(
                 found=f"a {axes[0].kind} joint" if len(axes) == 1 else f"a joint that is free in {free}",
                 remedy=_remedy(axes[0], stray[0]),
             )  # fmt: skip
+        elif stray:
+            reading.note(f"{path}: {stray[0]} is animated and not used: the joint does not move in that direction")
+
+
+def refuse_connection(path: str, attribute: Any) -> None:
+    """Refuse a target position without samples that another attribute is to give.
+
+    Raises:
+        ShotError: It is connected to one, which USD does not evaluate.
+    """
+    if attribute.HasAuthoredConnections():
+        raise ShotError(
+            "its value comes by a connection, which USD does not evaluate", path=path, attribute=attribute.GetName(),
+            found=", ".join(map(str, attribute.GetConnections())),
+            remedy="Author time samples in its place, or remove the connection",
+        )  # fmt: skip
 
 
 def _remedy(joint: JointPrim, name: str) -> str:
