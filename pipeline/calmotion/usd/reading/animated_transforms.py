@@ -8,7 +8,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.usd.gf import matrix
-from calmotion.usd.reading.animation_codes import animation_codes
+from calmotion.usd.reading.animated.animation_codes import animation_codes
 from calmotion.usd.reading.context import Reading
 
 if TYPE_CHECKING:

@@ -15,10 +15,10 @@ from calmotion.usd import stages
 from calmotion.usd.clock import Clock, clock_of, still_clock
 from calmotion.usd.diagnostics import quiet, with_places
 from calmotion.usd.masks import masked
+from calmotion.usd.reading.animated.constants import hold_constants
 from calmotion.usd.reading.animated_transforms import carriers, codes_of
 from calmotion.usd.reading.bases.roots import moving_frames
 from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
-from calmotion.usd.reading.constants import hold_constants
 from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims_of
 from calmotion.usd.reading.joints import joint_prims
 from calmotion.usd.reading.motors.driven_motors import BODIES, CONSTANT, DRIVE, GIVEN, Drive, to_si

@@ -13,7 +13,7 @@ from calmotion.shot import Body, Frame, Joint, Target, WeightTrack
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
-from calmotion.usd.reading.animation_codes import animation_codes
+from calmotion.usd.reading.animated.animation_codes import animation_codes
 from calmotion.usd.reading.context import Reading, carrying_body, is_rigid_body, prims_of, refuse_without_transform
 from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calmotion.usd.reading.animation_codes import animation_codes
+from calmotion.usd.reading.animated.animation_codes import animation_codes
 from calmotion.usd.reading.context import prims_of
 
 if TYPE_CHECKING:

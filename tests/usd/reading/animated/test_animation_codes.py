@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.usd.reading import read_shot
-from calmotion.usd.reading.animation_codes import animation_codes
+from calmotion.usd.reading.animated.animation_codes import animation_codes
 from posed_shots import still_drives
 from pxr import Sdf, Ts, Usd, UsdGeom, UsdPhysics
 from small_shots import BASE, ELBOW, FORE, FRAMES, HAND, UPPER, make_target, write_arm
