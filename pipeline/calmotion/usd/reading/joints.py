@@ -14,6 +14,7 @@ from calmotion.shot.character import Array
 from calmotion.shot.standing.contact import Contact
 from calmotion.support.naming import nearest
 from calmotion.usd import gf
+from calmotion.usd.reading.bases.joint_ends import refuse_lost_target, refuse_no_place
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.reading.generic_joints import freedoms
 from calmotion.usd.transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
@@ -200,6 +201,7 @@ def _end(reading: Reading, prim: Usd.Prim, side: int, poses: dict[str, Pose]) ->
         )
     rotation = rotation_from_quaternion(quaternion)
     if not named:
+        refuse_lost_target(relationship)
         return "", position, rotation
     target = reading.stage.GetPrimAtPath(named[0])
     if not target:
@@ -210,6 +212,7 @@ def _end(reading: Reading, prim: Usd.Prim, side: int, poses: dict[str, Pose]) ->
             found=named[0],
             remedy=f"{nearest(str(named[0]), poses)}Correct the target, or remove the joint",
         )
+    refuse_no_place(prim, name, target)
     body = target
     while body and str(body.GetPath()) not in poses:
         body = body.GetParent()
