@@ -11,12 +11,16 @@ import numpy as np
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.shot import Body, Character, Joint, MassProperties, RetargetSettings
+from calmotion.shot.motor import PRESCRIBED
 from calmotion.shot.tolerance import reach
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import scene, targets, topology
+from calmotion.usd.reading.actuators.motor_models import motor_model
 from calmotion.usd.reading.animated_transforms import moves, refuse_moving
 from calmotion.usd.reading.bases.contacts import contact_carriers, contact_joints
 from calmotion.usd.reading.bases.joint_places import tell_what_is_elsewhere
+from calmotion.usd.reading.bases.kinematic_links import refuse_held_twice
+from calmotion.usd.reading.bases.lost_bodies import refuse_lost_bodies
 from calmotion.usd.reading.bases.roots import on_moving_prim
 from calmotion.usd.reading.bodies import mass
 from calmotion.usd.reading.bodies.absent import no_bodies
@@ -108,6 +112,10 @@ def read_skeleton(
     kept = set(bodies)
     joints = [j for j in joints if (j.body0 or j.body1) in kept]
     reading.each(joints, refuse_unsupported)
+    with reading.collecting_problems():
+        stiff = {drive.joint.path for drive in drives if motor_model(drive.joint.prim) == PRESCRIBED}
+        refuse_held_twice({path: prim for path, prim in prims.items() if path in kept}, joints, stiff)
+        refuse_lost_bodies(reading, bodies, joints)
     held = contact_carriers(reading)
     joints += _world_joints(reading, bodies, joints, prims, poses, set(held.values()))
     far = topology.distances(bodies, joints)
