@@ -18,6 +18,8 @@ from calmotion.usd.transforms import pose_from_matrix
 if TYPE_CHECKING:
     from pxr import Gf, Usd, UsdSkel
 
+_UNIT = 1e-2  # how far the length of a quaternion may be off 1: half precision and interpolation
+
 
 @dataclass(frozen=True, eq=False)
 class BoundSkeleton:
@@ -57,18 +59,41 @@ class BoundSkeleton:
         from pxr import Tf
 
         try:
+            complete = self._has_all(code)
             transforms: Sequence[Gf.Matrix4d] = self.query.ComputeJointLocalTransforms(code)
         except Tf.ErrorException:
-            transforms = ()
-        if len(transforms) != len(self.joints):
+            complete, transforms = False, ()
+        if not complete or len(transforms) != len(self.joints):
             raise ShotError(
                 "its animation cannot be evaluated: translations, rotations and scales must be as many as its joints",
                 path=(self.animation or self.prim).GetPath(),
                 attribute="rotations",
                 found=f"at time code {code:g}",
-                remedy="Author one of each for every joint that it names",
+                remedy="Author one of each for every joint that it names, and restTransforms of the Skeleton for others",
             )
         return transforms
+
+    def _has_all(self, code: float) -> bool:
+        """Whether the animation has a value of each kind for all of its joints: else USD takes the rest pose.
+
+        Raises:
+            ShotError: A rotation that is not of unit length.
+        """
+        query = self.query.GetAnimQuery()
+        if not query:
+            return True
+        places, rotations, scales = query.ComputeJointLocalTransformComponents(code)
+        lengths = np.array([q.GetLength() for q in rotations])
+        if np.any(np.abs(lengths - 1.0) > _UNIT):
+            worst = int(np.argmax(np.abs(lengths - 1.0)))
+            raise ShotError(
+                "a rotation of the animation is not of unit length",
+                path=query.GetPrim().GetPath(),
+                attribute="rotations",
+                found=f"{rotations[worst]} at time code {code:g}",
+                remedy="Normalise the quaternions",
+            )
+        return len(places) == len(rotations) == len(scales) == len(query.GetJointOrder())
 
     def placement(self, code: float) -> Array:
         """From the skeleton's space to the world, shape [4, 4]."""

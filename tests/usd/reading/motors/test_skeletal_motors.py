@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
-from posed_shots import ARM, skeletal
-from pxr import Sdf
+from posed_shots import ANIMATION, ARM, SKELETON, skeletal
+from pxr import Sdf, UsdSkel
 from small_shots import ELBOW, FRAMES, SHOULDER, Scale, angles, write_arm
 
 FRAME = np.arange(FRAMES + 1)
@@ -72,3 +72,40 @@ def test_motors_of_one_joint_must_form_a_chain(tmp_path):
     with pytest.raises(ShotError, match="must form a chain") as caught:
         read(tmp_path, edit)
     assert "/Arm/joints/other" in caught.value.found
+
+
+def rotations(stage):
+    return UsdSkel.Animation(stage.GetPrimAtPath(ANIMATION)).GetRotationsAttr()
+
+
+def read_skeletal(tmp_path, change):
+    def edit(stage):
+        skeletal(stage)
+        change(stage)
+
+    return read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
+
+
+@pytest.mark.parametrize("length", [0.0, 2.0])
+def test_rotations_that_are_not_of_unit_length_are_refused_as_such(tmp_path, length):
+    def change(stage):
+        own = rotations(stage)
+        own.Set([turn.GetNormalized() * length for turn in own.Get(5)], 5)
+
+    with pytest.raises(ShotError, match="not of unit length") as error:
+        read_skeletal(tmp_path, change)
+    assert error.value.path == ANIMATION and "time code 5" in error.value.found
+
+
+def test_a_sample_with_too_few_rotations_does_not_pass_for_the_rest_pose(tmp_path):
+    with pytest.raises(ShotError, match="cannot be evaluated") as error:
+        read_skeletal(tmp_path, lambda stage: rotations(stage).Set(list(rotations(stage).Get(5))[:1], 5))
+    assert error.value.path == ANIMATION and "time code 5" in error.value.found
+
+
+def test_a_skeleton_without_an_animation_says_so(tmp_path):
+    character, animation, _ = read_skeletal(
+        tmp_path, lambda stage: stage.GetPrimAtPath(SKELETON).RemoveProperty("skel:animationSource")
+    )
+    assert all(np.ptp(track.values) == 0.0 for track in animation.tracks)
+    assert any(note.startswith(SKELETON) and "has no animation" in note for note in character.notes)

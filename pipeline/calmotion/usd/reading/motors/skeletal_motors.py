@@ -94,6 +94,15 @@ def hinge_stacks(reading: Reading, drives: Sequence[Drive]) -> list[HingeStack]:
                     remedy="Name another joint of the skeleton, or remove the attribute from the surplus motors",
                 )
             found.append(_stack(reading, skeleton, joint, _outwards(stack)))
+            if skeleton.animation is None:
+                reading.warn(
+                    ShotError(
+                        "the skeleton has no animation, so that its motors stand still",
+                        path=skeleton.prim.GetPath(),
+                        attribute="skel:animationSource",
+                        remedy="Name its SkelAnimation there, with SkelBindingAPI applied",
+                    )
+                )
     return found
 
 
