@@ -28,7 +28,7 @@ from calmotion.usd.reading.motors.posed_motors import joint_motions, pose_codes,
 from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stacks, performed_on, skeletal_tracks
 from calmotion.usd.reading.motors.tracks import read_track, sample_codes
 from calmotion.usd.reading.motors.unused_animation import target_positions
-from calmotion.usd.reading.provenance import provenance_of
+from calmotion.usd.reading.provenance import notes_of_results, provenance_of
 from calmotion.usd.reading.targets import weight_tracks
 from calmotion.usd.reading.unread import misplaced_schemas, unread_attributes
 from calmotion.usd.reading.well_formed import broken_transforms, wrong_types
@@ -77,15 +77,13 @@ def read_shot(
             standing = hinge_stacks(reading, read.skeleton.drives)
             current = motor_tracks(of_motors, read.skeleton.drives, clock, given, standing)
             raise_all(of_motors.problems)
-            names = ", ".join(stages.display_name(layer, path) for layer in earlier)
-            note = f"the shot carries results of Calmotion ({names}); the intended motion is the animation beneath them"
-            character = dataclasses.replace(character, notes=(*character.notes, note))
+        of_results = notes_of_results(composed, path, earlier)
         provenance = provenance_of(path, stage, clock, earlier)
         weights = weight_tracks(part, character.targets, clock)
         free = free_tracks(part, character.motors, clock)
         unread = grouped([error.message() for error in (*unread_attributes(part), *misplaced_schemas(part))])
     notes = (f"{place}: {message}" for place, message in with_places(messages, part, prims_of(part)))
-    character = dataclasses.replace(character, notes=(*character.notes, *unread, *notes))
+    character = dataclasses.replace(character, notes=(*character.notes, *of_results, *unread, *notes))
     return character, Animation(clock.frame_times(), tracks, current, read.moving, weights, free), provenance
 
 

@@ -1,0 +1,41 @@
+"""What is told of results that a shot carries."""
+
+import pytest
+from calmotion.usd.reading import read_shot
+from calmotion.usd.writing import write_result
+from performing import result_with
+from posed_shots import posed
+from pxr import Usd
+from small_shots import write_arm
+
+
+def with_result(tmp_path, edit=None):
+    shot = write_arm(tmp_path / "shot.usda", edit)
+    character, animation, provenance = read_shot(str(shot))
+    result = result_with(character, animation, {0: 0.1, 1: 0.1})
+    return shot, write_result(character, animation, provenance, result, str(tmp_path / "calm.usda"))[1]
+
+
+def notes(path):
+    return [note for note in read_shot(str(path))[0].notes if "results" in note]
+
+
+@pytest.mark.parametrize("edit", [None, posed], ids=["drives", "bodies"])
+def test_results_are_told_once_and_have_all_of_their_prims(tmp_path, edit):
+    shot, root = with_result(tmp_path, edit)
+    (note,) = notes(root)
+    assert "calm.usda" in note and notes(shot) == []
+
+
+def test_results_of_prims_that_were_renamed_are_told(tmp_path):
+    shot, root = with_result(tmp_path)
+    shot.write_text(shot.read_text().replace("/Arm/joints", "/Arm/motors").replace('"joints"', '"motors"'))
+    _, lost = notes(root)
+    assert lost.startswith("calm.usda: the shot has no /Arm/joints/") and "1 more" in lost
+
+
+def test_a_flattened_result_says_what_its_curves_are(tmp_path):
+    _, root = with_result(tmp_path)
+    Usd.Stage.Open(root).Export(str(tmp_path / "flat.usda"))
+    (note,) = notes(tmp_path / "flat.usda")
+    assert note.startswith("flat.usda") and "flattened" in note
