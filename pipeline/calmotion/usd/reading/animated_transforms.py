@@ -9,7 +9,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.usd.gf import matrix
 from calmotion.usd.reading.animated.animation_codes import animation_codes
-from calmotion.usd.reading.context import Reading
+from calmotion.usd.reading.context import Reading, is_rigid_body
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -87,3 +87,14 @@ def moves(reading: Reading, prim: Usd.Prim) -> tuple[Usd.Prim, float] | None:
             if np.max(np.abs(now - start)) > _TOLERANCE * max(1.0, float(np.max(np.abs(start)))):
                 return mover, code
     return None
+
+
+def moves_on_body(prim: Usd.Prim) -> bool:
+    """Whether the transform of a prim, or of one between it and its body, is animated."""
+    from pxr import UsdGeom
+
+    while prim and not is_rigid_body(prim):
+        if prim.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(prim).TransformMightBeTimeVarying():
+            return True
+        prim = prim.GetParent()
+    return False

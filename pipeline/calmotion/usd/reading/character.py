@@ -28,7 +28,7 @@ from calmotion.usd.reading.bodies.flexible import flexible_settings
 from calmotion.usd.reading.bodies.interfaces import interfaces_of
 from calmotion.usd.reading.bodies.part_materials import with_parts
 from calmotion.usd.reading.bodies.scenery import scenery_of
-from calmotion.usd.reading.bodies.shapes import shapes_of, tets_of
+from calmotion.usd.reading.bodies.shapes import note_unread_shape, shapes_of, tets_of
 from calmotion.usd.reading.bodies.unused_physics import tell_what_is_not_used
 from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims_of
 from calmotion.usd.reading.generic_joints.chains import Between, expanded
@@ -246,6 +246,7 @@ def _body(reading: Reading, path: str, pose: Pose, joints: list[str], fixed: boo
     shapes = shapes_of(reading, prim, pose)
     flexible = flexible_settings(reading, prim, pose)
     if flexible is not None:
+        note_unread_shape(reading, shapes)
         flexible = replace(flexible, material=with_parts(reading, prim, flexible.material, shapes))
     if flexible is not None and not mass.has_authored_mass(prim):
         properties = None  # the mesh and the density of the material decide

@@ -69,7 +69,7 @@ class BoundSkeleton:
                 path=(self.animation or self.prim).GetPath(),
                 attribute="rotations",
                 found=f"at time code {code:g}",
-                remedy="Author one of each for every joint that it names, and restTransforms of the Skeleton for others",
+                remedy="Author one of each for every joint it names, and restTransforms of its Skeleton for others",
             )
         return transforms
 

@@ -14,7 +14,8 @@ from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated.animation_codes import animation_codes
-from calmotion.usd.reading.context import Reading, carrying_body, is_rigid_body, prims_of, refuse_without_transform
+from calmotion.usd.reading.animated_transforms import moves_on_body
+from calmotion.usd.reading.context import Reading, carrying_body, prims_of, refuse_without_transform
 from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def read_target(reading: Reading, prim: Usd.Prim, body: int, pose: Pose) -> Targ
         ShotError: Weights that are negative, not finite, or both zero; a transform that shears.
     """
     target_pose = pose_from_matrix(reading.world_matrix(prim), str(prim.GetPath()))
-    if _moves_on_body(prim):
+    if moves_on_body(prim):
         reading.notes.append(f"{prim.GetPath()}: it moves on its body; its place at the first frame is used")
     weights = [_weight(reading, prim, name) for name in WEIGHTS]
     if weights == [0.0, 0.0] and not any(_counts_later(prim, name) for name in WEIGHTS):
@@ -122,17 +123,6 @@ def read_target(reading: Reading, prim: Usd.Prim, body: int, pose: Pose) -> Targ
         position_weight=weights[0],
         rotation_weight=weights[1],
     )
-
-
-def _moves_on_body(prim: Usd.Prim) -> bool:
-    """Whether the transform of a target, or of a prim between it and its body, is animated."""
-    from pxr import UsdGeom
-
-    while prim and not is_rigid_body(prim):
-        if prim.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(prim).TransformMightBeTimeVarying():
-            return True
-        prim = prim.GetParent()
-    return False
 
 
 def outermost_target(body: Body, index: int, joints: tuple[Joint, ...]) -> Target:

@@ -199,3 +199,22 @@ def test_a_body_of_guides_alone_is_shown_by_them(tmp_path):
         UsdGeom.Imageable(stage.GetPrimAtPath(FORE)).CreatePurposeAttr("guide")
 
     assert [surface.visible for surface in body(tmp_path, FORE, edit).surfaces] == [True]
+
+
+def test_a_shape_that_viewers_show_and_simulations_do_not_have_is_told(tmp_path):
+    def notes(flexible, animated):
+        def edit(stage):
+            if flexible:
+                make_flexible(stage)
+            mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"{FORE}/skin"))
+            mesh.GetSubdivisionSchemeAttr().Set("catmullClark" if animated else "none")
+            place = mesh.AddTranslateOp()
+            for code in (0, 12):
+                place.Set(Gf.Vec3d(0, 0, 0.01 * code * animated), code * animated)
+
+        character, _, _ = read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
+        return [note for note in character.notes if note.startswith(f"{FORE}/skin")]
+
+    told = notes(True, True)
+    assert len(told) == 2 and "catmullClark" in told[0] and "first frame" in told[1]
+    assert notes(True, False) == notes(False, True) == []

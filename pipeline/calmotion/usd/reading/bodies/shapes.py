@@ -11,6 +11,7 @@ from calmotion.errors import ShotError
 from calmotion.shot import SurfaceMesh, TetGeometry
 from calmotion.shot.character import Array, IntArray
 from calmotion.usd import gf
+from calmotion.usd.reading.animated_transforms import moves_on_body
 from calmotion.usd.reading.bodies import primitives
 from calmotion.usd.reading.bodies.moments import Moments, is_closed, surface_moments
 from calmotion.usd.reading.bodies.polygons import triangulate
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from pxr import Usd
 
 MESH = "Mesh"
+_ROUNDED = ("catmullClark", "loop")  # schemes of subdivision that move points
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +90,18 @@ def shapes_of(reading: Reading, body_prim: Usd.Prim, pose: Pose) -> list[Shape]:
         collider = collider and prim.GetAttribute("physics:collisionEnabled").Get() is not False
         shapes.append(Shape(prim, surface, moments, collider))
     return shapes
+
+
+def note_unread_shape(reading: Reading, shapes: list[Shape]) -> None:
+    """Note what changes the shape of a flexible body in a viewer and not in a simulation: subdivision, animation."""
+    for prim in (shape.prim for shape in shapes):
+        path, scheme, points = prim.GetPath(), prim.GetAttribute("subdivisionScheme"), prim.GetAttribute("points")
+        if scheme and scheme.HasAuthoredValue() and scheme.Get() in _ROUNDED:
+            reading.note(
+                f"{path}: its subdivision ({scheme.Get()}) is not applied: the body has the shape of its points"
+            )
+        if (points and points.ValueMightBeTimeVarying()) or moves_on_body(prim):
+            reading.note(f"{path}: it is animated on its body; its shape and place at the first frame are used")
 
 
 def tets_of(reading: Reading, body_prim: Usd.Prim, pose: Pose) -> TetGeometry | None:
