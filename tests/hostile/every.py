@@ -9,6 +9,7 @@ from typing import Any
 sys.path[:0] = [str(Path(__file__).resolve().parent), str(Path(__file__).resolve().parents[1] / "helpers" / "usd")]
 
 import commands  # noqa: E402
+import contradictions  # noqa: E402
 import files  # noqa: E402
 import motions  # noqa: E402
 import physics  # noqa: E402
@@ -26,6 +27,7 @@ def broken(case: Any) -> Case:
 GROUPS: dict[str, dict[str, Case]] = {
     "motions": motions.CASES,
     "commands": commands.CASES,
+    "contradictions": contradictions.CASES,
     "files": files.CASES,
     "physics": physics.CASES,
     "recordings": takes.CASES,

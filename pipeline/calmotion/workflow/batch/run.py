@@ -35,7 +35,7 @@ _STAGE = "Batch"
 
 # parameters: one for each option of the command, all but the shots and the folder by keyword
 def batch(
-    shots: Sequence[str | os.PathLike[str]],
+    shots: Sequence[str | os.PathLike[str]] | str | os.PathLike[str],
     folder: str | os.PathLike[str],
     *,
     command: str = "optimize",
@@ -55,7 +55,7 @@ def batch(
     inputs, its request and its outputs are unchanged.
 
     Args:
-        shots: USD files.
+        shots: USD files, or one.
         folder: Of the results; workers elsewhere see it under the same path.
         command: `optimize` or `simulate`.
         arguments: Options of that command, such as `("--tolerance", "1mm")`.
@@ -73,9 +73,8 @@ def batch(
         SettingError: An argument does not fit.
     """
     target = os.path.abspath(os.fspath(folder))
-    shots, arguments, extras = (
-        (given,) if isinstance(given, (str, os.PathLike)) else given for given in (shots, arguments, extras)
-    )
+    shots = (shots,) if isinstance(shots, (str, os.PathLike)) else shots
+    arguments, extras = ((given,) if isinstance(given, str) else given for given in (arguments, extras))
     unknown = [name for name in extras if name not in EXTRAS]
     if unknown or (workers is not None and not (isinstance(workers, Integral) and workers > 0)):
         raise SettingError(
