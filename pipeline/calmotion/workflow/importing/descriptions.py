@@ -12,6 +12,7 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.support.files import is_special, refuse_special
 from calmotion.support.foreign_files import remedy_for
 from calmotion.support.naming import nearest
+from calmotion.workflow.importing.mjcf import refuse_several_joints, unread
 from calmotion.workflow.importing.repairs import (
     PACKAGE,
     faults,
@@ -39,6 +40,7 @@ class Description:
         efforts: Largest effort of each joint of a URDF, where it is positive [N m or N].
         without_mass: Links of a URDF with geometry and without inertia.
         massless: Links of a URDF whose mass is 0, and those with neither inertia nor geometry: frames.
+        unread: What of an MJCF robot is not read, as sentences for the user.
         faults: What of a URDF is repaired in a copy before it is converted, as sentences for the user.
     """
 
@@ -49,6 +51,7 @@ class Description:
     without_mass: tuple[str, ...] = ()
     massless: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
 
 
 def read_description(path: str, packages: Mapping[str, str]) -> Description:
@@ -63,8 +66,8 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
     """
     root, prefixes = _root(path)
     if root.tag == "mujoco":
-        _refuse_special_files(root, path)
-        return Description(path, MJCF)
+        _refuse_wrong_files(root, path)
+        return Description(path, MJCF, unread=unread(root))
     if root.tag != "robot":
         raise ShotError(
             "this is neither a URDF nor an MJCF robot", path=path, found=f"<{root.tag}>",
@@ -189,12 +192,14 @@ def _meshes(root: xml.Element) -> Iterator[tuple[str, str]]:
             yield link.get("name", ""), mesh.get("filename", "")
 
 
-def _refuse_special_files(root: xml.Element, path: str, seen: frozenset[str] = frozenset()) -> None:
-    """Refuse named pipes and the like among the files of an MJCF robot, for which a converter would wait for ever.
+def _refuse_wrong_files(root: xml.Element, path: str, seen: frozenset[str] = frozenset()) -> None:
+    """Refuse named pipes and the like among the files of an MJCF robot, for which a converter would wait for ever, and
+    bodies with several joints in any of them.
 
     Args:
         seen: Files that include this one.
     """
+    refuse_several_joints(root, path)
     here = os.path.dirname(os.path.abspath(path))
     named = ("meshdir", "texturedir", "assetdir")
     folders = [here, *(os.path.join(here, node.get(name, "")) for node in root.iter("compiler") for name in named)]
@@ -207,7 +212,7 @@ def _refuse_special_files(root: xml.Element, path: str, seen: frozenset[str] = f
                         attribute=f"{node.tag}.file", found=name, remedy="Name a file",
                     )  # fmt: skip
                 if node.tag == "include" and os.path.isfile(file) and file not in seen:
-                    _refuse_special_files(_root(file)[0], file, seen | {file})
+                    _refuse_wrong_files(_root(file)[0], file, seen | {file})
 
 
 def _packages(root: xml.Element, path: str, given: Mapping[str, str]) -> dict[str, str]:

@@ -222,10 +222,8 @@ class _Import:
             write_layer(layer, draft, lambda path: read.append(read_shot(path, still=True)[:2]))
             self._move(parts, draft)
         character, animation = read[0]
-        told = [f"converter: {text}" for text in warnings]
-        return ImportedRobot(
-            self._layer, self._folder, character, animation, (*changes, *notes, *told, *character.notes)
-        )
+        told = (*changes, *self._description.unread, *notes, *(f"converter: {text}" for text in warnings))
+        return ImportedRobot(self._layer, self._folder, character, animation, (*told, *character.notes))
 
     def _converted(self, work: str, parts: str, python: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
         """The converted robot, warnings of the converter, and what was repaired for it."""
