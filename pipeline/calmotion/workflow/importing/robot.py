@@ -25,6 +25,7 @@ from calmotion.usd.writing.root import relative_asset
 from calmotion.version import __version__
 from calmotion.workflow.importing.converters import BrokenMeshes, convert, converter_python, temporary_folder
 from calmotion.workflow.importing.descriptions import USD, Description, read_description, repaired
+from calmotion.workflow.importing.doubts import doubts
 from calmotion.workflow.materials import known_materials
 from calmotion.workflow.problems import problems_of, value_of
 from calmotion.workflow.shot import Given, Path, read_settings
@@ -198,7 +199,7 @@ def _over_usd(robot: str, layer: str, options: RobotOptions) -> ImportedRobot:
     read: list[tuple[Character, Animation]] = []
     write_layer(made, layer, lambda path: read.append(read_shot(path, still=True)[:2]))
     character, animation = read[0]
-    return ImportedRobot(layer, "", character, animation, (*notes, *character.notes))
+    return ImportedRobot(layer, "", character, animation, (*notes, *doubts(character), *character.notes))
 
 
 class _Import:
@@ -223,7 +224,9 @@ class _Import:
             self._move(parts, draft)
         character, animation = read[0]
         told = (*changes, *self._description.unread, *notes, *(f"converter: {text}" for text in warnings))
-        return ImportedRobot(self._layer, self._folder, character, animation, (*told, *character.notes))
+        return ImportedRobot(
+            self._layer, self._folder, character, animation, (*told, *doubts(character), *character.notes)
+        )
 
     def _converted(self, work: str, parts: str, python: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
         """The converted robot, warnings of the converter, and what was repaired for it."""

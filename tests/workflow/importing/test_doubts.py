@@ -1,0 +1,18 @@
+"""What of an imported robot can hardly be meant."""
+
+import dataclasses
+
+from calmotion.usd.reading.shot import read_shot
+from calmotion.workflow.importing.doubts import doubts
+from small_shots import FORE, write_arm
+
+
+def test_a_robot_of_a_thousand_tonnes_has_meshes_in_millimetres(tmp_path):
+    character, _, _ = read_shot(str(write_arm(tmp_path / "arm.usda")))
+    assert doubts(character) == ()
+    bodies = tuple(
+        dataclasses.replace(body, mass=dataclasses.replace(body.mass, mass=1e6)) if body.path == FORE else body
+        for body in character.bodies
+    )
+    (told,) = doubts(dataclasses.replace(character, bodies=bodies))
+    assert "1000 t" in told and FORE in told and "0.001" in told
