@@ -53,3 +53,10 @@ def target_columns(character: Character, simulation: Simulation) -> dict[str, Ar
         table[f"{target.path}.error"] = simulation.position_errors[rows, k]
         table[f"{target.path}.rotation_error"] = simulation.rotation_errors[rows, k]
     return table
+
+
+def read_only(values: Array) -> Array:
+    """A view that cannot be written to: what is written of a result later must not differ from its report."""
+    view = values.view()
+    view.flags.writeable = False
+    return view

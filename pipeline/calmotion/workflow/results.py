@@ -14,8 +14,7 @@ from calmotion.shot import Character, Result, Simulation
 from calmotion.shot.character import Array
 from calmotion.shot.outputs import CsvFile, Figures, Recording, Verification, Video, WrittenLayer
 from calmotion.shot.run import OutputPaths
-from calmotion.shot.table import columns
-from calmotion.support.arrays import read_only
+from calmotion.shot.table import columns, read_only
 from calmotion.workflow.exporting.result_files import no_input
 from calmotion.workflow.run import Outcome, again
 

@@ -1,8 +1,8 @@
-"""Arrays that are handed out."""
+"""Arrays that are handed out of a result."""
 
 import numpy as np
 import pytest
-from calmotion.support.arrays import read_only
+from calmotion.shot.table import read_only
 
 
 def test_a_view_follows_its_array_and_cannot_be_written_to():
