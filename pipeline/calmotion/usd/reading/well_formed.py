@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError
-from calmotion.usd.reading.context import prims_of
+from calmotion.usd.reading.animated.animation_codes import animation_codes
+from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.schemas import NAMES
 
 if TYPE_CHECKING:
@@ -48,11 +49,20 @@ def wrong_types(stage: Usd.Stage) -> Iterator[ShotError]:
 
 
 def broken_transforms(stage: Usd.Stage) -> Iterator[ShotError]:
-    """Prims whose xformOpOrder names an operation that does not exist or has a wrong type."""
+    """Prims whose xformOpOrder names an operation that does not exist or has a wrong type, and bodies with animated
+    operations without an order, which USD does not apply."""
     from pxr import Tf, UsdGeom
 
     for prim in prims_of(stage):
         order = prim.GetAttribute("xformOpOrder")
+        if is_rigid_body(prim) and (unordered := _animated_without_order(prim)):
+            yield ShotError(
+                "does not name the animated transform operations of this body, so that USD does not apply them",
+                path=prim.GetPath(),
+                attribute="xformOpOrder",
+                found=", ".join(unordered),
+                remedy="Author the order, such as by UsdGeom.XformCommonAPI, or remove the operations",
+            )
         if not order or not order.HasAuthoredValue() or not prim.IsA(UsdGeom.Xformable):
             continue
         names = [str(name) for name in order.Get() or ()]
@@ -71,6 +81,15 @@ def broken_transforms(stage: Usd.Stage) -> Iterator[ShotError]:
                 found=", ".join(dict.fromkeys(wrong)) or "an empty name",
                 remedy="Correct the order, or author the operations",
             )
+
+
+def _animated_without_order(prim: Usd.Prim) -> list[str]:
+    """Names of the animated transform operations of a prim that has no order of operations."""
+    order = prim.GetAttribute("xformOpOrder")
+    if order and order.HasAuthoredValue():
+        return []
+    properties = prim.GetAuthoredPropertiesInNamespace("xformOp")
+    return [prop.GetName() for prop in properties if animation_codes(prim.GetAttribute(prop.GetName()))]
 
 
 def _type_of(definition: Usd.PrimDefinition, name: str) -> str:
