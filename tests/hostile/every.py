@@ -13,6 +13,7 @@ import contradictions  # noqa: E402
 import files  # noqa: E402
 import motions  # noqa: E402
 import physics  # noqa: E402
+import scenes  # noqa: E402
 import takes  # noqa: E402
 from broken_shots import CASES as BROKEN  # noqa: E402
 from hostile import DONE, REFUSED, SHOT, Case  # noqa: E402
@@ -31,6 +32,7 @@ GROUPS: dict[str, dict[str, Case]] = {
     "files": files.CASES,
     "physics": physics.CASES,
     "recordings": takes.CASES,
+    "scenes": scenes.CASES,
 }
 # Shots that are broken in one way each are refused by `tests/refusals`, in this way as well.
 GROUPS["broken"] = {name: broken(case) for name, case in BROKEN.items()}
