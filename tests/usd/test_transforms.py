@@ -61,3 +61,11 @@ def test_the_axis_rotation_takes_z_to_the_axis(axis, direction):
     turn = transforms.axis_rotation(axis)
     assert np.array_equal(turn @ [0, 0, 1], direction)
     assert np.linalg.det(turn) == pytest.approx(1.0) and np.allclose(turn.T @ turn, np.eye(3))
+
+
+@pytest.mark.parametrize("row", [(0.0, 0.0, 0.0, 2.0), (0.1, 0.0, 0.0, 1.0)])
+def test_a_matrix_that_is_not_affine_is_refused(row):
+    matrix = np.eye(4)
+    matrix[3] = row
+    with pytest.raises(ShotError, match="not affine"):
+        transforms.pose_from_matrix(matrix, "/A")

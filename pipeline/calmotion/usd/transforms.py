@@ -10,6 +10,7 @@ from calmotion.errors import ShotError
 from calmotion.shot.character import Array, Frame
 
 _HUGE = 1e30
+_AFFINE = 1e-9
 _SHEAR_TOLERANCE = 1e-4  # xforms are often authored in single precision
 
 
@@ -51,10 +52,18 @@ def pose_from_matrix(matrix: Array, path: str) -> Pose:
         path: Prim path, for the message.
 
     Raises:
-        ShotError: The matrix shears, or is singular or not finite.
+        ShotError: The matrix shears, or is singular, not affine or not finite.
     """
     linear = matrix[:3, :3]
     refuse_infinite(matrix, path)
+    if np.any(np.abs(matrix[3] - [0.0, 0.0, 0.0, 1.0]) > _AFFINE):
+        raise ShotError(
+            "its transform is not affine",
+            path=path,
+            attribute="xformOpOrder",
+            found=f"last column {matrix[3].tolist()}",
+            remedy="Author (0, 0, 0, 1) in the last column of its matrix",
+        )
     scale = np.linalg.norm(linear, axis=0)
     if np.min(scale) <= 1e-12 * max(1.0, float(np.max(scale))):
         raise ShotError(
