@@ -87,21 +87,7 @@ def interface_patches(
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
     if radius >= size:
         raise _nothing_left(body, radius, size)
-    groups: list[list[int]] = []
-    for index, attachment in enumerate(attachments):
-        if attachment.kind != "interface":
-            continue
-        at = attachment.frame.position
-        for group in groups:
-            if (
-                attachment.surface is None
-                and attachments[group[0]].surface is None
-                and np.linalg.norm(attachments[group[0]].frame.position - at) < 1e-6 * size
-            ):
-                group.append(index)
-                break
-        else:
-            groups.append([index])
+    groups = _at_one_position(attachments, size)
     skin = meshed or mesh
     measured = skin.nodes[skin.surface[:, :3]]
     surface = mesh.surface_nodes
@@ -143,6 +129,26 @@ def interface_patches(
     if patches and radius >= 0.0 and np.all(taken):
         raise _nothing_left(body, radius, size)
     return patches
+
+
+def _at_one_position(attachments: Sequence[AttachmentFrame], size: float) -> list[list[int]]:
+    """Indices of the attachment frames of kind `interface`: those that share a patch together."""
+    groups: list[list[int]] = []
+    for index, attachment in enumerate(attachments):
+        if attachment.kind != "interface":
+            continue
+        at = attachment.frame.position
+        for group in groups:
+            if (
+                attachment.surface is None
+                and attachments[group[0]].surface is None
+                and np.linalg.norm(attachments[group[0]].frame.position - at) < 1e-6 * size
+            ):
+                group.append(index)
+                break
+        else:
+            groups.append([index])
+    return groups
 
 
 def _cut_patch(
