@@ -166,7 +166,7 @@ CASES = {
     "a shaper that is none": (simulate, no_edit, {"shaper": "zdv"}, "--shaper"),
     "a shot of one frame": (simulate, one_frame, {}, "endTimeCode"),
     "no tolerance at all": (simulate, no_edit, {"tolerance": 0.0}, "--tolerance"),
-    "a tolerance that is no number": (simulate, no_edit, {"tolerance": float("nan")}, "--tolerance"),
+    "a tolerance that is no number": (simulate, no_edit, {"tolerance": float("nan")}, "tolerance"),
     "a tolerance below rounding": (optimize, no_edit, {"tolerance": 1e-300}, "--tolerance"),
     "a tolerance beyond the character": (optimize, no_edit, {"tolerance": 1.0}, "--tolerance"),
     "a tolerance of a shot beyond the character": (

@@ -146,7 +146,7 @@ def test_what_a_run_took_over_and_what_it_made_are_told(shot_file, capsys):
     watch._last = {}  # else it would be forgotten, as that of the run before
     result = watch.run()
     assert (watch.reused, watch.made) == (["time step"], ["meshes", "reduction", "subspaces"])
-    args = argparse.Namespace(quiet=False, optimize=False, verbose=True)
+    args = argparse.Namespace(quiet=False, optimize=False, verbose=True, strict=False)
     _tell(result, watch, 1.0, args, Output(sys.stdout, False))
     told = capsys.readouterr().out
     assert told.endswith("; reused time step; made meshes, reduction, subspaces\n")
