@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.multibody.parallel import in_parallel
 from calmotion.multibody.sensitivity.linearization import spare_memory
 from calmotion.retargeting.found_curves import found_curves
@@ -224,7 +225,8 @@ class WorstCase:
         """The least maximum of the linear model, and the factors with which it keeps the allowed error."""
         d = np.zeros_like(self._x)
         for left in reversed(range(FACTORS)):
-            d = least_maximum(linear, self._factors, rest, self._fixed, d, orders, steps)
+            with one_blas_thread():  # products by a vector take twice as long with two
+                d = least_maximum(linear, self._factors, rest, self._fixed, d, orders, steps)
             nominal = _largest(linear.at(d)[0])
             free = np.all(self._factors[0] <= 1.0) or np.any(nominal >= met[0] * most)
             if not left or np.all(nominal <= met[1] * most) and free:
