@@ -272,8 +272,7 @@ def _patch(
         raise ShotError(
             f"the surface near the attachment frame of {path} is too small to carry a joint",
             path=body, attribute="calm:flexible:interfaceRadius", found=f"{len(nodes)} nodes within {radius:.4g} m",
-            remedy="Move the joints apart, or author a smaller elementSize or "
-            "another interfaceRadius",
+            remedy="Move the joints apart, or author a smaller elementSize or another interfaceRadius",
         )  # fmt: skip
     return InterfacePatch(nodes=nodes.astype(np.int32), attachments=tuple(group), radius=radius, center=center)
 
