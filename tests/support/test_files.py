@@ -36,6 +36,9 @@ def test_a_file_is_replaced_as_a_whole_and_is_as_public_as_others(tmp_path):
     mask = os.umask(0)
     os.umask(mask)
     assert stat.S_IMODE(file.stat().st_mode) == 0o666 & ~mask
+    file.chmod(0o660)  # as a studio sets it for a group
+    write_text(file, "newer")
+    assert stat.S_IMODE(file.stat().st_mode) == 0o660
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="needs Linux")

@@ -33,7 +33,7 @@ def replaced(path: str | Path, keep_existing: bool = False, flush: bool = True) 
     suffix of `path`, in the folder of `path`, and no symbolic link is followed. What killed processes left there is
     removed. Its content is flushed to the disk before it is renamed. An
     exception in the block removes it. Missing folders above `path` are created. The new file has the permissions of
-    any new file.
+    the file that it replaces, or of any new file.
 
     Args:
         path: The file to replace; a symbolic link to a file is replaced itself.
@@ -55,7 +55,7 @@ def replaced(path: str | Path, keep_existing: bool = False, flush: bool = True) 
         yield temporary
         if flush:
             _flush(temporary)
-        _make_public(temporary)
+        _permit(temporary, target)
         if keep_existing:
             _move_unless_present(temporary, target)
         else:
@@ -295,8 +295,15 @@ def _flush(path: Path) -> None:
         os.close(descriptor)
 
 
-def _make_public(path: Path) -> None:
-    """Replace the permissions that mkstemp gives, owner only, by those of any new file."""
+def _permit(path: Path, target: Path) -> None:
+    """Give a file, which mkstemp keeps to its owner, the permissions of the file that it replaces, or of a new one."""
+    try:
+        old = target.lstat().st_mode
+    except FileNotFoundError:
+        old = 0
+    if stat.S_ISREG(old):
+        os.chmod(path, old & 0o777)
+        return
     mask = os.umask(0)
     os.umask(mask)
     os.chmod(path, 0o666 & ~mask)

@@ -30,8 +30,21 @@ def test_results_are_told_once_and_have_all_of_their_prims(tmp_path, edit):
 def test_results_of_prims_that_were_renamed_are_told(tmp_path):
     shot, root = with_result(tmp_path)
     shot.write_text(shot.read_text().replace("/Arm/joints", "/Arm/motors").replace('"joints"', '"motors"'))
-    _, lost = notes(root)
+    _, changed, lost = notes(root)
+    assert "another version of shot.usda" in changed
     assert lost.startswith("calm.usda: the shot has no /Arm/joints/") and "1 more" in lost
+
+
+def test_results_of_a_shot_that_has_changed_since_are_told(tmp_path):
+    shot, root = with_result(tmp_path)
+    character, animation, provenance = read_shot(str(root))
+    again = result_with(character, animation, {0: 0.2})
+    root = write_result(character, animation, provenance, again, str(tmp_path / "again.usda"))[1]
+    (tmp_path / "calm_root.usda").write_text((tmp_path / "calm_root.usda").read_text() + "\n")
+    assert len(notes(root)) == 1  # a root layer of ours that was written anew is no change
+    shot.write_text(shot.read_text().replace("endTimeCode = 24", "endTimeCode = 23"))
+    _, changed = notes(root)
+    assert changed.startswith("again.usda") and "another version of shot.usda" in changed
 
 
 def test_a_flattened_result_says_what_its_curves_are(tmp_path):

@@ -23,7 +23,7 @@ def authored(path, attribute, linear):
     motor = Motor(0, path, attribute, linear=linear)
     character = SimpleNamespace(motors=[motor], retarget=SimpleNamespace(cyclic=False))
     clock = Clock(start=101, end=113, time_codes_per_second=24, frames_per_second=24)
-    return layer, f"{path}.{attribute}", author_curves(layer, character, ANIMATION, (CURVE,), FRAMES, clock, 0.01)
+    return layer, f"{path}.{attribute}", author_curves(layer, character, ANIMATION, (CURVE,), None, clock, 0.01)
 
 
 @pytest.mark.parametrize(("rate", "parts"), [(24.0, 1), (25.0, 2), (96.0, 4), (1.0, 1)])
@@ -40,6 +40,24 @@ def test_between_frames_a_curve_is_what_its_frames_are_read_back_as():
     read_back = interpolate(Track(FRAMES, CURVE.frame_values), 0.5)
     assert np.abs(curve_values(ANIMATION, CURVE, times, False) - read_back(times)).max() < 1e-14
     assert curve_values(ANIMATION, CURVE, FRAMES, False) is CURVE.frame_values
+
+
+def test_what_is_authored_between_frames_is_kept_where_the_frames_alone_would_lose_it():
+    """The curvature of the track jumps at 0.1 s, between two frames, and in the rest it is smooth."""
+    from calmotion.shot.curves import held_curve
+
+    times = np.linspace(0.0, 0.5, 241)
+    kinked = Track(times, 0.1 * times**2 + 20.0 * np.maximum(times - 0.1, 0.0) ** 2)
+    smooth = Track(times, np.sin(times))
+    assert sample_times(FRAMES, None, [smooth]) is FRAMES
+    assert len(sample_times(FRAMES, 48.0, [kinked])) == 25
+    found = sample_times(FRAMES, None, [smooth, kinked])
+    assert np.isin(FRAMES, found).all() and 20 < len(found) < 120
+    whole = held_curve(kinked, 0.5)
+    read_back = held_curve(Track(found, whole(found, 0)), 0.5)
+    at_frames = held_curve(Track(FRAMES, whole(FRAMES, 0)), 0.5)
+    assert np.abs(read_back(times, 0) - kinked.values).max() < 1e-6
+    assert np.abs(at_frames(times, 0) - kinked.values).max() > 3e-4
 
 
 def test_values_are_degrees_at_the_time_codes_of_the_stage():

@@ -9,12 +9,14 @@ import os
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.shot import Track
+from calmotion.shot.curves import held_curve
 from calmotion.usd.reading import read_shot
 from calmotion.usd.writing import WriteOptions, write_result
-from performing import result_with, tracks_of, worst_gap
+from performing import performed, result_with, tracks_of, worst_gap
 from posed_shots import ANIMATION, ARM, FOREARM, posed, posed_by_pivots, skeletal
-from pxr import Sdf, Usd, UsdSkel, UsdUtils
-from small_shots import ELBOW, FORE, FRAMES, SHOULDER, TARGET_POSITION, UPPER, angles, write_arm
+from pxr import Sdf, Ts, Usd, UsdGeom, UsdSkel, UsdUtils
+from small_shots import ELBOW, FORE, FRAMES, LENGTH, SHOULDER, TARGET_POSITION, UPPER, angles, write_arm
 
 MOTOR = {"shoulder": 0, "elbow": 1}
 
@@ -51,6 +53,49 @@ def test_bodies_perform_the_new_curves(tmp_path, edit, motor):
     # the elbow moves the forearm alone
     moved = {path.split(".")[0] for path in properties(layer)}
     assert moved == ({FORE} if motor == "elbow" else {UPPER, FORE})
+
+
+def posed_by_splines(stage):
+    """The elbow turns by a spline that rests at each key, where its curvature jumps."""
+    posed(stage)
+    fore = UsdGeom.Xformable(stage.GetPrimAtPath(FORE))
+    fore.ClearXformOpOrder()
+    UsdGeom.Xformable(stage.GetPrimAtPath(UPPER)).ClearXformOpOrder()
+    UsdGeom.Xformable(stage.GetPrimAtPath(UPPER)).AddTranslateOp().Set((0, 0, 1))
+    fore.AddTranslateOp().Set((LENGTH, 0, 1))
+    turn, spline = fore.AddRotateYOp(), Ts.Spline("float")
+    for k, value in enumerate((0.0, 30.0, -10.0, 20.0, 0.0)):
+        knot = Ts.Knot("float")
+        knot.SetTime(0.25 * FRAMES * k)
+        knot.SetValue(value)
+        knot.SetNextInterpolation(Ts.InterpCurve)
+        for width in (knot.SetPreTanWidth, knot.SetPostTanWidth):
+            width(0.25 * FRAMES / 3.0)
+        spline.SetKnot(knot)
+    turn.GetAttr().SetSpline(spline)
+
+
+def test_bodies_that_splines_pose_perform_the_new_curves_between_frames_too(tmp_path):
+    shot = write_arm(tmp_path / "arm.usda", posed_by_splines)
+    character, animation, provenance = read_shot(str(shot))
+    end = float(animation.frame_times[-1])
+    fine = np.linspace(0.0, end, 601)
+    authored = held_curve(animation.tracks[1], end)
+    stage = Usd.Stage.Open(str(shot))
+    spline = stage.GetPrimAtPath(FORE).GetAttribute("xformOp:rotateY").GetSpline()
+    meant = np.deg2rad([spline.Eval(24.0 * time) for time in fine])
+    assert np.abs(authored(fine, 0) - meant).max() < 1e-4
+    bump = 0.1 * np.sin(np.pi * fine / end) ** 2
+    new = (animation.tracks[0], Track(fine, authored(fine, 0) + bump))
+    result = dataclasses.replace(
+        result_with(character, animation, {1: 0.1}), performed=performed(character, animation, new)
+    )
+    layer, root = write_result(character, animation, provenance, result, str(tmp_path / "calm.usda"), WriteOptions())
+    again = read_shot(root)[1]
+    assert np.abs(held_curve(again.current[1], end)(fine, 0) - new[1].values).max() < 5e-5
+    frames = Track(animation.frame_times, held_curve(new[1], end)(animation.frame_times, 0))
+    assert np.abs(held_curve(frames, end)(fine, 0) - new[1].values).max() > 5e-4
+    assert {path.split(".")[0] for path in properties(layer)} == {FORE}
 
 
 def test_a_skeleton_performs_the_new_curves_and_keeps_its_other_joints(tmp_path):

@@ -61,6 +61,14 @@ def codes_of(prim: Usd.Prim) -> list[float]:
     return sorted(codes)
 
 
+def has_splines(prim: Usd.Prim) -> bool:
+    """Whether a spline animates the local transform of a prim."""
+    from pxr import UsdGeom
+
+    xform = UsdGeom.Xformable(prim)
+    return bool(xform) and any(one.GetAttr().HasSpline() for one in xform.GetOrderedXformOps())
+
+
 def carriers(prim: Usd.Prim) -> list[Usd.Prim]:
     """A prim and the prims above it, up to one that resets the transform stack."""
     from pxr import UsdGeom

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from calmotion.shot import Provenance
+from calmotion.shot import InputLayer, Provenance
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
 from calmotion.usd.units import units_of
@@ -41,13 +42,16 @@ def provenance_of(path: str, stage: Usd.Stage, clock: Clock, earlier: tuple[str,
     )
 
 
-def notes_of_results(composed: Usd.Stage, path: str, earlier: Sequence[str]) -> list[str]:
+def notes_of_results(
+    composed: Usd.Stage, path: str, earlier: Sequence[str], inputs: Sequence[InputLayer] = ()
+) -> list[str]:
     """What a user must know of results that a shot carries.
 
     Args:
         composed: The stage with them.
         path: Its file.
         earlier: Identifiers of the layers of results.
+        inputs: What the shot without them is composed from.
     """
     root = composed.GetRootLayer()
     if not earlier:
@@ -57,11 +61,39 @@ def notes_of_results(composed: Usd.Stage, path: str, earlier: Sequence[str]) -> 
     names = ", ".join(stages.display_name(layer, path) for layer in earlier)
     notes = [f"the shot carries results of Calmotion ({names}); the intended motion is the animation beneath them"]
     for layer in composed.GetLayerStack(False):
-        lost = _without_prim(layer, composed) if layer.identifier in earlier else []
+        if layer.identifier not in earlier:
+            continue
+        changed = _changed_inputs(layer, path, inputs)
+        if changed:
+            others = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
+            notes.append(
+                f"{layer.GetDisplayName()}: these results were made for another version of {changed[0]}{others}; their "
+                "errors are those of that version"
+            )
+        lost = _without_prim(layer, composed)
         if lost:
             others = f" and {len(lost) - 1} more" if len(lost) > 1 else ""
             notes.append(f"{layer.GetDisplayName()}: the shot has no {lost[0]}{others}, of which it holds results")
     return notes
+
+
+def _changed_inputs(layer: Sdf.Layer, path: str, inputs: Sequence[InputLayer]) -> list[str]:
+    """Files from which a result was made, and which are no longer among those of the shot with the same content.
+
+    Not those of ours, which are muted or only name the others.
+    """
+    from pxr import Sdf
+
+    origin = layer.customLayerData[stages.METADATA_KEY]
+    present = {source.sha256 for source in inputs}
+    made_from = zip(map(str, origin.get("inputs", [])), map(str, origin.get("sha256", [])), strict=False)
+    changed = []
+    for name in (name for name, digest in made_from if digest not in present):
+        file = os.path.join(os.path.dirname(os.path.realpath(path)), name)
+        found = Sdf.Layer.FindOrOpen(file) if os.path.isfile(file) else None
+        if found is None or stages.role_of(found) not in (stages.CURVES, stages.MOTION, stages.ROOT):
+            changed.append(name)
+    return changed
 
 
 def _without_prim(layer: Sdf.Layer, stage: Usd.Stage) -> list[str]:

@@ -37,6 +37,8 @@ from calmotion.usd.units import other_units, units_of
 if TYPE_CHECKING:
     from pxr import Usd
 
+_PARTS = 8  # of a frame, at which bodies that splines pose are read
+
 
 def read_shot(
     path: str, *, still: bool = False, given: MotorTracks | None = None, measured: Sequence[str] = ()
@@ -77,8 +79,8 @@ def read_shot(
             standing = hinge_stacks(reading, read.skeleton.drives)
             current = motor_tracks(of_motors, read.skeleton.drives, clock, given, standing)
             raise_all(of_motors.problems)
-        of_results = notes_of_results(composed, path, earlier)
         provenance = provenance_of(path, stage, clock, earlier)
+        of_results = notes_of_results(composed, path, earlier, provenance.layers)
         weights = weight_tracks(part, character.targets, clock)
         free = free_tracks(part, character.motors, clock)
         unread = grouped([error.message() for error in (*unread_attributes(part), *misplaced_schemas(part))])
@@ -162,7 +164,7 @@ def motor_tracks(
     tracks: dict[str, Track] = {}
     posed = [d for d in drives if d.source == BODIES or (d.source == CONSTANT and d.constant is None)]
     bodies = [drive.joint for drive in posed]
-    codes = pose_codes(stage, bodies, clock)
+    codes = pose_codes(stage, bodies, clock, _PARTS)
     if len(codes) == 0:
         codes = np.unique([clock.start, clock.end])
     for joint, motion in zip(bodies, joint_motions(reading, bodies, codes), strict=True):
@@ -195,5 +197,5 @@ def _note_dense_samples(tracks: tuple[Track, ...], clock: Clock, reading: Readin
     if any(len(track.times) > 1 and np.median(np.diff(track.times)) < 0.75 * frame for track in tracks):
         reading.note(
             f"the animation has more samples than its {clock.frames_per_second:g} frames a second; curves are written "
-            "at the frames, unless --samples-per-second requests more"
+            "with those of them that they need, unless --samples-per-second gives a number"
         )

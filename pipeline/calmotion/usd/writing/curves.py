@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calmotion.shot import Animation, Character, Motor, MotorCurve
+from calmotion.shot import Animation, Character, Motor, MotorCurve, Track
 from calmotion.shot.character import Array
 from calmotion.usd.clock import Clock
 from calmotion.usd.schemas import is_applied
@@ -15,20 +15,54 @@ from calmotion.usd.schemas import is_applied
 if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
+SAME = 1e-6  # times that are closer are one [s]
+NEAR = 1e-6  # a curve that is nearer to what was authored is the same [rad or m]
 
-def sample_times(frame_times: Array, samples_per_second: float | None) -> Array:
+
+def sample_times(frame_times: Array, samples_per_second: float | None, tracks: Iterable[Track] = ()) -> Array:
     """Times of the samples [s]: the frames, or a uniform grid that is at least that dense and has the frames.
 
     Args:
         frame_times: Shape [f].
-        samples_per_second: None for the frames alone.
+        samples_per_second: None for the frames, and what the tracks need between.
+        tracks: The animation of what is written.
     """
     if samples_per_second is None:
-        return frame_times
+        return with_authored(frame_times, tracks)
     frame = float(frame_times[1] - frame_times[0])
     parts = max(1, int(np.ceil(frame * samples_per_second - 1e-9)))
     steps = np.arange((len(frame_times) - 1) * parts + 1)
     times: Array = frame_times[0] + steps * (frame / parts)
+    return times
+
+
+def with_authored(times: Array, tracks: Iterable[Track]) -> Array:
+    """Times of samples together with those of tracks between which a curve through the samples alone would leave: there
+    something was authored between the frames, or the curvature of a spline jumps.
+
+    Args:
+        times: [s], ascending, shape [n].
+        tracks: The animation of what is written.
+    """
+    from calmotion.shot.curves import held_curve
+
+    end = float(times[-1])
+    for track in tracks:
+        inside = (track.times > times[0] + SAME) & (track.times < end - SAME)
+        own, values = track.times[inside], track.values[inside]
+        if not len(own):
+            continue
+        whole = held_curve(track, end)
+        while True:
+            error = np.abs(held_curve(Track(times, whole(times, 0)), end)(own, 0) - values)
+            after = np.searchsorted(times, own)
+            apart = np.minimum(own - times[after - 1], times[after] - own)
+            far = np.flatnonzero((error > NEAR) & (apart > SAME))
+            if not len(far):
+                break
+            # the worst of each interval: what is left is often near enough then
+            far = far[np.argsort(-error[far])]
+            times = np.union1d(times, own[far[np.unique(after[far], return_index=True)[1]]])
     return times
 
 
@@ -46,7 +80,7 @@ def author_curves(
     character: Character,
     animation: Animation,
     curves: tuple[MotorCurve, ...],
-    times: Array,
+    samples_per_second: float | None,
     clock: Clock,
     meters: float,
 ) -> dict[str, int]:
@@ -56,7 +90,7 @@ def author_curves(
         layer: The Sdf.Layer.
         character, animation: The shot.
         curves: Those to write.
-        times: Times of the samples [s].
+        samples_per_second: Their density [1/s]; None: at the frames, and between where the animation needs them.
         clock: The clock of the shot.
         meters: Metres in the stage's unit of length.
 
@@ -65,9 +99,10 @@ def author_curves(
     """
     from pxr import Sdf
 
-    codes = clock.time_codes(times)
     written = {}
     for curve in curves:
+        times = sample_times(animation.frame_times, samples_per_second, [animation.tracks[curve.motor]])
+        codes = clock.time_codes(times)
         motor = character.motors[curve.motor]
         path = f"{motor.prim_path}.{motor.attribute}"
         spec = attribute_spec(layer, path, Sdf.ValueTypeNames.Float)

@@ -27,13 +27,17 @@ class BakedMotion:
     elastic: tuple[Array, ...] | None
 
 
-def simulated_motion(motion: Motion, frame_times: Array) -> BakedMotion:
-    """Pick the steps of a simulation that are frames; a run that was interrupted gives the frames it reached.
+def simulated_motion(motion: Motion, times: Array) -> BakedMotion:
+    """Pick steps of a simulation, such as its frames; a run that was interrupted gives those that it reached.
+
+    Args:
+        motion: The motion.
+        times: Of the steps to pick [s], shape [f].
 
     Raises:
-        ValueError: A frame is no step, which the time grid rules out.
+        ValueError: A time is no step, which the time grid rules out for frames.
     """
-    reached = frame_times[frame_times <= motion.times[-1] + 1e-9]
+    reached = times[times <= motion.times[-1] + 1e-9]
     step = float(motion.times[1] - motion.times[0])
     indices = np.round((reached - motion.times[0]) / step).astype(int)
     if len(reached) == 0 or np.max(np.abs(motion.times[indices] - reached)) > 1e-3 * step:

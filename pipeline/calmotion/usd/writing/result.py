@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from calmotion.errors import ShotError
-from calmotion.shot import Animation, Character, Motor, MotorCurve, Provenance, Result
+from calmotion.shot import Animation, Character, Motor, MotorCurve, Provenance, Result, Track
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
 from calmotion.usd.layers import refuse_input_as_output, write_layer
 from calmotion.usd.reading.motors.tracks import MOST as MAX_SAMPLES
 from calmotion.usd.writing import bake, metadata, motions
-from calmotion.usd.writing.curves import author_curves, ensure_drives, sample_times
+from calmotion.usd.writing.curves import author_curves, ensure_drives, sample_times, with_authored
 from calmotion.usd.writing.root import keeps_earlier_curves, root_path, write_root
 from calmotion.usd.writing.skeletal import author_skeletons
 from calmotion.usd.writing.splines import author_splines
@@ -208,14 +208,15 @@ def _write_curves(
     for curve in _curves_to_write(character, result, shot.provenance):
         curves[character.motors[curve.motor].source] += (curve,)
     ensure_drives(layer, shot.stage, [character.motors[curve.motor] for curve in curves["drive"]])
-    times = sample_times(animation.frame_times, options.samples_per_second)
+    rate = options.samples_per_second
     # what was authored with corners keeps them: samples would be read back without
     cornered = tuple(curve for curve in curves["drive"] if len(animation.tracks[curve.motor].corners))
     splines = curves["drive"] if options.splines else cornered
     knots = author_splines(layer, character, animation, splines, clock, shot.meters)
     samples = tuple(curve for curve in curves["drive"] if curve not in splines)
-    written = author_curves(layer, character, animation, samples, times, clock, shot.meters)
+    written = author_curves(layer, character, animation, samples, rate, clock, shot.meters)
     if curves["skeleton"]:
+        times = sample_times(animation.frame_times, rate, _tracks(shot, "skeleton"))
         written |= author_skeletons(layer, shot.stage, character, animation, curves["skeleton"], times, clock)
     if curves["bodies"] and options.bake != "motors":
         motion = _performed(shot, result)
@@ -223,7 +224,14 @@ def _write_curves(
     return written, knots
 
 
+def _tracks(shot: _Shot, source: str) -> list[Track]:
+    """The animation of all motors of a source."""
+    return [t for motor, t in zip(shot.character.motors, shot.animation.tracks, strict=True) if motor.source == source]
+
+
 def _performed(shot: _Shot, result: Result) -> motions.BakedMotion:
+    """The rigid robot at the frames; at all steps where its bodies are animated between frames, by splines or by denser
+    samples: read back at the frames alone, it would move otherwise than it was simulated."""
     if result.performed is None:
         raise ShotError(
             "a rigid robot cannot perform these curves: its linkage does not close",
@@ -231,7 +239,10 @@ def _performed(shot: _Shot, result: Result) -> motions.BakedMotion:
             attribute="bake",
             remedy="Use --bake=simulated",
         )
-    return motions.simulated_motion(result.performed, shot.animation.frame_times)
+    times = shot.animation.frame_times
+    if len(with_authored(times, _tracks(shot, "bodies"))) > len(times):
+        times = result.performed.times[result.performed.judged]
+    return motions.simulated_motion(result.performed, times)
 
 
 def _bake(layer: Sdf.Layer, shot: _Shot, result: Result, options: WriteOptions) -> dict[str, int]:

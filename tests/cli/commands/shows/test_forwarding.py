@@ -5,6 +5,7 @@ import os
 import pytest
 from calmotion.cli.commands.shows.forwarding import command_of, extras_of, forwarded
 from calmotion.cli.main import build_parser
+from calmotion.host import SettingError
 
 GIVEN = (
     "--tolerance", "0.5mm", "--step", "2ms", "--pre-roll", "1s", "--keep", "modes", "--leave-out", "turning",
@@ -30,14 +31,16 @@ def test_options_have_the_same_meaning_for_each_shot(command):
     assert one.settings == os.path.abspath("s.toml") and one.plugins == [os.path.abspath("more")]
 
 
-def test_a_simulation_gets_no_options_of_searches():
+def test_simulations_refuse_options_of_searches():
     parser = build_parser()
-    args = parser.parse_args(
-        ["batch", "shot.usda", "-o", "out", "--simulate", "--window", "5s", "--integrator", "radau"]
-    )
+    simulated = ["batch", "shot.usda", "-o", "out", "--simulate", "--integrator", "radau"]
+    args = parser.parse_args(simulated)
     line = forwarded(args)
     assert command_of(args) == "simulate" and line == ["--integrator=radau"]
     assert parser.parse_args(["simulate", "shot.usda", *line]).integrator == "radau"
+    for given in (["--window", "5s"], ["--robust"]):
+        with pytest.raises(SettingError, match=f"{given[0]} belongs to `calmotion optimize`"):
+            forwarded(parser.parse_args([*simulated, *given]))
 
 
 def test_without_options_nothing_is_passed_on():

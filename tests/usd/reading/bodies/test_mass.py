@@ -50,6 +50,15 @@ def test_a_mass_on_the_body_overrides_those_below_and_scales_the_inertia(tmp_pat
     assert mass.inertia[0, 0] == pytest.approx(3.0 * WIDTH**2 / 6, rel=1e-6)
 
 
+def test_a_mass_of_zero_is_none_as_in_usdphysics(tmp_path):
+    def edit(stage):
+        UsdPhysics.MassAPI.Apply(stage.GetPrimAtPath(UPPER)).CreateMassAttr(0.0)
+
+    found, notes = body(tmp_path, UPPER, edit)
+    assert found.mass.mass == pytest.approx(body(tmp_path, UPPER)[0].mass.mass)
+    assert any("physics:mass is 0" in note for note in notes)
+
+
 def test_the_mass_of_a_collider_overrides_its_density(tmp_path):
     mass = body(tmp_path, UPPER, lambda stage: set_float(stage, CUBE, "physics:mass", 7.0))[0].mass
     assert mass.mass == pytest.approx(7.0)
@@ -152,7 +161,7 @@ def test_an_inertia_that_is_not_positive_is_refused(tmp_path, diagonal):
     assert (caught.value.path, caught.value.attribute) == (FORE, "physics:diagonalInertia")
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf")])
 @pytest.mark.parametrize("path", [BASE, UPPER, FORE])
 def test_an_authored_mass_that_is_not_positive_is_refused(tmp_path, path, value):
     def edit(stage):

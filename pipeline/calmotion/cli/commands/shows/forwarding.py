@@ -66,15 +66,25 @@ def extras_of(args: argparse.Namespace) -> tuple[str, ...]:
 
 
 def forwarded(args: argparse.Namespace) -> list[str]:
-    """The options of each shot's command line; files by absolute paths."""
+    """The options of each shot's command line; files by absolute paths.
+
+    Raises:
+        SettingError: An option of searches, for shots that are simulated alone.
+    """
+    from calmotion.host import SettingError
+
+    given = [f"--{name.replace('_', '-')}" for name in _OF_SEARCHES if getattr(args, name) is not None]
+    if given and command_of(args) == "simulate":
+        raise SettingError(
+            f"{given[0]} belongs to `calmotion optimize`", path="--simulate", remedy="Remove one of the two options."
+        )
     return list(_forwarded(args))
 
 
 def _forwarded(args: argparse.Namespace) -> Iterator[str]:
-    optimizes = command_of(args) == "optimize"
     for name in _VALUES:
         value = getattr(args, name)
-        if value is None or (name in _OF_SEARCHES and not optimizes):
+        if value is None:
             continue
         text = f"{value!r}{_UNITS.get(name, '')}" if isinstance(value, float) else str(value)
         yield f"--{name.replace('_', '-')}={text}"

@@ -41,10 +41,16 @@ def mass_of(reading: Reading, prim: Usd.Prim, pose: Pose, shapes: list[Shape]) -
         SI, body frame; None where nothing in the shot gives the body a mass.
 
     Raises:
-        ShotError: A mass, density or inertia that is authored and not positive, or not finite.
+        ShotError: A mass or density that is authored and negative, or not finite; an inertia that is not positive.
     """
     units = reading.units
-    mass = _authored(prim, "physics:mass", "mass", zero_means_unauthored=False)
+    mass = _authored(prim, "physics:mass", "mass")
+    written = prim.GetAttribute("physics:mass")
+    if mass is None and written and written.HasAuthoredValue():
+        reading.note(
+            f"{prim.GetPath()}: physics:mass is 0, which UsdPhysics reads as not authored: the mass follows from "
+            "geometry and density"
+        )
     center, tensor = _center(prim), _inertia(prim)
     if tensor is not None:
         _note_impossible_inertia(reading, prim, tensor)
@@ -61,17 +67,17 @@ def mass_of(reading: Reading, prim: Usd.Prim, pose: Pose, shapes: list[Shape]) -
 
 
 def has_authored_mass(prim: Usd.Prim) -> bool:
-    """Whether a positive mass is authored on the body itself; refuses one that is not positive."""
-    return _authored(prim, "physics:mass", "mass", zero_means_unauthored=False) is not None
+    """Whether a mass is authored on the body itself; refuses one that is negative."""
+    return _authored(prim, "physics:mass", "mass") is not None
 
 
-def _authored(prim: Usd.Prim, name: str, what: str, *, zero_means_unauthored: bool = True) -> float | None:
-    """A mass or density: None where not authored."""
+def _authored(prim: Usd.Prim, name: str, what: str) -> float | None:
+    """A mass or density: None where not authored, or zero, which UsdPhysics reads as not authored."""
     attribute = prim.GetAttribute(name)
     if not attribute or not attribute.HasAuthoredValue():
         return None
     value = attribute.Get()
-    if value is None or (value == 0.0 and zero_means_unauthored):
+    if value is None or value == 0.0:
         return None
     if not (np.isfinite(value) and value > 0.0):
         raise ShotError(

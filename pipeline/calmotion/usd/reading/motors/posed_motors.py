@@ -13,7 +13,7 @@ from calmotion.shot import Track
 from calmotion.shot.character import Array, Frame
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
-from calmotion.usd.reading.animated_transforms import carriers, codes_of, moves
+from calmotion.usd.reading.animated_transforms import carriers, codes_of, has_splines, moves
 from calmotion.usd.reading.bases.roots import world_frame, world_side_prim
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.generic_joints.chains import axis_values
@@ -44,15 +44,25 @@ class JointMotion:
     gap: Array
 
 
-def pose_codes(stage: Usd.Stage, joints: Sequence[JointPrim], clock: Clock) -> Array:
+def pose_codes(stage: Usd.Stage, joints: Sequence[JointPrim], clock: Clock, parts: int = 1) -> Array:
     """Time codes at which bodies of joints are posed: their samples within the shot, and its frames; empty where no
-    body has any."""
-    found: set[float] = set()
-    for path in _bodies(joints):
-        for prim in carriers(stage.GetPrimAtPath(path)):
-            found.update(codes_of(prim))
+    body has any.
+
+    Args:
+        stage: The shot.
+        joints: Joints whose bodies are looked at.
+        clock: The clock of the shot.
+        parts: Into which frames are divided where splines pose a body: their curvature jumps at knots, so that a cubic
+            through the frames alone is another motion.
+    """
+    prims = {prim for path in _bodies(joints) for prim in carriers(stage.GetPrimAtPath(path))}
+    found = {code for prim in prims for code in codes_of(prim)}
     if not found:
         return np.zeros(0)
+    if parts > 1 and any(has_splines(prim) for prim in prims):
+        frames = clock.frame_times()
+        fine = np.linspace(0.0, frames[-1], parts * (len(frames) - 1) + 1)
+        found.update(clock.time_codes(fine).tolist())
     return clock.merged(np.array(list(found)))
 
 
