@@ -46,6 +46,11 @@ class ReadTable(Operator):
         names = [name.strip() for name in values.joints.split(",")] if values.joints else []
         tracks = read_motion(path, angles=values.angles, rate=values.rate, names=names)
         context.report("info", f"{path}: {len(tracks.values)} joints, {tracks.times[-1]:.4g} s")
+        last = len(tracks.times) - 1
+        if values.rate > 0.0 and abs(tracks.times[-1] * values.rate - last) > 0.01 * last:
+            context.report("info", f"{path}: the table has times, so that motion.read.rate is not used")
+        if names and not set(names) <= {*tracks.values, "-"}:
+            context.report("info", f"{path}: the table has names, so that motion.read.joints is not used")
         return (tracks,)
 
 

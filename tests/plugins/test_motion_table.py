@@ -7,6 +7,7 @@ import zipfile
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
+from calmotion.host import Host
 from calmotion.shot import MotorTracks
 from calmotion.shot.run import Source
 from calmotion.support import memory
@@ -67,6 +68,20 @@ def test_forms_of_a_motion(read, tmp_path, name, content, settings):
     assert list(found.values) == ["pan", "lift"]
     np.testing.assert_allclose(found.values["pan"], PAN, atol=1e-9)
     np.testing.assert_allclose(found.values["lift"], LIFT, atol=1e-8)
+
+
+def test_settings_that_a_table_with_times_and_names_does_not_need_are_told(repository, tmp_path):
+    (tmp_path / "a.csv").write_text(table())
+    host = host_with(repository / "plugins" / "motion_table")
+    source = Source("", "import", motion=str(tmp_path / "a.csv"))
+
+    def told(**settings):
+        run = Host.run(host, [source], (MotorTracks,), settings={"motion.read": settings}).finish()
+        return [record.text for record in run.results[-1].records if "not used" in record.text]
+
+    assert told() == told(rate=2.0, joints="pan,lift") == []
+    rate, joints = told(rate=60.0, joints="a,b")
+    assert "motion.read.rate" in rate and "motion.read.joints" in joints
 
 
 def test_columns_may_be_left_out(read):

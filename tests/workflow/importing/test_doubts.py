@@ -16,3 +16,10 @@ def test_a_robot_of_a_thousand_tonnes_has_meshes_in_millimetres(tmp_path):
     )
     (told,) = doubts(dataclasses.replace(character, bodies=bodies))
     assert "1000 t" in told and FORE in told and "0.001" in told
+
+
+def test_motors_without_a_range_are_told(tmp_path):
+    character, _, _ = read_shot(str(write_arm(tmp_path / "arm.usda")))
+    held = tuple(dataclasses.replace(joint, lower=0.0, upper=0.0) for joint in character.joints)
+    (told,) = doubts(dataclasses.replace(character, joints=held))
+    assert "/Arm/joints/" in told and "1 more" in told and "continuous" in told

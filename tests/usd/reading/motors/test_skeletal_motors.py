@@ -7,7 +7,7 @@ import pytest
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
 from posed_shots import ANIMATION, ARM, SKELETON, skeletal
-from pxr import Sdf, UsdSkel
+from pxr import Sdf, UsdGeom, UsdSkel
 from small_shots import ELBOW, FRAMES, SHOULDER, Scale, angles, write_arm
 
 FRAME = np.arange(FRAMES + 1)
@@ -37,6 +37,18 @@ def test_what_a_hinge_cannot_do_is_reported(tmp_path):
     character, _ = read(tmp_path, lambda stage: skeletal(stage, off_axis=4.0))
     note = next(note for note in character.notes if "off the axes" in note)
     assert ELBOW in note and "4 degrees" in note
+
+
+def test_what_moves_the_skeleton_as_a_whole_is_told(tmp_path):
+    def edit(stage):
+        skeletal(stage)
+        place = UsdGeom.Xformable(stage.GetPrimAtPath("/Arm/skel")).GetOrderedXformOps()[0]
+        for frame in (0, FRAMES):
+            place.Set((0.1 * frame, 3, 0), frame)
+
+    character, _ = read(tmp_path, edit)
+    assert sum(note.startswith("/Arm/skel: it moves the skeleton") for note in character.notes) == 1
+    assert not any("moves the skeleton" in note for note in read(tmp_path, skeletal)[0].notes)
 
 
 def test_a_joint_may_be_named_by_its_last_part(tmp_path):

@@ -21,6 +21,7 @@ from calmotion.shot import Track
 from calmotion.shot.character import Array
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
+from calmotion.usd.reading.animated_transforms import moves
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.motors.driven_motors import SKEL_JOINT, SKELETON, Drive
 from calmotion.usd.reading.motors.posed_motors import GAP_TOLERANCE, TILT_TOLERANCE, joint_motions
@@ -103,6 +104,12 @@ def hinge_stacks(reading: Reading, drives: Sequence[Drive]) -> list[HingeStack]:
                         remedy="Name its SkelAnimation there, with SkelBindingAPI applied",
                     )
                 )
+    for prim in {stack.skeleton.prim for stack in found}:
+        if (movement := moves(reading, prim)) is not None:
+            reading.note(
+                f"{movement[0].GetPath()}: it moves the skeleton as a whole; the robot follows turns of joints "
+                "alone, and its base moves only where its own body is animated, with physics:kinematicEnabled"
+            )
     return found
 
 
