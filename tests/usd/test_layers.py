@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 
 import pytest
 from calmotion import ShotError
@@ -26,6 +28,23 @@ def test_the_written_layer_opens_again_and_no_other_file_is_left(tmp_path, name)
     write_layer(small_layer("A"), str(output), accept)
     assert Sdf.Layer.FindOrOpen(str(output)).GetPrimAtPath("/A")
     assert [p.name for p in output.parent.iterdir()] == [output.name]
+
+
+def test_what_usd_says_of_a_spline_that_it_writes_is_kept_from_the_user(tmp_path):
+    """It says so once in a process, hence in one of its own."""
+    program = f"""
+from calmotion.usd.layers import write_layer
+from calmotion.usd.writing.splines import bezier
+from calmotion.usd.writing.curves import attribute_spec
+from pxr import Sdf
+import numpy as np
+layer, ends = Sdf.Layer.CreateAnonymous(".usda"), np.array([0.0, 1.0])
+attribute_spec(layer, "/A.size", Sdf.ValueTypeNames.Float).SetSpline(bezier(ends, ends, ends, ends, "float"))
+write_layer(layer, {str(tmp_path / "out.usda")!r}, lambda path: None)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("", "")
+    assert "spline" in (tmp_path / "out.usda").read_text()
 
 
 def test_a_failed_validation_keeps_the_old_file(tmp_path):

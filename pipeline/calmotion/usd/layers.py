@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError
 from calmotion.support.files import replaced
+from calmotion.usd.diagnostics import quiet
 
 if TYPE_CHECKING:
     from pxr import Sdf
@@ -61,7 +62,7 @@ def write_layer(layer: Sdf.Layer, output: str, validate: Callable[[str], None]) 
     from pxr import Sdf, Tf
 
     try:
-        with replaced(output) as temporary:
+        with quiet(), replaced(output) as temporary:
             if not layer.Export(str(temporary)):
                 raise OSError("USD could not write it")
             if Sdf.Layer.OpenAsAnonymous(str(temporary)) is None:
