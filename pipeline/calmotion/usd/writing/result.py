@@ -30,7 +30,8 @@ class WriteOptions:
     """How a result is written.
 
     Attributes:
-        samples_per_second: Density of the motor samples [1/s]; None: the shot's frames.
+        samples_per_second: Density of the motor samples [1/s]; None: the shot's frames, and between them what the
+            animation needs.
         splines: Whether motor curves are written as splines instead of samples.
         bake: `none`, `motors` (body transforms of a rigid robot with the new curves) or `simulated` (the predicted
             motion, deformed meshes included).
