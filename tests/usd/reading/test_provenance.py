@@ -5,7 +5,7 @@ from calmotion.usd.reading import read_shot
 from calmotion.usd.writing import write_result
 from performing import result_with
 from posed_shots import posed
-from pxr import Usd
+from pxr import Usd, UsdUtils
 from small_shots import write_arm
 
 
@@ -45,6 +45,12 @@ def test_results_of_a_shot_that_has_changed_since_are_told(tmp_path):
     shot.write_text(shot.read_text().replace("endTimeCode = 24", "endTimeCode = 23"))
     _, changed = notes(root)
     assert changed.startswith("again.usda") and "another version of shot.usda" in changed
+
+
+def test_a_package_of_a_result_and_its_shot_is_no_other_version(tmp_path):
+    _, root = with_result(tmp_path)
+    assert UsdUtils.CreateNewUsdzPackage(root, str(tmp_path / "both.usdz"))
+    assert len(notes(tmp_path / "both.usdz")) == 1
 
 
 def test_a_flattened_result_says_what_its_curves_are(tmp_path):

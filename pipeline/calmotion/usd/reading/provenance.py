@@ -14,6 +14,8 @@ from calmotion.usd.units import units_of
 if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
+_PACKAGE = ".usdz"
+
 
 def provenance_of(path: str, stage: Usd.Stage, clock: Clock, earlier: tuple[str, ...] = ()) -> Provenance:
     """The provenance of a shot.
@@ -80,15 +82,17 @@ def notes_of_results(
 def _changed_inputs(layer: Sdf.Layer, path: str, inputs: Sequence[InputLayer]) -> list[str]:
     """Files from which a result was made, and which are no longer among those of the shot with the same content.
 
-    Not those of ours, which are muted or only name the others.
+    Not those of ours, which are muted or only name the others, nor what is in a package now, which is hashed as one.
     """
     from pxr import Sdf
 
     origin = layer.customLayerData[stages.METADATA_KEY]
-    present = {source.sha256 for source in inputs}
+    present, packed = {source.sha256 for source in inputs}, any(source.path.endswith(_PACKAGE) for source in inputs)
     made_from = zip(map(str, origin.get("inputs", [])), map(str, origin.get("sha256", [])), strict=False)
     changed = []
     for name in (name for name, digest in made_from if digest not in present):
+        if packed and not name.endswith(_PACKAGE):
+            continue
         file = os.path.join(os.path.dirname(os.path.realpath(path)), name)
         found = Sdf.Layer.FindOrOpen(file) if os.path.isfile(file) else None
         if found is None or stages.role_of(found) not in (stages.CURVES, stages.MOTION, stages.ROOT):
