@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from calmotion.shot import Animation, Motor, MotorCurve, Track
 from calmotion.usd.clock import Clock
-from calmotion.usd.writing.curves import attribute_spec, author_curves, curve_values, sample_times
+from calmotion.usd.writing.curves import NEAR, attribute_spec, author_curves, curve_values, sample_times
 from pxr import Sdf
 
 FRAMES = np.arange(13) / 24.0
@@ -56,7 +56,7 @@ def test_what_is_authored_between_frames_is_kept_where_the_frames_alone_would_lo
     whole = held_curve(kinked, 0.5)
     read_back = held_curve(Track(found, whole(found, 0)), 0.5)
     at_frames = held_curve(Track(FRAMES, whole(FRAMES, 0)), 0.5)
-    assert np.abs(read_back(times, 0) - kinked.values).max() < 1e-6
+    assert np.abs(read_back(times, 0) - kinked.values).max() <= NEAR
     assert np.abs(at_frames(times, 0) - kinked.values).max() > 3e-4
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
 SAME = 1e-6  # times that are closer are one [s]
-NEAR = 1e-6  # a curve that is nearer to what was authored is the same [rad or m]
+NEAR = 1e-5  # a curve that is nearer to what was authored is the same [rad or m]
 
 
 def sample_times(frame_times: Array, samples_per_second: float | None, tracks: Iterable[Track] = ()) -> Array:
