@@ -240,10 +240,10 @@ CASES: dict[str, Case] = {
                 "clips",
                 {
                     "default": {
-                        "assetPaths": [Sdf.AssetPath("./clip.usda")],
+                        "assetPaths": Sdf.AssetPathArray([Sdf.AssetPath("./clip.usda")]),
                         "primPath": "/Arm/joints",
-                        "active": [Gf.Vec2d(0, 0)],
-                        "times": [Gf.Vec2d(0, 0), Gf.Vec2d(12, 24), Gf.Vec2d(12, 0), Gf.Vec2d(24, 12)],
+                        "active": Vt.Vec2dArray([(0, 0)]),
+                        "times": Vt.Vec2dArray([(0, 0), (12, 24), (12, 0), (24, 12)]),
                     }
                 },
             ),
