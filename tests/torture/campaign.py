@@ -48,6 +48,7 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=1000, help="number of kills; other faults in proportion")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", choices=tuple(KINDS), action="append", help="kinds of fault (default: all)")
+    parser.add_argument("--before", default="", help="kill only before writes of this kind, such as kernels")
     parser.add_argument("--folder", type=Path, help="where to run (default: a temporary folder)")
     parser.add_argument("--write", action="store_true", help="keep the counts, and write them into docs/reliability.md")
     parser.add_argument("--anew", action="store_true", help="with --write: forget the counts of earlier campaigns")
@@ -87,7 +88,7 @@ def disturbed(space: Workspace, options: argparse.Namespace, record: Record) -> 
         rng = random.Random(f"{options.seed} {kind} {first}")
         try:
             if kind == "kills":
-                kills.campaign(space, rng, count, tally, seconds, where, first)
+                kills.campaign(space, rng, count, tally, seconds, where, first, options.before)
             else:
                 _CAMPAIGNS[kind](space, rng, count, tally)
         except KeyboardInterrupt:

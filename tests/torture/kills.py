@@ -5,12 +5,14 @@ A series kills the same command up to four times, each time with a part of the c
 
 from __future__ import annotations
 
+import itertools
 import os
 import random
 import signal
 import time
 from collections import Counter
 from functools import cache
+from pathlib import Path
 
 import events
 import runs
@@ -20,6 +22,7 @@ from workspace import Workspace
 ASKING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # those that the program answers
 FATAL = (signal.SIGQUIT, signal.SIGABRT, signal.SIGSEGV, signal.SIGBUS, signal.SIGALRM, signal.SIGUSR1, signal.SIGXCPU)
 COLD = 0.05  # share of runs in a new process, which can be killed while it imports
+TRIED, KERNELS = 40, 4  # kernels that are tried, and most that are taken away, one at a time
 CACHED = ("kernels", "meshes", "reductions")
 
 
@@ -29,20 +32,38 @@ class Writes:
     def __init__(self, space: Workspace) -> None:
         file = space.root / "events"
         self.counts: Counter[str] = Counter()
-        for part in ("all", *CACHED):
-            space.reset()
-            rng = random.Random(1)
-            while part != "all" and space.cool(rng) != part:
-                space.reset()
-            ending = runs.run(space, figures=part == "all", fault=events.record(space, file))
-            assert ending.status == 0, ending.err
-            self.counts |= Counter(file.read_text().split("\n"))
-            file.unlink()
-        del self.counts[""]
+        rng = random.Random(1)
+        self._record(space, file, "all", rng)
+        for part in CACHED:
+            if part == "kernels":
+                names = space.kernel_names()
+                rng.shuffle(names)
+                again = (name for name in names[:TRIED] if self._makes_again(space, file, name))
+                space.kernels[:] = list(itertools.islice(again, KERNELS))
+            else:
+                self._record(space, file, part, rng)
 
-    def draw(self, rng: random.Random) -> tuple[str, int]:
+    def _makes_again(self, space: Workspace, file: Path, kernel: str) -> bool:
+        """Whether a run compiles a kernel that is missing: not one that is compiled into those that call it."""
+        space.kernels[:] = [kernel]
+        return "kernels: rename" in self._record(space, file, "kernels", random.Random(1))
+
+    def _record(self, space: Workspace, file: Path, part: str, rng: random.Random) -> Counter[str]:
+        """Take in the writes of a run that lacks a part of the caches."""
+        space.reset()
+        while part != "all" and space.cool(rng) != part:
+            space.reset()
+        ending = runs.run(space, figures=part == "all", fault=events.record(space, file))
+        assert ending.status == 0, ending.err
+        found = Counter(file.read_text().split("\n"))
+        file.unlink()
+        del found[""]
+        self.counts |= found
+        return found
+
+    def draw(self, rng: random.Random, kind: str = "") -> tuple[str, int]:
         """A kind of write and which one of a run: all kinds alike, however often a run does them."""
-        name = rng.choice(sorted(self.counts))
+        name = rng.choice([name for name in sorted(self.counts) if name.startswith(kind)])
         return name, rng.randint(1, self.counts[name])
 
 
@@ -60,7 +81,7 @@ def draw_signal(rng: random.Random) -> int:
 
 def campaign(
     space: Workspace, rng: random.Random, kills: int, tally: verdicts.Tally, seconds: float, where: Counter[str],
-    first: int = 0,
+    first: int = 0, before: str = "",
 ) -> None:  # fmt: skip
     """Kill runs.
 
@@ -70,6 +91,7 @@ def campaign(
         seconds: Processor time of an undisturbed run [s].
         where: Takes the numbers of kills by stage and signal, and by write.
         first: Number of the first kill in the descriptions of faults.
+        before: Kind of the writes before which all kills are, such as `kernels`; empty: any moment.
     """
     writes = writes_of(space)
     while tally.runs < kills:
@@ -77,13 +99,16 @@ def campaign(
         figures = rng.random() < 0.15
         about = f"series at kill {first + tally.runs}"
         for _ in range(rng.randint(1, 4)):
-            parts = {space.cool(rng), "layer", "root layer", "table", "recording", "checkpoint", "temporary files"}
+            cooled = space.cool(rng)
+            while before in CACHED and cooled != before:
+                cooled = space.cool(rng)
+            parts = {cooled, "layer", "root layer", "table", "recording", "checkpoint", "temporary files"}
             parts |= {"figures"} if figures else set()
-            name, count = writes.draw(rng)
+            name, count = writes.draw(rng, before)
             while name.split(":")[0] not in parts:
-                name, count = writes.draw(rng)
+                name, count = writes.draw(rng, before)
             number = draw_signal(rng)
-            timed = rng.random() < 0.4
+            timed = not before and rng.random() < 0.4
             if timed:
                 cold = rng.random() < COLD / 0.4
                 run = runs.start(space, space.arguments(figures), cold=cold)

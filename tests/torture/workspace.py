@@ -7,7 +7,7 @@ import random
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -38,9 +38,11 @@ class Workspace:
 
     Attributes:
         root: Everything lies in it.
+        kernels: Names of the compiled kernels that a run makes again where they are missing; empty: not known.
     """
 
     root: Path
+    kernels: list[str] = field(default_factory=list, compare=False)
 
     @property
     def shot(self) -> Path:
@@ -114,14 +116,17 @@ class Workspace:
         """Remove a part of the caches, so that a run writes it again; what was removed."""
         part = rng.choice(("kernels", "meshes", "reductions", "nothing"))
         if part == "kernels":  # one small kernel: a larger part of them would compile for minutes
-            indices = sorted(self.cache.glob("kernels/*/**/*.nbi"), key=lambda path: path.name)
-            chosen = rng.choice(indices)
-            for path in chosen.parent.glob(f"{chosen.stem}*"):
+            chosen = rng.choice(self.kernels or self.kernel_names())
+            for path in self.cache.glob(f"kernels/**/{chosen}*"):
                 path.unlink()
         elif part != "nothing":
             for path in (self.cache / part).iterdir():
                 path.unlink()
         return part
+
+    def kernel_names(self) -> list[str]:
+        """Names of the compiled kernels in the cache."""
+        return sorted({path.stem for path in self.cache.glob("kernels/*/**/*.nbi")})
 
     def files(self) -> set[str]:
         """Names of all files in caches, outputs and temporary files."""
