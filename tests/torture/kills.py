@@ -33,7 +33,8 @@ class Writes:
         file = space.root / "events"
         self.counts: Counter[str] = Counter()
         rng = random.Random(1)
-        self._record(space, file, "all", rng)
+        space.reset()
+        self._record(space, file, figures=True)
         for part in CACHED:
             if part == "kernels":
                 names = space.kernel_names()
@@ -41,19 +42,19 @@ class Writes:
                 again = (name for name in names[:TRIED] if self._makes_again(space, file, name))
                 space.kernels[:] = list(itertools.islice(again, KERNELS))
             else:
-                self._record(space, file, part, rng)
+                space.reset()
+                space.cool(rng, part)
+                self._record(space, file)
 
     def _makes_again(self, space: Workspace, file: Path, kernel: str) -> bool:
         """Whether a run compiles a kernel that is missing: not one that is compiled into those that call it."""
-        space.kernels[:] = [kernel]
-        return "kernels: rename" in self._record(space, file, "kernels", random.Random(1))
-
-    def _record(self, space: Workspace, file: Path, part: str, rng: random.Random) -> Counter[str]:
-        """Take in the writes of a run that lacks a part of the caches."""
         space.reset()
-        while part != "all" and space.cool(rng) != part:
-            space.reset()
-        ending = runs.run(space, figures=part == "all", fault=events.record(space, file))
+        space.remove_kernel(kernel)
+        return "kernels: rename" in self._record(space, file)
+
+    def _record(self, space: Workspace, file: Path, figures: bool = False) -> Counter[str]:
+        """Take in the writes of a run."""
+        ending = runs.run(space, figures, fault=events.record(space, file))
         assert ending.status == 0, ending.err
         found = Counter(file.read_text().split("\n"))
         file.unlink()
@@ -62,8 +63,15 @@ class Writes:
         return found
 
     def draw(self, rng: random.Random, kind: str = "") -> tuple[str, int]:
-        """A kind of write and which one of a run: all kinds alike, however often a run does them."""
-        name = rng.choice([name for name in sorted(self.counts) if name.startswith(kind)])
+        """A kind of write and which one of a run: all kinds alike, however often a run does them.
+
+        Raises:
+            SystemExit: A run has no write of the kind.
+        """
+        names = [name for name in sorted(self.counts) if kind in ("", name.split(":")[0])]
+        if not names:
+            raise SystemExit(f"an undisturbed run has no write of {kind}")
+        name = rng.choice(names)
         return name, rng.randint(1, self.counts[name])
 
 
@@ -96,12 +104,10 @@ def campaign(
     writes = writes_of(space)
     while tally.runs < kills:
         space.reset(old_outputs=rng.random() < 0.3)
-        figures = rng.random() < 0.15
+        figures = before == "figures" or rng.random() < 0.15
         about = f"series at kill {first + tally.runs}"
         for _ in range(rng.randint(1, 4)):
-            cooled = space.cool(rng)
-            while before in CACHED and cooled != before:
-                cooled = space.cool(rng)
+            cooled = space.cool(rng, before if before in CACHED else "")
             parts = {cooled, "layer", "root layer", "table", "recording", "checkpoint", "temporary files"}
             parts |= {"figures"} if figures else set()
             name, count = writes.draw(rng, before)

@@ -112,17 +112,20 @@ class Workspace:
                 shutil.copytree(source, folder, dirs_exist_ok=True)
         empty(self.temporary)
 
-    def cool(self, rng: random.Random) -> str:
-        """Remove a part of the caches, so that a run writes it again; what was removed."""
-        part = rng.choice(("kernels", "meshes", "reductions", "nothing"))
+    def cool(self, rng: random.Random, part: str = "") -> str:
+        """Remove a part of the caches, or one drawn at random, so that a run writes it again; what was removed."""
+        part = part or rng.choice(("kernels", "meshes", "reductions", "nothing"))
         if part == "kernels":  # one small kernel: a larger part of them would compile for minutes
-            chosen = rng.choice(self.kernels or self.kernel_names())
-            for path in self.cache.glob(f"kernels/**/{chosen}*"):
-                path.unlink()
+            self.remove_kernel(rng.choice(self.kernels or self.kernel_names()))
         elif part != "nothing":
             for path in (self.cache / part).iterdir():
                 path.unlink()
         return part
+
+    def remove_kernel(self, name: str) -> None:
+        """Remove a compiled kernel from the cache."""
+        for path in self.cache.glob(f"kernels/**/{name}*"):
+            path.unlink()
 
     def kernel_names(self) -> list[str]:
         """Names of the compiled kernels in the cache."""

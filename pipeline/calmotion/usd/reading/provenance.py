@@ -44,9 +44,7 @@ def provenance_of(path: str, stage: Usd.Stage, clock: Clock, earlier: tuple[str,
     )
 
 
-def notes_of_results(
-    composed: Usd.Stage, path: str, earlier: Sequence[str], inputs: Sequence[InputLayer] = ()
-) -> list[str]:
+def notes_of_results(composed: Usd.Stage, path: str, earlier: Sequence[str], inputs: Sequence[InputLayer]) -> list[str]:
     """What a user must know of results that a shot carries.
 
     Args:
