@@ -13,7 +13,6 @@ from calmotion.retargeting.robust.choice import (
 )
 from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import scenario_at, uncertain_parameters
-from calmotion.shot.robust.robots import Scenario
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 
@@ -73,14 +72,18 @@ def test_robots_with_larger_errors_are_added(shot):
     axis = np.eye(len(parameters))[0]
     near = tuple(scenario_at(parameters, 0.1 * k * axis) for k in (0, 1, 2))
     points = tried_robots(parameters)
-    found, left = worse_robots(shot, OPTIONS, tracks, parameters, near, points)
+
+    def largest(robots):
+        return errors_on(shot, OPTIONS, {"": tracks}, robots)[""].max()
+
+    found, left = worse_robots(shot, OPTIONS, tracks, parameters, largest(near[1:]), points)
     assert len(found) == 2
     errors = errors_on(shot, OPTIONS, {"": tracks}, (*near[1:], *found))[""].max(axis=1)
     assert errors[2:].min() > 1.05 * errors[:2].max()
     # what is tried once more are the other ones with large errors, which are the first to be taken in next
     assert 0 < len(left) < len(points) - 2 and all(any(np.array_equal(x, y) for y in points) for x in left)
-    following, _ = worse_robots(shot, OPTIONS, tracks, parameters, near, left)
+    following, _ = worse_robots(shot, OPTIONS, tracks, parameters, largest(near[1:]), left)
     again = errors_on(shot, OPTIONS, {"": tracks}, following)[""].max(axis=1)
     assert len(following) == 2 and NEAR * errors[2:].max() < again.max() <= errors[2:].max()
-    far = (Scenario(), *(scenario_at(parameters, 6.0 * k * axis) for k in (-1, 1)))
-    assert worse_robots(shot, OPTIONS, tracks, parameters, far, points)[0] == ()
+    far = [scenario_at(parameters, 6.0 * k * axis) for k in (-1, 1)]
+    assert worse_robots(shot, OPTIONS, tracks, parameters, largest(far), points)[0] == ()

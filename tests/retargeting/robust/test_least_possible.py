@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from calmotion.retargeting.robust import least_possible as module
-from calmotion.retargeting.robust.least_maximum import LinearErrors, least_maximum, lengths
+from calmotion.retargeting.robust.least_maximum import least_maximum
 from calmotion.retargeting.robust.least_possible import ORDERS, STEPS, EvenErrors, least_possible
+from calmotion.retargeting.robust.linear_errors import LinearErrors, lengths
 from scipy.optimize import linprog
 from scipy.sparse import identity
 

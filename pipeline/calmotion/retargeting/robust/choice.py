@@ -72,15 +72,15 @@ def tried_robots(parameters: Sequence[Parameter]) -> Array:
 
 
 def worse_robots(
-    shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], parameters: Sequence[Parameter],
-    scenarios: Sequence[Scenario], points: Array,
+    shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], parameters: Sequence[Parameter], known: float,
+    points: Array,
 ) -> tuple[tuple[Scenario, ...], Array]:  # fmt: skip
     """Those of some robots on which curves leave larger errors than on the known ones, and those that are near it.
 
     Args:
         shot, options, parameters: As of `chosen_scenarios`.
         tracks: Curves with the smallest largest error on the known robots.
-        scenarios: The known robots, the nominal one first.
+        known: That error as it weighs, see `largest_weighted` [m].
         points: The robots to try, in standard deviations of the parameters, shape [n, d].
 
     Returns:
@@ -88,16 +88,15 @@ def worse_robots(
         [m, d].
     """
     tried = [scenario_at(parameters, x) for x in points]
-    errors = largest_weighted(shot, errors_on(shot, options, {"": tracks}, (*scenarios[1:], *tried))[""])
-    known, found = errors[: len(scenarios) - 1], errors[len(scenarios) - 1 :]
+    found = largest_weighted(shot, errors_on(shot, options, {"": tracks}, tried)[""])
     found = np.where(np.isfinite(found), found, 0.0)
     picked: list[int] = []
     for k in np.argsort(-found):
-        if found[k] <= LARGER * known.max() or len(picked) == ADDED:
+        if found[k] <= LARGER * known or len(picked) == ADDED:
             break
         if all(np.linalg.norm(points[k] - points[j]) > ALIKE * np.linalg.norm(points[j]) for j in picked):
             picked.append(int(k))
-    near = found > NEAR * max(known.max(), found.max(initial=0.0))
+    near = found > NEAR * max(known, found.max(initial=0.0))
     near[picked] = False
     return tuple(tried[k] for k in picked), points[near]
 

@@ -14,19 +14,18 @@ steps succeed (Levenberg 1944, Marquardt 1963), keeps the others from growing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
+from calmotion.retargeting.robust.linear_errors import FewErrors, LinearErrors
 from calmotion.shot.character import Array, BoolArray
 
 ORDERS: tuple[int, ...] = (8, 16)
 STEPS = 30  # most of each order, with those that fail
 _ENDED = 1e-3  # relative decrease of F_p below which the next order follows
-_COUNTS = 1e-2  # of the largest weight: smaller ones count in the gradient only
+_SEEN = 0.02  # relative decrease of F_p after which it is looked which errors count
 _NOTHING = 1e-12  # of the mean of the matrix's diagonal, added to it
 _DAMPED, _EASED, _FAILED = (
     1.0,
@@ -46,76 +45,13 @@ class Rest(Protocol):
         """Gradient, shape [n], and second derivatives, shape [n, n], at least semidefinite."""
 
 
-@dataclass(frozen=True, eq=False)
-class LinearErrors:
-    """Errors of S robots at T instants and G targets, linear in n unknowns.
-
-    Attributes:
-        errors: r, shape [S, T, G, 3] [m].
-        changes: J, shape [S, T, G, 3, n], of single precision.
-        scale: c, of half the squared norm in the merit.
-        gram: Second derivatives of c/2 M_2^2 for factors of 1, shape [n, n].
-    """
-
-    errors: Array
-    changes: NDArray[np.float32]
-    scale: float
-    gram: Array
-
-    @classmethod
-    def of(cls, errors: Array, changes: NDArray[np.float32], scale: float) -> LinearErrors:
-        """The errors with the matrix of their derivatives."""
-        return cls(errors, changes, scale, scale * _products(changes) / (errors.size // 3))
-
-    def with_robots(self, errors: Array, changes: NDArray[np.float32]) -> LinearErrors:
-        """The errors of these robots and of further ones.
-
-        Args:
-            errors: Of all robots, shape [S', T, G, 3] [m].
-            changes: Of the further ones, shape [S' - S, T, G, 3, n].
-        """
-        before, after = self.errors.size // 3, errors.size // 3
-        gram = (before * self.gram + self.scale * _products(changes)) / after
-        return LinearErrors(errors, np.concatenate([self.changes, changes]), self.scale, gram)
-
-    def at(self, d: Array) -> Array:
-        """The errors at a change of the unknowns, shape [S, T, G, 3]."""
-        return self.errors + self.moved(d)
-
-    def moved(self, d: Array) -> Array:
-        """The change of the errors, shape [S, T, G, 3]."""
-        # as one matrix: three times as fast as a product for each instant
-        flat = self.changes.reshape(-1, len(d)) @ d.astype(np.float32)
-        return flat.reshape(self.errors.shape).astype(float)
-
-
-def _products(changes: NDArray[np.float32]) -> Array:
-    """The sum of the squares of changes of shape [..., n] as a matrix, shape [n, n]."""
-    flat = changes.reshape(-1, changes.shape[-1])
-    return np.asarray(flat.T @ flat, float)
-
-
-def lengths(errors: Array, factors: Array) -> Array:
-    """m of errors of shape [S, T, G, 3] for factors of shape [S, G], shape [S, T, G]."""
-    return np.asarray(np.linalg.norm(errors, axis=3) * factors[:, None, :])
-
-
-def norm_of(m: Array, order: int) -> float:
-    """M_p."""
-    largest = float(m.max(initial=0.0))
-    return largest * float(np.mean((m / largest) ** order)) ** (1.0 / order) if largest > 0.0 else 0.0
-
-
-def weights_of(m: Array, factors: Array, order: int) -> Array:
-    """Weights of the squared errors that are stationary where F_p is, shape [S, T, G]."""
-    return np.asarray((m / max(norm_of(m, order), 1e-300)) ** (order - 2) * factors[:, None, :] ** 2)
-
-
 def least_maximum(
     linear: LinearErrors, factors: Array, rest: Rest, fixed: BoolArray, start: Array,
     orders: tuple[int, ...] = ORDERS, steps: int = STEPS,
 ) -> Array:  # fmt: skip
     """The change of the unknowns with the smallest F_p, p the last of some orders, shape [n].
+
+    Errors of next to no weight are left out until they have more.
 
     Args:
         linear: The errors.
@@ -126,59 +62,43 @@ def least_maximum(
         orders: Of the norms, one after the other.
         steps: Most of each order, with those that fail.
     """
-    d, errors, free = start, linear.at(start), np.flatnonzero(~fixed)
-    damping = _DAMPED
+    d, damping, free = start, _DAMPED, np.ix_(*[np.flatnonzero(~fixed)] * 2)
+    gram = linear.gram[free]
     for order in orders:
-        before = merit(linear.scale, lengths(errors, factors), order, rest.value(d))
-        derivatives = None
+        few = FewErrors.of(linear, linear.at(d), factors, order)
+        errors, derivatives = few.errors, None
+        before, unseen = few.merit(errors, rest.value(d)), 0.0
         for _ in range(steps):
             if derivatives is None:
-                derivatives = _derivatives(linear, errors, factors, order, rest.derivatives(d))
+                gradient, matrix = few.derivatives(errors, rest.derivatives(d))
+                derivatives = gradient[~fixed], matrix[free]
             step = np.zeros_like(d)
-            step[free] = _step(derivatives[0][free], (derivatives[1] + damping * linear.gram)[np.ix_(free, free)])
-            moved = linear.moved(step)
-            after = merit(linear.scale, lengths(errors + moved, factors), order, rest.value(d + step))
+            step[~fixed] = _step(derivatives[0], derivatives[1] + damping * gram)
+            moved = few.moved(step)
+            after = few.merit(errors + moved, rest.value(d + step))
             if not after < before:
                 damping *= _FAILED
                 if damping > _MOST_DAMPED:
                     break
                 continue
             d, errors, derivatives, fell, before = d + step, errors + moved, None, (before - after) / before, after
-            if fell < _ENDED and damping <= _DAMPED:
+            ended, unseen = fell < _ENDED and damping <= _DAMPED, unseen + fell
+            if ended or unseen > _SEEN:
+                everywhere, unseen = linear.at(d), 0.0
+                if not few.are_all(everywhere, factors):
+                    few, ended = few.with_further(linear, everywhere, factors), False
+                    errors, before = few.errors, few.merit(few.errors, rest.value(d))
+            if ended:
                 break
             damping *= _EASED
         damping = min(damping, _DAMPED)
     return d
 
 
-def merit(scale: float, m: Array, order: int, rest: float) -> float:
-    """F_p."""
-    return 0.5 * scale * norm_of(m, order) ** 2 + rest
-
-
-def _derivatives(
-    linear: LinearErrors, errors: Array, factors: Array, order: int, rest: tuple[Array, Array]
-) -> tuple[Array, Array]:
-    """Gradient of F_p, shape [n], and its second derivatives without the part that is negative, shape [n, n]."""
-    m = lengths(errors, factors)
-    weights, share = weights_of(m, factors, order), linear.scale / m.size
-    gradient, matrix = rest
-    gradient = gradient + np.tensordot((share * weights[..., None] * errors).astype(np.float32), linear.changes, 4)
-    counts = weights > _COUNTS * weights.max()
-    along = errors[counts] / np.maximum(np.linalg.norm(errors[counts], axis=1), 1e-300)[:, None]
-    rows, along = linear.changes[counts], along.astype(np.float32)
-    # the root of 1 + (p - 2) u u^T is 1 + (sqrt(p - 1) - 1) u u^T
-    steeper = np.float32(np.sqrt(order - 1.0) - 1.0)
-    rows = rows + steeper * along[:, :, None] * np.einsum("ki,kin->kn", along, rows)[:, None, :]
-    rows *= np.sqrt(share * weights[counts]).astype(np.float32)[:, None, None]
-    flat = rows.reshape(-1, rows.shape[2])
-    return gradient, matrix + flat.T @ flat
-
-
 def _step(gradient: Array, matrix: Array) -> Array:
     """Newton's step; none where the matrix is singular to rounding, so that it is damped more."""
     matrix[np.diag_indices_from(matrix)] += _NOTHING * np.trace(matrix) / max(len(matrix), 1)
     try:
-        return np.asarray(-solve(matrix, gradient, assume_a="pos"))
+        return np.asarray(-cho_solve(cho_factor(matrix, overwrite_a=True), gradient))
     except LinAlgError:
         return np.zeros_like(gradient)

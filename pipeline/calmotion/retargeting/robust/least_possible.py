@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from calmotion.retargeting.robust.least_maximum import LinearErrors, lengths, weights_of
+from calmotion.retargeting.robust.linear_errors import LinearErrors, lengths, weights_of
 from calmotion.retargeting.robust.rest_of_merit import RestOfMerit
 from calmotion.retargeting.solver.dense_preconditioner import for_each_motor
 from calmotion.shot.character import Array, BoolArray

@@ -51,10 +51,15 @@ def errors_on(
     unknown = np.full(len(shot.character.targets), np.inf)
 
     def largest(off: Array | None) -> Array:
-        return unknown if off is None else np.asarray(np.linalg.norm(off, axis=2).max(axis=0, initial=0.0))
+        return unknown if off is None else largest_of(off)
 
     found = deviations_on(shot, options, curves, scenarios, largest, progress)
     return {name: np.array([robot[name] for robot in found]) for name in curves}
+
+
+def largest_of(deviations: Array) -> Array:
+    """The largest deviation of each target, shape [K] [m], of shape [T, K, 3]."""
+    return np.asarray(np.linalg.norm(deviations, axis=2).max(axis=0, initial=0.0))
 
 
 def deviations_on(

@@ -99,7 +99,8 @@ def _minimize(
     with worst.work.timed():
         worst.minimize(allowed, progress)
         for _ in range(SEARCHES - 1):
-            added, points = worse_robots(shot, options, worst.tracks, parameters, worst.scenarios, points)
+            known = float(largest_weighted(shot, worst.errors())[1:].max())
+            added, points = worse_robots(shot, options, worst.tracks, parameters, known, points)
             if not (added and worst.take_in(added)):
                 break
             worst.minimize(allowed, progress)

@@ -26,16 +26,9 @@ from calmotion.retargeting.problem.response_gram import COST, dense_responses
 from calmotion.retargeting.problem.rigid_approximation import rigid_response
 from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.robust import least_possible as bound
-from calmotion.retargeting.robust.least_maximum import (
-    ORDERS,
-    STEPS,
-    LinearErrors,
-    Rest,
-    least_maximum,
-    lengths,
-    merit,
-    weights_of,
-)
+from calmotion.retargeting.robust.least_maximum import ORDERS, STEPS, Rest, least_maximum
+from calmotion.retargeting.robust.linear_errors import LinearErrors, lengths, merit, weights_of
+from calmotion.retargeting.robust.measure import largest_of
 from calmotion.retargeting.robust.rest_of_merit import RestOfMerit
 from calmotion.retargeting.robust.robots import robots_of
 from calmotion.retargeting.robust.weighted_errors import WeightedErrors
@@ -56,6 +49,7 @@ FIRST_FACTOR = 0.4  # of the largest error over the allowed one: the others' err
 FALLING, AS_PREDICTED = 0.1, 0.25  # a smaller relative decrease of the merit ends, a smaller share of it is refused
 FORETOLD = 0.25  # relative error of a predicted decrease up to which the linear model serves once more
 DAMPED = 10.0  # growth of the damping after a refused step
+_FREE = 1e-3  # of the merit over the squared step: a smaller damping does not hold it back
 _LARGEST, _SHARE = 3000, 0.5  # most unknowns, and most of the free memory
 
 
@@ -144,8 +138,7 @@ class WorstCase:
             allowed: Error of the position of a target on the nominal robot [m]; where it began with more, as much.
             progress: Called with a fraction and a message.
         """
-        problem, damping, orders = self._problem, self._damping, ORDERS
-        eased = 1.0 / DAMPED  # the next model has a smaller damping unless this one needed it
+        problem, damping, orders, refused = self._problem, self._damping, ORDERS, False
         linear, rest = self._linearized()
         if not len(self._own):
             self._own = _largest(linear.errors[0])
@@ -156,27 +149,35 @@ class WorstCase:
             progress(number / ROUNDS, f"largest weighted error on {len(self.scenarios)} robots: {now:.3f} mm")
             rest = replace(rest, damping=damping)
             d = self._minimum(linear, rest, most, orders)
-            before, after = (self._merit(linear, linear.at(c), rest.value(c)) for c in (np.zeros_like(d), d))
-            kept, foretold = problem.limits is None or problem.limits.kept(rest.limited), before - after
+            before = self._merit(linear, linear.errors, rest.value(np.zeros_like(d)))
+            foretold = before - self._merit(linear, linear.at(d), rest.value(d))
+            kept = problem.limits is None or problem.limits.kept(rest.limited)
+            fresh, least = np.array_equal(self._made_at, self._x), before / max(rest.squared(d), 1e-300)
             if not np.any(d) or foretold < FALLING * before and kept:
-                break
+                if not np.any(d) or (fresh if refused else damping <= _FREE * least):
+                    break
+                if refused:
+                    linear, rest = self._linearize()  # the model of other curves misled
+                damping, refused = damping / DAMPED, False
+                continue
             gained = 0.0
             self.work.evaluations += 1
             if self._performs(self._x + d):
                 gained = before - self._merit(linear, self._errors(), self._rest(damping, d))
             if gained < AS_PREDICTED * foretold or gained <= 0.0:
-                damping = max(DAMPED * damping, before / max(rest.squared(d), 1e-300))
-                if eased == 1.0 and foretold > FALLING * before and not np.array_equal(self._made_at, self._x):
+                damping = max(DAMPED * damping, least)
+                if refused and foretold > FALLING * before and not fresh:
                     linear, rest = self._linearize()  # damped, the model of other curves misleads as well
-                eased = 1.0
+                refused = True
                 continue
             self._x, small = self._x + d, gained < FALLING * before
             right = abs(gained - foretold) < FORETOLD * foretold
             linear, rest = self._moved(linear) if small or right else self._linearized()
             if small and np.all(_largest(linear.errors[0]) <= MET[1] * most) and not problem.tighten():
                 break
-            self._damping = damping = damping * eased
-            eased, orders = 1.0 / DAMPED, ORDERS[-1:]
+            # the next model has a smaller damping unless this one needed it
+            self._damping = damping = damping if refused else damping / DAMPED
+            refused, orders = False, ORDERS[-1:]
 
     def least_possible(self, allowed: float) -> float:
         """A bound below which no curves can bring the largest weighted error on these robots [m] (`least_possible`).
@@ -199,6 +200,14 @@ class WorstCase:
             Track(times, curve.frame_values) if curve.changed else track
             for curve, track in zip(curves, self._animation.tracks, strict=True)
         )
+
+    def errors(self) -> Array:
+        """The largest error of each target on each robot for the curves found, which are simulated for it, shape [S, K]
+        [m]."""
+        self._performs(self._x)
+        at, robots = self._problem.grid.judged, self._problem.robots
+        motions = [(robot.run.target_positions, robot.objective.intended.target_positions) for robot in robots]
+        return np.array([largest_of((performed - intended)[at]) for performed, intended in motions])
 
     def weighted(self) -> tuple[Scenario, ...]:
         """The robots with the weights of their squared errors in the sum that is smallest for the curves found, which

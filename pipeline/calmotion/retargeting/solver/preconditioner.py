@@ -45,6 +45,8 @@ class BandedGram:
     def add(self, basis: csr_matrix, metric: Array) -> None:
         """Add the rows of a matrix of shape [T, P], the metric of shape [T, M, M], symmetric."""
         functions, weights = _rows(basis)
+        acting = metric.any(axis=(1, 2))  # of limits, few
+        functions, weights, metric = functions[acting], weights[acting], metric[acting]
         places = self._place[functions]
         for i in range(DEGREE + 1):
             for j in range(DEGREE + 1):
