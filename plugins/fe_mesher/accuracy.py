@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +28,9 @@ _REFINED = 12_000
 _POOR, _POOR_REFINED = 0.0125, (32_000, 60_000)
 _IN_TIME, _OF_TRIANGLE = 100_000, 16.5
 _KEPT = 22_000  # nodes of the mesh that takes the stiffness of these, where one factor is enough
+# Relative error of the squares of frequencies that a solver may leave, on surfaces of more triangles: of the G1's wrist
+# 40% fewer steps, with frequencies that differ by 0.07% where 1.6% are estimated
+_DENSE, _ALGEBRAIC = 2_500, 3e-4
 _SAME_MASS, _HOLLOW = 0.05, 0.7  # difference that is reported; ratio below which a body may be hollow
 
 
@@ -40,7 +44,8 @@ def effort_after(triangles: int) -> Effort:
 
     least, most = _POOR_REFINED
     poor = int(min(max(_IN_TIME - _OF_TRIANGLE * triangles, least), most))
-    return Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, poor, _KEPT)
+    effort = Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, poor, _KEPT)
+    return replace(effort, algebraic=_ALGEBRAIC) if triangles > _DENSE else effort
 
 
 def frames_of(character: Character, index: int) -> tuple[Frame, ...]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.geometry.flat_tets import unflattened
-from calmotion.geometry.tetrahedra import flat_tets
+from calmotion.geometry.tetrahedra import flat_tets, surface_volume
 from calmotion.support.files import temporary_folder
 
 from . import cache
@@ -23,9 +23,11 @@ from . import cache
 REMEDY = "Simplify or repair the Mesh, author a larger calm:flexible:elementSize, or give a TetMesh or a mesh file"
 MORE_TIME = ", or allow more with --set fe.mesh.time_limit={:.0f}"
 _TRIES = 3  # attempts at a mesh without flat elements
-# Number of passes that improve the elements, and the energy of the worst element at which they end. On dense surfaces
-# more passes hardly improve the smallest angles and take most of the time.
-_NORMAL, _QUICK, _DENSE = (80, 10.0), (5, 30.0), 2_000
+# Number of passes that improve the elements, and the energy of the worst element at which they end. More passes hardly
+# improve the smallest angles and take most of the time where surfaces are dense, of more triangles than these, and where
+# a volume is many times the cubed element size. What worse elements cost is part of the estimated error of a mesh.
+_NORMAL, _QUICK, _QUICKEST, _DENSE = (80, 10.0), (5, 30.0), (5, 50.0), (2_000, 2_500)
+_LARGE, _MANY = (80, 20.0), 1_000.0
 # A process that takes no processor time, such as one that is blocked, ends after this many times its limit.
 _PATIENCE = 100.0
 # Processor time of a node [s]: a quarter of that measured with 4,000 to 130,000 nodes, for faster machines
@@ -86,7 +88,7 @@ def tetrahedralize(
         OutOfTime: It exceeded the limit of processor time.
         ShotError: fTetWild crashed, or made no tetrahedra.
     """
-    passes, stop_energy = _QUICK if len(triangles) > _DENSE else _NORMAL
+    passes, stop_energy = _improvement(points, triangles, element_size)
     settings: dict[str, Any] = {
         "element_size": element_size,
         "envelope": envelope,
@@ -117,6 +119,13 @@ def tetrahedralize(
         if use_cache and not flat_tets(*mesh).any():
             mesh = cache.store(key, {"points": mesh[0], "tets": mesh[1]}, lambda kept: not flat_tets(*kept).any())
     return mesh[0], mesh[1]
+
+
+def _improvement(points: np.ndarray, triangles: np.ndarray, element_size: float) -> tuple[int, float]:
+    """Number of passes that improve the elements, and the energy of the worst one at which they end."""
+    if len(triangles) > _DENSE[0]:
+        return _QUICK if len(triangles) <= _DENSE[1] else _QUICKEST
+    return _LARGE if surface_volume(points, triangles) > _MANY * element_size**3 else _NORMAL
 
 
 def _refuse_hopeless(key: str, size: str, path: str, time: ProcessorTime) -> None:

@@ -17,7 +17,7 @@ from calmotion.geometry.tetrahedra import min_dihedral_deg
 from calmotion.reduction.cache import cached_reduction
 from calmotion.reduction.elements.assembly import quadratic_nodes
 from calmotion.reduction.elements.bisection import bisected
-from calmotion.reduction.full_order.mesh_estimates import frequency_estimate, load_estimate
+from calmotion.reduction.full_order.mesh_estimates import ALGEBRAIC, frequency_estimate, load_estimate
 from calmotion.reduction.full_order.mesh_extrapolation import (
     Estimate,
     deviation,
@@ -53,6 +53,7 @@ class Effort:
         poor: An error for which more nodes are spent; infinite: none.
         poor_nodes: Largest number of nodes of a mesh with a larger error.
         kept_nodes: Largest number of nodes of the mesh that takes the stiffness of finer ones, if by one factor.
+        algebraic: Relative error of the squares of frequencies of a mesh that the solver may leave.
     """
 
     wanted: float
@@ -60,6 +61,7 @@ class Effort:
     poor: float = np.inf
     poor_nodes: int = 0
     kept_nodes: float = np.inf
+    algebraic: float = ALGEBRAIC
 
     def ends(self, error: float, nodes: int) -> bool:
         """Whether a mesh with an error is enough."""
@@ -239,7 +241,9 @@ def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, eff
         carrier: Frame of the parent joint on the body; None for a free body.
         effort: How far; errors are those of the compliance, twice those of the frequencies.
     """
-    estimate = partial(frequency_estimate, body=body, carrier=carrier, coarser=NestedModes())
+    estimate = partial(
+        frequency_estimate, body=body, carrier=carrier, coarser=NestedModes(), algebraic=effort.algebraic
+    )  # fmt: skip
     key = ("for frequencies", mesh, replace(body, surfaces=()), carrier, effort)
     # the estimates of many links are still large with as many nodes; what the loads need is not known yet
     return cached_reduction(key, lambda: refined(mesh, estimate, effort, far=True))

@@ -97,3 +97,17 @@ def test_a_mesh_that_took_too_long_is_not_tried_again_unless_it_may_take_longer(
         with pytest.raises(tetwild.OutOfTime, match="limit of processor time"):
             tetwild.tetrahedralize(np.array(cube.vertices), np.array(cube.faces), 0.01, 1e-3, "/Arm/link", time, True)
     assert tries == [5.0, 9.0]
+
+
+def test_elements_are_improved_less_where_that_takes_most_of_the_time(package):
+    tetwild, cube = package("tetwild"), box()
+    points, faces = np.array(cube.vertices), np.array(cube.faces)
+    edge = float(np.cbrt(cube.volume))
+
+    def improved(size, copies=1):
+        return tetwild._improvement(points, np.tile(faces, (copies, 1)), size)
+
+    normal, large = improved(edge / 8.0), improved(edge / 12.0)
+    assert normal[0] == large[0] and normal[1] < large[1]
+    dense, denser = improved(edge, 2_400 // len(faces)), improved(edge, 3_000 // len(faces))
+    assert denser[0] == dense[0] < normal[0] and large[1] < dense[1] < denser[1]

@@ -18,7 +18,7 @@ from calmotion.shot.character import Body, Frame, IntArray
 from calmotion.shot.meshes import CutPatch, FEMesh
 
 _MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
-_ALGEBRAIC = 3e-5  # relative error of the squares of frequencies whose mesh is wrong by a hundred times that and more
+ALGEBRAIC = 3e-5  # relative error of the squares of frequencies whose mesh is wrong by a hundred times that and more
 
 
 def load_estimate(linear: LinearModes, body: Body) -> Estimate:
@@ -51,13 +51,14 @@ def load_estimate(linear: LinearModes, body: Body) -> Estimate:
 
 
 def frequency_estimate(
-    mesh: FEMesh, body: Body, carrier: Frame | None, coarser: NestedModes | None = None
+    mesh: FEMesh, body: Body, carrier: Frame | None, coarser: NestedModes | None = None, algebraic: float = ALGEBRAIC
 ) -> Estimate:  # fmt: skip
     """Error of the first modes, of which each counts by its compliance relative to that of the first.
 
     Args:
         mesh, body, carrier: As of `refined_for_frequencies`.
         coarser: Modes of the meshes that it is bisected from.
+        algebraic: Relative error of the squares of frequencies that may be left with these.
 
     Raises:
         ShotError: Nothing of the mesh is free.
@@ -68,7 +69,7 @@ def frequency_estimate(
     if coarser is None or clamped is None or not len(clamped):
         frequencies, modes = clamped_modes(model, _COUNT, clamped)
     else:
-        frequencies, modes = coarser.lowest(model, _COUNT, clamped, _ALGEBRAIC)
+        frequencies, modes = coarser.lowest(model, _COUNT, clamped, algebraic)
     if not len(frequencies):
         raise ShotError(
             "its parent joint holds all of the mesh, so that nothing of it can bend", path=body.path,
