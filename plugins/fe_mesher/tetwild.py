@@ -24,8 +24,8 @@ REMEDY = "Simplify or repair the Mesh, author a larger calm:flexible:elementSize
 MORE_TIME = ", or allow more with --set fe.mesh.time_limit={:.0f}"
 _TRIES = 3  # attempts at a mesh without flat elements
 # Number of passes that improve the elements, and the energy of the worst element at which they end. More passes hardly
-# improve the smallest angles and take most of the time where surfaces are dense, of more triangles than these, and where
-# a volume is many times the cubed element size. What worse elements cost is part of the estimated error of a mesh.
+# improve the smallest angles and take most of the time where surfaces are dense, of more triangles than these, and
+# where a volume is many times the cubed element size. What worse elements cost is part of a mesh's estimated error.
 _NORMAL, _QUICK, _QUICKEST, _DENSE = (80, 10.0), (5, 30.0), (5, 50.0), (2_000, 2_500)
 _LARGE, _MANY = (80, 20.0), 1_000.0
 # A process that takes no processor time, such as one that is blocked, ends after this many times its limit.
