@@ -13,6 +13,8 @@ from calmotion.shot import Body, Character, FEMesh, Frame
 from calmotion.shot.materials.parts import Part
 from calmotion.shot.meshes import MeshQuality
 
+from .tetwild import DENSE
+
 if TYPE_CHECKING:
     from calmotion.geometry.makeup import Makeup
     from calmotion.reduction.mesh_refinement import Effort
@@ -28,9 +30,9 @@ _REFINED = 12_000
 _POOR, _POOR_REFINED = 0.0125, (32_000, 60_000)
 _IN_TIME, _OF_TRIANGLE = 100_000, 16.5
 _KEPT = 22_000  # nodes of the mesh that takes the stiffness of these, where one factor is enough
-# Relative error of the squares of frequencies that a solver may leave, on surfaces of more triangles: of the G1's wrist
-# 40% fewer steps, with frequencies that differ by 0.07% where 1.6% are estimated
-_DENSE, _ALGEBRAIC = 2_500, 3e-4
+# Relative error of the squares of frequencies that a solver may leave on dense surfaces: of the G1's wrist 40% fewer
+# steps, with frequencies that differ by 0.07% where 1.6% are estimated
+_ALGEBRAIC = 3e-4
 _SAME_MASS, _HOLLOW = 0.05, 0.7  # difference that is reported; ratio below which a body may be hollow
 
 
@@ -45,7 +47,7 @@ def effort_after(triangles: int) -> Effort:
     least, most = _POOR_REFINED
     poor = int(min(max(_IN_TIME - _OF_TRIANGLE * triangles, least), most))
     effort = Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, poor, _KEPT)
-    return replace(effort, algebraic=_ALGEBRAIC) if triangles > _DENSE else effort
+    return replace(effort, algebraic=_ALGEBRAIC) if triangles > DENSE else effort
 
 
 def frames_of(character: Character, index: int) -> tuple[Frame, ...]:

@@ -28,14 +28,14 @@ from calmotion.geometry.tetrahedra import (
 from calmotion.shot import Body, Character, FEMesh, Frame, TetGeometry
 
 from .accuracy import effort_after, makeup_note, mass_note, remark
-from .filling import DENSE, filled, refuse_loose_parts, refuse_too_many
+from .filling import filled, refuse_loose_parts, refuse_too_many
 from .mesh_file import read_mesh_file
 from .repair import Solid
 from .sources.beam import equivalent_beam
 from .sources.choice import solid_of
 from .sources.hollow import hollowed
 from .sources.twins import moved
-from .tetwild import OutOfTime, ProcessorTime
+from .tetwild import DENSE, OutOfTime, ProcessorTime
 
 if TYPE_CHECKING:
     from calmotion.reduction.interfaces.interface_patches import AttachmentFrame

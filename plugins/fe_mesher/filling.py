@@ -22,14 +22,14 @@ from calmotion.shot import Body, FEMesh
 
 from .grids.gridded import gridded
 from .repair import Solid, simplified
-from .tetwild import MORE_TIME, REMEDY, OutOfTime, ProcessorTime, tetrahedralize
+from .tetwild import DENSE, MORE_TIME, REMEDY, OutOfTime, ProcessorTime, tetrahedralize
 
 # Wanted and largest allowed error. An error of half a percent of volume in thin walls is larger than that in a
 # frequency. Where a better mesh would take too long, a larger error is accepted and reported.
 _GOOD_VOLUME, MAX_VOLUME_ERROR, _ACCEPTED = 0.005, 0.01, 0.05
 # Detail that is removed, of the envelope, which the mesh does not resolve; more of it from surfaces that are dense
 # still: fTetWild takes some 2 ms for each triangle, and many times as much where the envelope is narrow.
-_DETAIL, _DENSE_DETAIL, DENSE = 0.1, 0.5, 2_500
+_DETAIL, _DENSE_DETAIL = 0.1, 0.5
 # What is more detailed gets as many triangles, and a wider envelope: of that which others have, and of the thickness of
 # walls. The boundary of the mesh is fitted to the surface afterwards.
 _TRIANGLES, _WIDER, _OF_WALL = 3_000, 4.0, 0.4

@@ -26,8 +26,9 @@ _TRIES = 3  # attempts at a mesh without flat elements
 # Number of passes that improve the elements, and the energy of the worst element at which they end. More passes hardly
 # improve the smallest angles and take most of the time where surfaces are dense, of more triangles than these, and
 # where a volume is many times the cubed element size. What worse elements cost is part of a mesh's estimated error.
-_NORMAL, _QUICK, _QUICKEST, _DENSE = (80, 10.0), (5, 30.0), (5, 50.0), (2_000, 2_500)
-_LARGE, _MANY = (80, 20.0), 1_000.0
+_NORMAL, _QUICK, _QUICKEST, _MANY = (80, 10.0), (5, 30.0), (5, 50.0), 2_000
+_LARGE, _CUBES = (80, 20.0), 1_000.0
+DENSE = 2_500  # triangles to which surfaces are simplified where that takes away small details alone
 # A process that takes no processor time, such as one that is blocked, ends after this many times its limit.
 _PATIENCE = 100.0
 # Processor time of a node [s]: a quarter of that measured with 4,000 to 130,000 nodes, for faster machines
@@ -123,9 +124,9 @@ def tetrahedralize(
 
 def _improvement(points: np.ndarray, triangles: np.ndarray, element_size: float) -> tuple[int, float]:
     """Number of passes that improve the elements, and the energy of the worst one at which they end."""
-    if len(triangles) > _DENSE[0]:
-        return _QUICK if len(triangles) <= _DENSE[1] else _QUICKEST
-    return _LARGE if surface_volume(points, triangles) > _MANY * element_size**3 else _NORMAL
+    if len(triangles) > _MANY:
+        return _QUICK if len(triangles) <= DENSE else _QUICKEST
+    return _LARGE if surface_volume(points, triangles) > _CUBES * element_size**3 else _NORMAL
 
 
 def _refuse_hopeless(key: str, size: str, path: str, time: ProcessorTime) -> None:

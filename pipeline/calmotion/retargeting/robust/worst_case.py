@@ -141,7 +141,7 @@ class WorstCase:
         problem, damping, orders, refused = self._problem, self._damping, ORDERS, False
         linear, rest = self._linearized()
         if not len(self._own):
-            self._own = _largest(linear.errors[0])
+            self._own = largest_of(linear.errors[0])
         most = self._most(linear, np.maximum(allowed, self._own), FIRST_FACTOR)
         for number in range(ROUNDS):
             interrupts.check()
@@ -153,8 +153,10 @@ class WorstCase:
             foretold = before - self._merit(linear, linear.at(d), rest.value(d))
             kept = problem.limits is None or problem.limits.kept(rest.limited)
             fresh, least = np.array_equal(self._made_at, self._x), before / max(rest.squared(d), 1e-300)
-            if not np.any(d) or foretold < FALLING * before and kept:
-                if not np.any(d) or (fresh if refused else damping <= _FREE * least):
+            if not np.any(d):
+                break
+            if foretold < FALLING * before and kept:
+                if fresh if refused else damping <= _FREE * least:
                     break
                 if refused:
                     linear, rest = self._linearize()  # the model of other curves misled
@@ -173,7 +175,7 @@ class WorstCase:
             self._x, small = self._x + d, gained < FALLING * before
             right = abs(gained - foretold) < FORETOLD * foretold
             linear, rest = self._moved(linear) if small or right else self._linearized()
-            if small and np.all(_largest(linear.errors[0]) <= MET[1] * most) and not problem.tighten():
+            if small and np.all(largest_of(linear.errors[0]) <= MET[1] * most) and not problem.tighten():
                 break
             # the next model has a smaller damping unless this one needed it
             self._damping = damping = damping if refused else damping / DAMPED
@@ -186,7 +188,7 @@ class WorstCase:
             allowed: As of `minimize`; where the curves found have more, as much.
         """
         linear, rest = self._linearized()
-        most = self._most(linear, np.maximum(allowed, _largest(linear.errors[0])), bound.FIRST_FACTOR)
+        most = self._most(linear, np.maximum(allowed, largest_of(linear.errors[0])), bound.FIRST_FACTOR)
         even = bound.EvenErrors.of(linear, rest)
         d = self._minimum(linear, even, most, bound.ORDERS, bound.MET, bound.STEPS)
         return bound.least_possible(linear, self._factors, most, even, self._fixed, d, self._problem.grid.end)
@@ -236,7 +238,7 @@ class WorstCase:
         for left in reversed(range(FACTORS)):
             with one_blas_thread():  # products by a vector take twice as long with two
                 d = least_maximum(linear, self._factors, rest, self._fixed, d, orders, steps)
-            nominal = _largest(linear.at(d)[0])
+            nominal = largest_of(linear.at(d)[0])
             free = np.all(self._factors[0] <= 1.0) or np.any(nominal >= met[0] * most)
             if not left or np.all(nominal <= met[1] * most) and free:
                 break
@@ -306,8 +308,3 @@ class WorstCase:
         if limits is not None and not limits.on:
             limits.on = True
             limits.rho = FIRST_PENALTY * self._merit(linear, linear.errors, 0.0) / grid.end
-
-
-def _largest(errors: Array) -> Array:
-    """The largest error of each group of a robot, of shape [t, G, 3]."""
-    return np.asarray(np.linalg.norm(errors, axis=2).max(axis=0))
