@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 from calmotion.geometry.tetrahedra import min_dihedral_deg
+from calmotion.reduction.basis.nested_interface_modes import CoarserModes
 from calmotion.reduction.cache import cached_reduction
 from calmotion.reduction.elements.assembly import quadratic_nodes
 from calmotion.reduction.elements.bisection import bisected
@@ -29,7 +30,7 @@ from calmotion.reduction.full_order.mesh_extrapolation import (
 from calmotion.reduction.full_order.nested_modes import NestedModes
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.load_envelope import LoadEnvelope
-from calmotion.reduction.reduce import FullBody, linear_modes
+from calmotion.reduction.reduce import FullBody, full_body, linear_modes
 from calmotion.shot.character import Array, Body, Frame, IntArray
 from calmotion.shot.meshes import FEMesh, MeshQuality
 
@@ -221,10 +222,16 @@ def refined_for_loads(
         ShotError: As `reduce_body`.
     """
     first = replace(mesh, quality=replace(mesh.quality, stiffness_factor=1.0, interface_factors=None))
+    coarser: list[CoarserModes] = []
 
     def estimate(mesh: FEMesh) -> Estimate:
-        known = full if mesh is first else None
-        return load_estimate(linear_modes(mesh, body, attachments, root, loads, tolerance, known), body)
+        known = full if full is not None and mesh is first else full_body(mesh, body, attachments, root)
+        fixed = known.support.fixed(known.model)
+        for modes in coarser:
+            fixed.begin_with(modes)
+        found = load_estimate(linear_modes(mesh, body, attachments, root, loads, tolerance, known), body)
+        coarser[:] = [fixed.for_finer()]
+        return found
 
     given = replace(body, surfaces=())  # skins do not matter
     key = ("for loads", first, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor, elements)

@@ -12,6 +12,7 @@ import numpy as np
 from calmotion.geometry.tetrahedra import Indices
 from calmotion.linear_algebra.sparse_solver import SparseSolver, turned
 from calmotion.reduction.basis.natural_modes import lowest_modes, vector_mass
+from calmotion.reduction.basis.nested_interface_modes import CoarserModes
 from calmotion.reduction.basis.residual_flexibility import residual_vectors
 from calmotion.reduction.basis.static_loads import ACCELERATIONS, UNIFORM, unit_accelerations
 from calmotion.reduction.elements.assembly import FEModel
@@ -52,6 +53,7 @@ class FixedInterface:
     _like: Likeness | None = field(default=None, repr=False)
     _normal: dict[float, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
     _inertial: list[tuple[Array, Array]] = field(default_factory=list, init=False, repr=False)
+    _coarser: list[CoarserModes] = field(default_factory=list, init=False, repr=False)
     # links that are alike are reduced in several threads
     _lock: threading.RLock = field(default_factory=threading.RLock, init=False, repr=False)
 
@@ -97,6 +99,14 @@ class FixedInterface:
         K, solver, like = factor * self.K, self.solver.scaled(factor), Likeness(self, factor=factor)
         return FixedInterface(model, self.patches, self.interior, K, self.M, self.mass, solver, self.constraint, like)
 
+    def begin_with(self, coarser: CoarserModes) -> None:
+        """Begin normal modes with those of a mesh that this one is bisected from."""
+        self._coarser[:] = [coarser]
+
+    def for_finer(self) -> CoarserModes:
+        """The normal modes that were asked for, for finer meshes."""
+        return CoarserModes(self.model.mesh, self.interior, dict(self._normal))
+
     def lowest(self, count: int) -> Array:
         """Constraint modes and enough normal modes for `count` accurate modes of the body, shape [3n, 6p + k]."""
         # as many as modes are kept: with constraint modes alone the lowest frequencies would be too high
@@ -137,7 +147,11 @@ class FixedInterface:
         least = min(_MOST, len(self.interior))
         with self._lock:
             if bound not in self._normal:
-                found = lowest_modes(self.K, self.M, least, solver=self.solver, below=bound, most=_CANDIDATES)
+                found = None
+                for coarser in self._coarser:
+                    found = coarser.on(self.model.mesh, self.interior, self.M, self.solver, bound)
+                if found is None:
+                    found = lowest_modes(self.K, self.M, least, solver=self.solver, below=bound, most=_CANDIDATES)
                 self._normal[bound] = found
         values, vectors = self._normal[bound]
         count = max(least, int(np.count_nonzero(values <= below)) + 1)

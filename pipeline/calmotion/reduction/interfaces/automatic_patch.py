@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.geometry.distances import closest_on_triangles, ray_length, triangle_parts
 from calmotion.geometry.tetrahedra import Indices
 from calmotion.reduction.elements.assembly import QuadraticMesh
+from calmotion.reduction.interfaces.just_reached import just_reached
 from calmotion.shot.character import Array, IntArray
 
 _ASIDE = 0.01  # of the body's size: distance from the attachment frame of the other measurements of the width
@@ -159,7 +160,9 @@ def _width_at(closest: Array, gaps: Array, triangles: Array, size: float) -> flo
     return depth
 
 
-def nodes_of_area(mesh: QuadraticMesh, candidates: IntArray, center: Array, radius: float) -> IntArray:
+def nodes_of_area(
+    mesh: QuadraticMesh, candidates: IntArray, center: Array, radius: float, given: bool = False
+) -> IntArray:
     """The nearest surface nodes whose share of the surface is the area inside a sphere about a center.
 
     All nodes inside the sphere would make a patch up to one element larger or smaller, depending on the mesh, and so
@@ -170,11 +173,16 @@ def nodes_of_area(mesh: QuadraticMesh, candidates: IntArray, center: Array, radi
         candidates: Surface nodes to choose from.
         center: [m], shape [3].
         radius: [m].
+        given: Whether the radius is given: then all of the surface inside counts, else not what it just reaches.
     """
     corners = mesh.nodes[mesh.surface[:, :3]]
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     # the share of each triangle that is inside, from the centers of its parts
     share = np.mean(np.linalg.norm(np.einsum("pk,tkx->tpx", _PARTS, corners) - center, axis=-1) <= radius, axis=1)
+    if not given:
+        left = just_reached(mesh.nodes, mesh.surface[:, :3], center, radius)
+        share[left] = 0.0
+        candidates = np.setdiff1d(candidates, mesh.surface[left])
     wanted = float(area @ share)
     # lumped area of a quadratic triangle: a third at each midpoint, nothing at the corners
     weight = np.zeros(len(mesh.nodes))

@@ -14,6 +14,7 @@ from calmotion.reduction.elements.assembly import quadratic_mesh
 from calmotion.reduction.elements.bisection import bisected
 from calmotion.reduction.interfaces.automatic_patch import Skin
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
+from calmotion.reduction.interfaces.just_reached import just_reached
 from calmotion.shot.character import Array, Body, IntArray
 
 _PARTS = triangle_parts(12)
@@ -46,7 +47,7 @@ def with_rims(
         whole = interface_patches(quadratic_mesh(points, tets), attachments, radius, body.path, meshed=meshed)
     except ShotError:
         return points, tets, ()  # the reduction reports it
-    rims = []
+    rims, given = [], radius >= 0.0
     for patch in whole:
         if patch.center is None:
             continue
@@ -55,7 +56,11 @@ def with_rims(
         radius += _excess(points, tets, center, radius)
         points, tets = cut(points, tets, center, radius)
         rims.append((attachments[patch.attachments[0]].frame.position, center, radius))
-    found = [(origin, _within(points, tets, center, radius)) for origin, center, radius in rims]
+    found = []
+    for origin, center, radius in rims:
+        within = _within(points, tets, center, radius)
+        held = within if given else within[~just_reached(points, within, center, radius)]
+        found.append((origin, held))
     return points, tets, tuple((origin, triangles) for origin, triangles in found if len(triangles))
 
 

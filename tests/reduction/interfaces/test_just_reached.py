@@ -1,0 +1,65 @@
+"""A joint between the cheeks of a fork holds the cheeks, not what its sphere just reaches of the ground."""
+
+import numpy as np
+import pytest
+from calmotion.geometry.tetrahedra import surface_area
+from calmotion.reduction.elements.assembly import quadratic_mesh
+from calmotion.reduction.interfaces.cut_patches import with_rims
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
+from calmotion.reduction.interfaces.just_reached import just_reached
+from calmotion.shot import Body, FlexibleSettings
+
+GAP, GROUND = 0.03, -0.037  # from the joint in the origin to the cheeks, and to the ground between them
+
+
+def fork(helpers, cells):
+    """Points and tetrahedra of a fork along z, its cheeks 10 mm thick."""
+    points, tets = helpers.box((8 * cells, 4 * cells, 10 * cells), (0.08, 0.08, 0.1), origin=(-0.04, -0.04, -0.057))
+    points = np.asarray(points)
+    x, _, z = points[tets].mean(axis=1).T
+    tets = tets[(np.abs(x) > GAP) | (z < GROUND)]
+    used = np.unique(tets)
+    return points[used], np.searchsorted(used, tets).astype(np.int32)
+
+
+@pytest.fixture(scope="module")
+def joint(helpers):
+    return AttachmentFrame("/Robot/pin", helpers.frame(0.0, 0.0, 0.0), "interface")
+
+
+def on_ground(x):
+    return (np.abs(x[..., 2] - GROUND) < 1e-9) & (np.abs(x[..., 0]) < GAP - 1e-9)
+
+
+@pytest.mark.parametrize("radius, left", [(0.0371, True), (0.045, False), (0.036, False)])
+def test_only_what_is_nearly_as_far_as_the_sphere_is_left(helpers, radius, left):
+    points, tets = fork(helpers, 1)
+    mesh = quadratic_mesh(points, tets)
+    found = just_reached(mesh.nodes, mesh.surface[:, :3], np.zeros(3), radius)
+    assert found.any() == left
+    assert on_ground(mesh.nodes[mesh.surface[found, :3]].mean(axis=1)).all()
+
+
+def test_a_measured_patch_holds_the_cheeks_and_a_given_one_what_is_within_its_radius(helpers, joint):
+    """The measured radius is that of a ball of a quarter more than the gap, or farther."""
+    points, tets = fork(helpers, 2)
+    mesh = quadratic_mesh(points, tets)
+    (patch,) = interface_patches(mesh, [joint], -1.0, "/Robot/fork")
+    assert patch.radius > -GROUND  # else this test shows nothing
+    x = mesh.nodes[patch.nodes]
+    assert not on_ground(x).any()
+    assert {-1.0, 1.0} <= set(np.sign(x[:, 0]))
+    (given,) = interface_patches(mesh, [joint], patch.radius, "/Robot/fork")
+    assert on_ground(mesh.nodes[given.nodes]).any()
+
+
+@pytest.mark.parametrize("radius", [0.0378, 0.0388])
+def test_a_cut_patch_of_a_measured_radius_has_no_ground_either(helpers, joint, plastic, monkeypatch, radius):
+    from calmotion.reduction.interfaces import interface_patches as module
+
+    monkeypatch.setattr(module, "automatic_radius", lambda *_: radius)
+    points, tets = fork(helpers, 2)
+    body = Body("/Robot/fork", helpers.frame(0, 0, 0), None, flexible=FlexibleSettings(plastic))
+    points, tets, ((_, held),) = with_rims(points, tets, body, [joint])
+    assert not on_ground(points[held].mean(axis=1)).any()
+    assert surface_area(points, held) == pytest.approx(2.0 * np.pi * (radius**2 - GAP**2), rel=0.02)
