@@ -35,7 +35,7 @@ from .sources.beam import equivalent_beam
 from .sources.choice import solid_of
 from .sources.hollow import hollowed
 from .sources.twins import moved
-from .tetwild import DENSE, OutOfTime, ProcessorTime
+from .tetwild import DENSE, TIME_LIMIT, OutOfTime, ProcessorTime
 
 if TYPE_CHECKING:
     from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
@@ -58,7 +58,7 @@ class MeshOptions:
     """
 
     element_size: float = -1.0
-    time_limit: float = 60.0
+    time_limit: float = TIME_LIMIT
     cache: bool = True
 
 

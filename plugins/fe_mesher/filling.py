@@ -36,7 +36,8 @@ _TRIANGLES, _WIDER, _OF_WALL = 3_000, 4.0, 0.4
 _ATTEMPTS = 3
 # Share of the time for the first mesh: what is left is for a coarser one, or that of a grid, which is made in seconds
 _FIRST, _FIRST_DENSE = 0.6, 0.4
-_TRIANGLE = 3e-3  # least processor time for a triangle of a surface with many details [s]
+_LATE = 0.1  # share of the time after which an accepted mesh is not followed by a closer one
+_TRIANGLE = 9e-3  # most processor time for a triangle of a surface with many details, on a slow machine [s]
 _COARSER = 1.6  # factor of size and envelope of a mesh that took too long
 # Largest error of the volume of a grid for a dense surface, which is reported: where it loses more, so many walls have
 # gaps that its frequencies tell nothing (a link of the G1 that lost 29% was five times too stiff)
@@ -128,7 +129,7 @@ def filled(
         if best is None or quality.volume_error < best.quality.volume_error:
             best = FEMesh(index, points, tets, quality)
         # a mesh that is closer to the surface takes about twice as long
-        late = time.used - begun > 0.25 * time.limit and best.quality.volume_error <= _ACCEPTED
+        late = time.used - begun > _LATE * time.limit and best.quality.volume_error <= _ACCEPTED
         enough = MAX_VOLUME_ERROR if number or dense else _GOOD_VOLUME
         if best.quality.volume_error <= enough or notes or late or attempt.detailed:
             break

@@ -11,6 +11,8 @@ from calmotion.host import Operator, Property, RunContext
 from calmotion.shot import Character, FEMeshes, ModelChoices
 from calmotion.shot.model_choice import no_flexible_bodies
 
+from .tetwild import TIME_LIMIT
+
 if TYPE_CHECKING:
     from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
     from calmotion.shot import Body, FEMesh
@@ -39,7 +41,7 @@ class TetrahedralizeFlexibleBodies(Operator):
         Property(
             "time_limit",
             float,
-            60.0,
+            TIME_LIMIT,
             unit="s",
             minimum=1.0,
             description="Largest processor time for the meshes of one body; then a coarser one is made.",

@@ -94,7 +94,10 @@ def test_elements_that_are_too_many_for_the_limit_are_refused_before_the_mesher_
     least = float(re.search(r"at least ([0-9.e-]+) m", caught.value.remedy).group(1))
     monkeypatch.undo()
     shape = package("body_mesh").shape_of(np.array(box().vertices), np.array(box().faces))
-    assert package("filling").expected_nodes(shape, 1.1 * least) * package("tetwild")._SECONDS < 60.0
+    assert (
+        package("filling").expected_nodes(shape, 1.1 * least) * package("tetwild")._SECONDS
+        < package("tetwild").TIME_LIMIT
+    )
 
 
 def test_a_visual_surface_that_takes_too_long_gives_way_to_the_collision_surface_or_a_beam(package, monkeypatch):

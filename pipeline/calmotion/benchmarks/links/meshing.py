@@ -229,7 +229,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("links", nargs="+", metavar="FILE[:PRIM]", help="links; all bodies without a prim")
     parser.add_argument("--sizes", nargs="+", help="multiples of the automatic element size, lengths (8mm), auto")
     parser.add_argument("--geometry-only", action="store_true", help="make solids, and no meshes")
-    parser.add_argument("--time-limit", type=float, default=60.0, help="processor time of the meshes of a link [s]")
+    parser.add_argument("--time-limit", type=float, default=180.0, help="processor time of the meshes of a link [s]")
     parser.add_argument(
         "--refine", type=int, default=0, metavar="NODES", help="also refine the automatic mesh to these"
     )
