@@ -13,6 +13,7 @@ from calmotion.shot import Body, Character, FEMesh, Frame
 from calmotion.shot.materials.parts import Part
 from calmotion.shot.meshes import MeshQuality
 
+from .filling import INTERSECTS, MAX_VOLUME_ERROR
 from .tetwild import DENSE
 
 if TYPE_CHECKING:
@@ -54,6 +55,13 @@ def frames_of(character: Character, index: int) -> tuple[Frame, ...]:
     """Frames on a body of its joints, body frame, that of the joint to its parent first."""
     carrying = [joint.frame1 for joint in character.joints if joint.body1 == index]
     return (*carrying, *(joint.frame0 for joint in character.joints if joint.body0 == index))
+
+
+def volume_note(quality: MeshQuality) -> tuple[str, ...]:
+    """Message about a mesh whose volume, after it was fitted to its surface, is not that of the surface."""
+    if quality.volume_error <= MAX_VOLUME_ERROR or INTERSECTS in quality.repairs:
+        return ()
+    return (f"its volume differs from that of the surface by {100.0 * quality.volume_error:.2g}%",)
 
 
 def mass_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:

@@ -27,7 +27,7 @@ from calmotion.geometry.tetrahedra import (
 )
 from calmotion.shot import Body, Character, FEMesh, Frame, TetGeometry
 
-from .accuracy import effort_after, makeup_note, mass_note, remark
+from .accuracy import effort_after, makeup_note, mass_note, remark, volume_note
 from .filling import filled, refuse_loose_parts, refuse_too_many
 from .mesh_file import read_mesh_file
 from .repair import Solid
@@ -178,8 +178,8 @@ def _meshed(
         mesh = accurate(index, body, geometry, element_size(geometry.shape), options, carrier, attachments)
     quality = mesh.quality
     source = geometry.solid.source if isinstance(geometry, Volume) else quality.source
-    repairs = (*quality.repairs, *mass_note(body, mesh), *makeup_note(body, mesh))
-    return replace(mesh, quality=replace(quality, repairs=repairs, source=source))
+    notes = (*volume_note(quality), *mass_note(body, mesh), *makeup_note(body, mesh))
+    return replace(mesh, quality=replace(quality, repairs=(*quality.repairs, *notes), source=source))
 
 
 def twin_mesh(mesh: FEMesh, isometry: Isometry, index: int, character: Character, geometry: FEMesh | Volume) -> FEMesh:

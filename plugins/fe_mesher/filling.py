@@ -42,6 +42,7 @@ _COARSER = 1.6  # factor of size and envelope of a mesh that took too long
 # Largest error of the volume of a grid for a dense surface, which is reported: where it loses more, so many walls have
 # gaps that its frequencies tell nothing (a link of the G1 that lost 29% was five times too stiff)
 _COARSEST = 0.1
+INTERSECTS = "its surface intersects itself: the volume is that of all that it winds around"
 _LOOSE = 0.05  # of the volume: parts that a thin connection, which the mesh did not follow, held
 
 
@@ -229,15 +230,13 @@ def _accepted(mesh: FEMesh, solid: Solid, volumes: list[float], path: str) -> FE
     if len(volumes) > 1 and abs(volumes[-1] - volumes[-2]) < 0.2 * error * solid.volume:
         wound = enclosed_volume(solid.points, solid.triangles)
         error = abs(mesh.quality.volume / wound - 1.0)
-        notes = (*notes, "its surface intersects itself: the volume is that of all that it winds around")
+        notes = (*notes, INTERSECTS)
     if error > _ACCEPTED:
         raise ShotError(
             "the tetrahedra do not fill the surface",
             path=path, found=f"volume error {100.0 * error:.2g}%, allowed {100.0 * _ACCEPTED:.2g}%",
             remedy="Author a smaller calm:flexible:elementSize, repair the Mesh, or give a TetMesh or a mesh file",
         )  # fmt: skip
-    if error > MAX_VOLUME_ERROR:
-        notes = (*notes, f"its volume differs from that of the surface by {100.0 * error:.2g}%")
     return replace(mesh, quality=replace(mesh.quality, volume_error=error, repairs=notes))
 
 

@@ -171,6 +171,17 @@ def test_finer_elements_are_kept_where_their_own_error_matters(helpers, beam, fr
     assert first_frequencies[0] == pytest.approx(first_frequencies[1], rel=0.01), "with the same statics"
 
 
+@pytest.mark.parametrize("known_error, kept", [(0.001, True), (0.5, False), (None, False)])
+def test_a_mesh_near_the_limit_keeps_what_its_frequencies_told(helpers, beam, frames, loads, known_error, kept):
+    mesh = mesh_of(helpers, (24, 2, 2))
+    mesh = replace(mesh, quality=replace(mesh.quality, stiffness_factor=0.97, frequency_error=known_error))
+    few = Effort(1e-4, 1_000)  # no finer mesh is allowed
+    found = refined_for_loads(mesh, beam, frames, 1, loads, 1e-4, few.wanted, few.max_nodes)
+    assert (found.quality.stiffness_factor == 0.97) == kept
+    finer = refined_for_loads(mesh, beam, frames, 1, loads, 1e-4, few.wanted, 20_000)
+    assert finer.quality.interface_factors is not None and finer.quality.stiffness_factor != 0.97
+
+
 def test_a_link_that_hardly_bends_keeps_its_stiffness(helpers, beam, frames, loads):
     """It has no modes by which the stiffness of two meshes could be compared."""
     idle = replace(loads, force=1e-9 * loads.force)

@@ -118,8 +118,9 @@ def _smallest(estimates: Sequence[Estimate], nodes: float, enough: float) -> tup
 
 
 def with_finer_stiffness(
-    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort, elements: float = np.inf
-) -> FEMesh:
+    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort, elements: float = np.inf,
+    known: FEMesh | None = None,
+) -> FEMesh:  # fmt: skip
     """The mesh with the stiffness that ever finer ones have: the same elements, and factors for their stiffness.
 
     A mesh that is too coarse makes a body too stiff, by one share in bending and by another in twist:
@@ -132,6 +133,9 @@ def with_finer_stiffness(
         mesh, estimate, effort: As of `refined`.
         elements: Relative error of the compliance that the elements may have by themselves; finer ones are taken for
             less, as far as they are few.
+        known: The same mesh with what is known of its stiffness. Where no finer one within the limit of nodes tells how
+            much too stiff it is, and less error is known, this is returned: meshes of detailed links begin near the
+            limit, and their first frequencies were found on meshes beyond it.
     """
     meshes, estimates = _bisected(mesh, estimate, effort)
     excess, error = extrapolation(estimates)
@@ -142,7 +146,14 @@ def with_finer_stiffness(
     factor = float(weights @ ratios) if weights.any() else 1.0  # a link that hardly bends has no modes
     if not len(estimates[-1].interfaces):
         error += deviation(ratios, weights)
-    return _with_quality(meshes[kept], _quality(mesh, own, estimates, factor * (1.0 - excess), error))
+    quality = _quality(mesh, own, estimates, factor * (1.0 - excess), error)
+    if known is not None and excess == 0.0 and kept == 0 and _error(known.quality) < _error(quality):
+        return known
+    return _with_quality(meshes[kept], quality)
+
+
+def _error(quality: MeshQuality) -> float:
+    return np.inf if quality.frequency_error is None else quality.frequency_error
 
 
 def _with_quality(mesh: FEMesh, quality: MeshQuality) -> FEMesh:
@@ -234,8 +245,8 @@ def refined_for_loads(
         return found
 
     given = replace(body, surfaces=())  # skins do not matter
-    key = ("for loads", first, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor, elements)
-    refine = partial(with_finer_stiffness, elements=elements) if by_factor else refined
+    key = ("for loads", mesh, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor, elements)
+    refine = partial(with_finer_stiffness, elements=elements, known=mesh) if by_factor else refined
     return cached_reduction(key, lambda: refine(first, estimate, Effort(wanted, max_nodes)))
 
 

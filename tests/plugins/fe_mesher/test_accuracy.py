@@ -76,6 +76,13 @@ def test_a_stated_mass_that_the_material_does_not_give_is_reported(package):
     assert mass_note(link(), mesh) == ()
 
 
+def test_a_volume_that_is_not_that_of_the_surface_is_reported_unless_it_winds_around_more(package):
+    note, wound = package("accuracy").volume_note, package("filling").INTERSECTS
+    (text,) = note(MeshQuality(20.0, 8e-5, 0.021))
+    assert text == "its volume differs from that of the surface by 2.1%"
+    assert note(MeshQuality(20.0, 8e-5, 0.0005)) == note(MeshQuality(20.0, 8e-5, 0.021, (wound,))) == ()
+
+
 def test_a_print_is_described_and_a_mass_that_is_not_its_own_is_reported(package, helpers):
     points, tets = helpers.box((16, 2, 2), (0.2, 0.02, 0.02))
     mesh = FEMesh(0, np.asarray(points), tets, MeshQuality(20.0, 8e-5, 0.0))
