@@ -63,3 +63,12 @@ def test_a_cut_patch_of_a_measured_radius_has_no_ground_either(helpers, joint, p
     points, tets, ((_, held),) = with_rims(points, tets, body, [joint])
     assert not on_ground(points[held].mean(axis=1)).any()
     assert surface_area(points, held) == pytest.approx(2.0 * np.pi * (radius**2 - GAP**2), rel=0.02)
+
+
+def test_triangles_that_a_cut_left_a_little_outside_belong_to_their_part():
+    """Two triangles with a common edge above the joint, of which the farther one begins outside the sphere."""
+    near = [[-1.0, 0.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, 1.0]]
+    points = np.array([*near, [0.1, 0.0, -1.9], [1.0, 0.0, -1.9], [-0.1, 0.6, -1.9], [-0.2, 0.7, -1.9]])
+    triangles = np.array([[0, 1, 2], [3, 4, 5], [4, 5, 6]])
+    assert just_reached(points, triangles, np.zeros(3), 1.92).tolist() == [False, True, False]
+    assert just_reached(points, triangles, np.zeros(3), 1.92, beyond=np.inf).tolist() == [False, True, True]

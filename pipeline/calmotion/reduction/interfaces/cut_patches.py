@@ -59,7 +59,7 @@ def with_rims(
     found = []
     for origin, center, radius in rims:
         within = _within(points, tets, center, radius)
-        held = within if given else within[~just_reached(points, within, center, radius)]
+        held = within if given else within[~just_reached(points, within, center, radius, beyond=np.inf)]
         found.append((origin, held))
     return points, tets, tuple((origin, triangles) for origin, triangles in found if len(triangles))
 

@@ -19,7 +19,7 @@ _ON = 1e-9  # of the radius: triangles that end on the sphere
 _FARTHEST = 0.75
 
 
-def just_reached(points: Array, triangles: Indices, center: Array, radius: float) -> BoolArray:
+def just_reached(points: Array, triangles: Indices, center: Array, radius: float, beyond: float = _ON) -> BoolArray:
     """Triangles of parts that a sphere just reaches, and that a joint in its center does not hold, shape [k].
 
     Args:
@@ -27,13 +27,15 @@ def just_reached(points: Array, triangles: Indices, center: Array, radius: float
         triangles: Shape [k, 3].
         center: [m], shape [3].
         radius: [m].
+        beyond: Of the radius: how far outside the sphere triangles may begin that belong to parts; infinite: all do, as
+            where only those within a sphere are given, some of which a cut left a little outside.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
     corners = points[triangles]
     gaps = np.linalg.norm(closest_on_triangles(center, corners) - center, axis=1)
-    reached = np.flatnonzero(gaps <= radius * (1.0 + _ON))
+    reached = np.flatnonzero(gaps <= radius * (1.0 + beyond))
     found = np.zeros(len(triangles), dtype=bool)
     if not len(reached):
         return found
