@@ -14,7 +14,7 @@ from calmotion.geometry.tetrahedra import Indices
 from calmotion.shot.character import Array, BoolArray
 
 _ON = 1e-9  # of the radius: triangles that end on the sphere
-# Nearest place of a part, from the nearest of all (0) to the sphere (1). On eleven robots, second cheeks and the sides
+# Nearest place of a part, from the nearest of all (0) to the sphere (1). On nine robots, second cheeks and the sides
 # of bores are at most at 0.7, walls that a sphere just reaches mostly at 0.9 and more.
 _FARTHEST = 0.75
 
