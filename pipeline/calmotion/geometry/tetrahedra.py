@@ -202,7 +202,7 @@ def welded_tets(points: Array, tets: IntArray, tolerance: float) -> tuple[Array,
 
 def connected_parts(tets: IntArray) -> int:
     """Number of parts that share no point; 1 for a connected body."""
-    return int(_parts(tets).max()) + 1
+    return int(part_of_each(tets).max()) + 1
 
 
 def largest_part(points: Array, tets: IntArray) -> IntArray:
@@ -219,14 +219,14 @@ def largest_part(points: Array, tets: IntArray) -> IntArray:
     return np.asarray(tets[part == volumes.argmax()])
 
 
-def _parts(tets: IntArray) -> Indices:
-    """Part of each tetrahedron, shape [m]."""
+def part_of_each(cells: Indices) -> Indices:
+    """Number of the part of each of m cells (tetrahedra, triangles; shape [m, k]), shape [m]; parts share no point."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    number = np.unique(tets, return_inverse=True)[1].reshape(-1, 4)
+    number = np.unique(cells, return_inverse=True)[1].reshape(cells.shape)
     n = int(number.max()) + 1
-    rows, columns = np.repeat(number[:, 0], 3), number[:, 1:].ravel()
+    rows, columns = np.repeat(number[:, 0], cells.shape[1] - 1), number[:, 1:].ravel()
     graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n))
     label: Indices = connected_components(graph, directed=False)[1][number[:, 0]]
     return np.unique(label, return_inverse=True)[1].reshape(-1)

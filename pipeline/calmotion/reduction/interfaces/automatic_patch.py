@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from calmotion.geometry.distances import closest_on_triangles, ray_length, triangle_parts
-from calmotion.geometry.tetrahedra import Indices
+from calmotion.geometry.tetrahedra import Indices, part_of_each
 from calmotion.reduction.elements.assembly import QuadraticMesh
 from calmotion.reduction.interfaces.just_reached import just_reached
 from calmotion.shot.character import Array, IntArray
@@ -51,9 +51,6 @@ def end_face(mesh: Skin, center: Array, triangles: Array, closest: Array, gaps: 
         closest, gaps: Closest point of each triangle to the center [m], shape [k, 3], and its distance, shape [k].
         room: Distance to the next attachment frame [m].
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     none = np.zeros(0, dtype=np.int32)
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
     nearest = int(gaps.argmin())
@@ -66,10 +63,7 @@ def end_face(mesh: Skin, center: Array, triangles: Array, closest: Array, gaps: 
     flat = np.flatnonzero((normals @ normal > _FLAT_COSINE) & (off_plane <= _FLAT_OFFSET * size))
     if nearest not in flat:
         return none
-    corners = mesh.surface[flat, :3]
-    links = (np.repeat(np.arange(len(flat)), 3), corners.ravel())
-    graph = coo_matrix((np.ones(len(links[0])), links), shape=(len(flat), len(mesh.nodes)))
-    label = connected_components(graph @ graph.T, directed=False)[1]
+    label = part_of_each(mesh.surface[flat, :3])
     face = flat[label == label[np.searchsorted(flat, nearest)]]
     extent = float(np.linalg.norm(triangles[face] - center, axis=-1).max())
     depth = _depth(closest[nearest], normal, triangles, size)

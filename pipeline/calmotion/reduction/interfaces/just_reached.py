@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from calmotion.geometry.distances import closest_on_triangles
-from calmotion.geometry.tetrahedra import Indices
+from calmotion.geometry.tetrahedra import Indices, part_of_each
 from calmotion.shot.character import Array, BoolArray
 
 _ON = 1e-9  # of the radius: triangles that end on the sphere
@@ -30,19 +30,14 @@ def just_reached(points: Array, triangles: Indices, center: Array, radius: float
         beyond: Of the radius: how far outside the sphere triangles may begin that belong to parts; infinite: all do, as
             where only those within a sphere are given, some of which a cut left a little outside.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     corners = points[triangles]
     gaps = np.linalg.norm(closest_on_triangles(center, corners) - center, axis=1)
     reached = np.flatnonzero(gaps <= radius * (1.0 + beyond))
     found = np.zeros(len(triangles), dtype=bool)
     if not len(reached):
         return found
-    of, corner = np.repeat(np.arange(len(reached)), 3), triangles[reached].ravel()
-    graph = coo_matrix((np.ones(len(of)), (of, corner)), shape=(len(reached), len(points)))
-    count, part = connected_components(graph @ graph.T, directed=False)
-    nearest = np.full(count, np.inf)
+    part = part_of_each(triangles[reached])
+    nearest = np.full(part.max() + 1, np.inf)
     np.minimum.at(nearest, part, gaps[reached])
     least = float(nearest.min())
     found[reached[nearest[part] > least + _FARTHEST * (radius - least)]] = True
