@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 ENOUGH = 2.0 * ACCURACY
 # Nodes of a mesh at most, for some seconds; where the shot needs more, it is refined for its loads
 _REFINED = 12_000
-# Error that the extrapolation of the frequencies is estimated to leave, 1.1 to 8 times the true one of ten real links,
-# from which more nodes are spent: at least and at most so many, and in between so many that meshing and refinement
-# together take some 20 s (3.3 ms for each triangle of the surface and 0.2 ms for each node)
-_POOR, _POOR_REFINED = 0.0125, (32_000, 60_000)
+# Error that the extrapolation of the frequencies is estimated to leave, from which more nodes are spent: at least and
+# at most so many, and in between so many that meshing and refinement together take some 20 s (3.3 ms for each triangle
+# of the surface and 0.2 ms for each node)
+_POOR, _POOR_REFINED = 0.0125, (40_000, 60_000)
 _IN_TIME, _OF_TRIANGLE = 100_000, 16.5
 _KEPT = 22_000  # nodes of the mesh that takes the stiffness of these, where one factor is enough
 # Relative error of the squares of frequencies that a solver may leave on dense surfaces: of the G1's wrist 40% fewer

@@ -195,15 +195,27 @@ def _bisected(
         if effort.ends(error, estimates[-1].nodes):
             break
         for marked in (MARKED, _FEWER):
-            points, tets = bisected(meshes[-1].points, meshes[-1].tets, _largest(estimates[-1].indicators, marked))
-            allowed = effort.allows(estimates[-1].nodes, quadratic_nodes(points, tets))
+            finer = bisected_where(meshes[-1], estimates[-1].indicators, marked)
+            allowed = effort.allows(estimates[-1].nodes, quadratic_nodes(finer.points, finer.tets))
             if allowed or not effort.poor_nodes:
                 break
         if not allowed:
             break
-        meshes.append(replace(mesh, points=points, tets=tets))
+        meshes.append(finer)
         estimates.append(estimate(meshes[-1]))
     return meshes, estimates
+
+
+def bisected_where(mesh: FEMesh, indicators: Array, share: float = MARKED) -> FEMesh:
+    """The mesh with the elements bisected that together have a share of the error.
+
+    Args:
+        mesh: To refine.
+        indicators: Part of each element in the error, shape [m].
+        share: Of the error.
+    """
+    points, tets = bisected(mesh.points, mesh.tets, _largest(indicators, share))
+    return replace(mesh, points=points, tets=tets)
 
 
 def _of_volume(mesh: FEMesh) -> float:
@@ -267,7 +279,7 @@ def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, eff
     return cached_reduction(key, lambda: refined(mesh, estimate, effort, far=True))
 
 
-def _largest(indicators: Array, share: float = MARKED) -> IntArray:
+def _largest(indicators: Array, share: float) -> IntArray:
     """The fewest elements that together have a share of the error."""
     order = np.argsort(-indicators, kind="stable")
     summed = np.cumsum(indicators[order])

@@ -20,9 +20,9 @@ _LEFT_ALONG = 0.3  # the same in one direction of an interface, of a bar and of 
 _LEAST = 0.1  # of the estimate of the finer mesh: the least error that is claimed
 _STIFFEST = 0.05  # excess of the stiffness of an interface in any direction that is extrapolated
 _ASYMPTOTIC = 0.05  # largest estimate that is in proportion to the error
-# Largest estimate from which one comparison is used, and the error that it leaves, of what was extrapolated
-_NEARLY, _ALONE = 0.25, 1.0
-_AGREE = 1.6  # ratio of two extrapolations from large estimates that are used
+# Error over a large estimate; how far the mean of it and of the change of the stiffness may be off, of their difference
+# and, where there was no change before, of the mean
+_USUAL, _DOUBTED, _ONCE = 0.55, 0.7, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,27 +74,29 @@ def extrapolation(estimates: Sequence[Estimate]) -> tuple[float, float]:
 
 
 def far_extrapolation(estimates: Sequence[Estimate]) -> tuple[float, float]:
-    """As `extrapolation`, from estimates that are too large to be in proportion to the error: the last three, or two
-    where the coarser one is nearly fine enough.
+    """As `extrapolation`, from estimates that may be too large to be in proportion to the error.
 
-    Two extrapolations that agree show that they nearly are. A link whose first frequencies were 731, 694, 672, 661 and
-    653 Hz on meshes with estimates of 18, 14, 9.9, 6.8 and 4.7% is extrapolated to 635 Hz from the fourth, to 638 Hz
-    from the fifth.
+    Two things tell how much too stiff the finest mesh is: the change of the stiffness since a coarser one, which may
+    tell up to twice as much where estimates are large, since these fall more slowly than the error; and its own
+    estimate, of which the error is mostly 0.4 to 0.8. Their geometric mean is taken, and their difference tells how
+    well it is known. On 115 meshes of 24 real links the largest error of the first three frequencies was 0.63 times
+    what is claimed in the median, 0.97 times for 95% and 1.15 times at most (0.65, 1.15 and 1.85 by the change alone).
+
+    Source: Richardson's extrapolation, by the estimated error in place of the element size.
     """
-    fine, excesses, apart = estimates[-1], [], 0.0
-    coarser = [e for e in estimates[:-1] if e.error >= _GAIN * fine.error][-2:]
-    for coarse in coarser:
-        ratios, weights = mode_ratios(coarse, fine)
-        each = (1.0 / ratios - 1.0) / (coarse.error / fine.error - 1.0)
-        excesses.append(float(weights @ each))
-        apart = float(np.abs(each - excesses[-1]).max())  # of the modes: there is one factor for all
-    if not excesses or excesses[-1] <= 0.0:
+    fine = estimates[-1]
+    coarser = [e for e in estimates[:-1] if e.error >= _GAIN * fine.error]
+    if not coarser:
         return 0.0, fine.error
-    if len(excesses) < 2 or min(excesses) <= 0.0 or max(excesses) > _AGREE * min(excesses):
-        excess = min(excesses[-1], fine.error)
-        return (excess, min(_ALONE * excess + apart, fine.error)) if coarser[-1].error <= _NEARLY else (0.0, fine.error)
-    left = max(_LEFT * excesses[1], _APART * abs(excesses[1] - excesses[0])) + apart
-    return min(excesses[1], fine.error), min(left, fine.error)
+    ratios, weights = mode_ratios(coarser[-1], fine)
+    each = (1.0 / ratios - 1.0) / (coarser[-1].error / fine.error - 1.0)
+    by_change, by_estimate = float(weights @ each), _USUAL * fine.error
+    if by_change <= 0.0:  # a finer mesh that is not softer tells nothing
+        return 0.0, fine.error
+    excess = min(float(np.sqrt(by_change * by_estimate)), fine.error)  # of the stiffness of ever finer meshes
+    apart = float(np.abs(each / by_change - 1.0).max()) * excess  # of the modes: there is one factor for all
+    left = max((_LEFT if len(coarser) > 1 else _ONCE) * excess, _DOUBTED * abs(by_change - by_estimate)) + apart
+    return excess / (1.0 + excess), min(left, fine.error)
 
 
 def _compared(estimates: Sequence[Estimate]) -> list[tuple[Estimate, float]]:
