@@ -3,7 +3,7 @@
 OUT gets the shot's time range and units (those of OVERS where the motion is there), and sublayers OVERS over SHOT with
 paths relative to it. The robots that such layers are for are not part of this repository; `g1_arms.usda` is for a
 Unitree G1 upper body converted from MJCF, `iiwa_reach.usda` for a KUKA LBR iiwa 14,
-`so101_servos.usda` for an SO-101 converted from URDF.
+`so101_arms.usda` and `so101_servos.usda` for an SO-101 converted from URDF.
 """
 
 from __future__ import annotations

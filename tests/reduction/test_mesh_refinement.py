@@ -172,7 +172,10 @@ def test_finer_elements_are_kept_where_their_own_error_matters(helpers, beam, fr
 
 
 @pytest.mark.parametrize("known_error, kept", [(0.001, True), (0.5, False), (None, False)])
-def test_a_mesh_near_the_limit_keeps_what_its_frequencies_told(helpers, beam, frames, loads, known_error, kept):
+def test_a_mesh_beyond_the_limit_keeps_what_its_frequencies_told(
+    helpers, beam, frames, loads, known_error, kept, monkeypatch
+):
+    monkeypatch.setattr(mesh_refinement, "_MOST", 1_000)
     mesh = mesh_of(helpers, (24, 2, 2))
     mesh = replace(mesh, quality=replace(mesh.quality, stiffness_factor=0.97, frequency_error=known_error))
     few = Effort(1e-4, 1_000)  # no finer mesh is allowed
@@ -180,6 +183,20 @@ def test_a_mesh_near_the_limit_keeps_what_its_frequencies_told(helpers, beam, fr
     assert (found.quality.stiffness_factor == 0.97) == kept
     finer = refined_for_loads(mesh, beam, frames, 1, loads, 1e-4, few.wanted, 20_000)
     assert finer.quality.interface_factors is not None and finer.quality.stiffness_factor != 0.97
+
+
+def test_a_mesh_near_the_limit_is_followed_by_finer_ones(helpers, beam, frames, loads, monkeypatch):
+    nodes, estimated = [], mesh_refinement.load_estimate
+
+    def noted(*arguments):
+        found = estimated(*arguments)
+        nodes.append(found.nodes)
+        return found
+
+    monkeypatch.setattr(mesh_refinement, "load_estimate", noted)
+    own = replace(beam, path="/Arm/near")  # not from the cache
+    refined_for_loads(mesh_of(helpers, (12, 2, 2)), own, frames, 1, loads, 1e-4, 1e-6, 700)
+    assert nodes[0] > 0.6 * 700 and nodes[-2] <= 0.6 * 3.0 * nodes[0] < nodes[-1] < 3.0 * nodes[0]
 
 
 def test_a_link_that_hardly_bends_keeps_its_stiffness(helpers, beam, frames, loads):

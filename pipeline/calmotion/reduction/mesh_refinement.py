@@ -23,7 +23,6 @@ from calmotion.reduction.full_order.mesh_extrapolation import (
     Estimate,
     deviation,
     extrapolation,
-    far_extrapolation,
     interface_factors,
     mode_ratios,
 )
@@ -41,6 +40,8 @@ _KEPT = 0.005  # of their own error, what elements leave with the statics of fin
 # Relative difference of the stiffness of modes from one factor, and the same of the error that is left: from more on,
 # finer elements are kept
 _APART, _APART_OF_ERROR = 0.01, 0.3
+# Nodes of the finest mesh after a first one that is itself near the limit: of its own, for two bisections, and at most
+_FOLLOWED, _MOST = 3.0, 50_000
 _FEW = 6_000  # nodes of elements on which a nonlinear body is reduced within a minute
 
 
@@ -76,20 +77,19 @@ class Effort:
         return nodes <= 0.6 * self.max_nodes  # the next bisection may exceed the limit by its factor
 
 
-def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort, far: bool = False) -> FEMesh:
+def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort, one_factor: bool = False) -> FEMesh:
     """The mesh, bisected until its estimated error is small enough; its quality holds the error.
 
     Args:
         mesh: To refine.
         estimate: Estimates the error of a mesh.
         effort: How far.
-        far: Whether the stiffness is extrapolated from estimates that are not yet in proportion to the error
-            (`far_extrapolation`), that of the interfaces not at all.
+        one_factor: Whether a coarser mesh may take the stiffness of the finest one by one factor for all modes, that of
+            the interfaces with it.
     """
-    extrapolated = far_extrapolation if far else extrapolation
-    meshes, estimates = _bisected(mesh, estimate, effort, extrapolated)
-    excess, error = extrapolated(estimates)
-    if not far:
+    meshes, estimates = _bisected(mesh, estimate, effort, one_factor)
+    excess, error = extrapolation(estimates, one_factor)
+    if not one_factor:
         return _with_quality(meshes[-1], _quality(mesh, estimates[-1], estimates, 1.0 - excess, error))
     kept, factor, apart = _smallest(estimates, effort.kept_nodes, max(_APART, _APART_OF_ERROR * error))
     quality = replace(
@@ -181,8 +181,7 @@ def _quality(mesh: FEMesh, own: Estimate, estimates: Sequence[Estimate], factor:
 
 
 def _bisected(
-    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort,
-    extrapolated: Callable[[Sequence[Estimate]], tuple[float, float]] = extrapolation,
+    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort, one_factor: bool = False
 ) -> tuple[list[FEMesh], list[Estimate]]:  # fmt: skip
     """Ever finer meshes from the given one on, until what an extrapolation leaves is small enough; their estimates."""
     meshes, estimates = [mesh], [estimate(mesh)]
@@ -191,7 +190,7 @@ def _bisected(
     effort = replace(effort, wanted=max(effort.wanted - by_volume, 0.5 * by_volume, 0.3 * effort.wanted))
     for _ in range(_ROUNDS):
         by_interfaces = interface_factors(estimates[-1], estimates)
-        error = max(extrapolated(estimates)[1], by_interfaces[2] if by_interfaces else 0.0)
+        error = max(extrapolation(estimates, one_factor)[1], by_interfaces[2] if by_interfaces else 0.0)
         if effort.ends(error, estimates[-1].nodes):
             break
         for marked in (MARKED, _FEWER):
@@ -236,7 +235,7 @@ def refined_for_loads(
         mesh, body, attachments, root: As of `reduce_body`.
         loads: Of the body.
         tolerance: Of the modes that count, as of `reduce_body` [m].
-        wanted, max_nodes: As of `Effort`.
+        wanted, max_nodes: As of `Effort`; by factor, more nodes where the first mesh has many.
         by_factor: `with_finer_stiffness` instead of finer elements.
         full: `full_body` of the mesh with its own stiffness, where it is known.
         elements: As of `with_finer_stiffness`.
@@ -258,8 +257,11 @@ def refined_for_loads(
 
     given = replace(body, surfaces=())  # skins do not matter
     key = ("for loads", mesh, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor, elements)
-    refine = partial(with_finer_stiffness, elements=elements, known=mesh) if by_factor else refined
-    return cached_reduction(key, lambda: refine(first, estimate, Effort(wanted, max_nodes)))
+    if not by_factor:
+        return cached_reduction(key, lambda: refined(first, estimate, Effort(wanted, max_nodes)))
+    nodes = int(min(_FOLLOWED * quadratic_nodes(mesh.points, mesh.tets), _MOST))
+    effort = Effort(wanted, max(max_nodes, nodes))
+    return cached_reduction(key, lambda: with_finer_stiffness(first, estimate, effort, elements, mesh))
 
 
 def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, effort: Effort) -> FEMesh:
@@ -276,7 +278,7 @@ def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, eff
     )  # fmt: skip
     key = ("for frequencies", mesh, replace(body, surfaces=()), carrier, effort)
     # the estimates of many links are still large with as many nodes; what the loads need is not known yet
-    return cached_reduction(key, lambda: refined(mesh, estimate, effort, far=True))
+    return cached_reduction(key, lambda: refined(mesh, estimate, effort, one_factor=True))
 
 
 def _largest(indicators: Array, share: float) -> IntArray:

@@ -63,7 +63,7 @@ def levels(link: Link, nodes: int) -> list[LevelRow]:
     """
     from calmotion.accuracy.element_size import element_size, shape_of
     from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
-    from calmotion.reduction.full_order.mesh_extrapolation import Estimate, far_extrapolation
+    from calmotion.reduction.full_order.mesh_extrapolation import Estimate, extrapolation
     from calmotion.reduction.full_order.nested_modes import NestedModes
     from calmotion.reduction.mesh_refinement import bisected_where
 
@@ -77,7 +77,7 @@ def levels(link: Link, nodes: int) -> list[LevelRow]:
     while estimates[-1].nodes < nodes:
         mesh = bisected_where(mesh, estimates[-1].indicators)
         estimates.append(estimate(mesh))
-    told = [far_extrapolation(estimates[: k + 1]) for k in range(len(estimates))]
+    told = [extrapolation(estimates[: k + 1], one_factor=True) for k in range(len(estimates))]
     found = [_frequencies(one.squares, excess) for one, (excess, _) in zip(estimates, told, strict=True)]
     rows = []
     for k, (one, (excess, left)) in enumerate(zip(estimates, told, strict=True)):
