@@ -196,7 +196,7 @@ def test_a_mesh_near_the_limit_is_followed_by_finer_ones(helpers, beam, frames, 
     monkeypatch.setattr(mesh_refinement, "load_estimate", noted)
     own = replace(beam, path="/Arm/near")  # not from the cache
     refined_for_loads(mesh_of(helpers, (12, 2, 2)), own, frames, 1, loads, 1e-4, 1e-6, 700)
-    assert nodes[0] > 0.6 * 700 and nodes[-2] <= 0.6 * 3.0 * nodes[0] < nodes[-1] < 3.0 * nodes[0]
+    assert nodes[0] > 0.6 * 700 and len(nodes) > 2 and nodes[-2] <= 0.6 * 3.3 * nodes[0] < nodes[-1]
 
 
 def test_a_link_that_hardly_bends_keeps_its_stiffness(helpers, beam, frames, loads):

@@ -41,7 +41,7 @@ _KEPT = 0.005  # of their own error, what elements leave with the statics of fin
 # finer elements are kept
 _APART, _APART_OF_ERROR = 0.01, 0.3
 # Nodes of the finest mesh after a first one that is itself near the limit: of its own, for two bisections, and at most
-_FOLLOWED, _MOST = 3.0, 50_000
+_FOLLOWED, _MOST = 3.3, 50_000
 _FEW = 6_000  # nodes of elements on which a nonlinear body is reduced within a minute
 
 
