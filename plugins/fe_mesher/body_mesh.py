@@ -169,11 +169,11 @@ def _meshed(
     """`mesh_of` a geometry, without another one in its place."""
     carrier = frames[0] if frames else None
     if isinstance(geometry, FEMesh):
-        mesh = _judged(geometry, body, carrier)
+        mesh = _judged(geometry, body, carrier, attachments)
     elif geometry.size > 0.0:
         time = ProcessorTime(options.time_limit)
         mesh = filled(index, body, geometry.solid, geometry.shape, geometry.size, time, options.cache)
-        mesh = _judged(_shaped(mesh, body, geometry, geometry.size, attachments), body, carrier)
+        mesh = _judged(_shaped(mesh, body, geometry, geometry.size, attachments), body, carrier, attachments)
     else:
         mesh = accurate(index, body, geometry, element_size(geometry.shape), options, carrier, attachments)
     quality = mesh.quality
@@ -249,13 +249,13 @@ def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FE
     return FEMesh(index, points, tets, quality)
 
 
-def _judged(mesh: FEMesh, body: Body, carrier: Frame | None) -> FEMesh:
+def _judged(mesh: FEMesh, body: Body, carrier: Frame | None, attachments: Sequence[AttachmentFrame]) -> FEMesh:
     """A mesh whose elements are given, with its estimated error; a mesh that is too large for the estimate without."""
     from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
 
     if len(mesh.points) > MAX_NODES:
         return replace(mesh, given=True)
-    return replace(refined_for_frequencies(mesh, body, carrier, Effort(np.inf, 0)), given=True)
+    return replace(refined_for_frequencies(mesh, body, carrier, Effort(np.inf, 0), attachments), given=True)
 
 
 def _shaped(mesh: FEMesh, body: Body, volume: Volume, size: float, attachments: Sequence[AttachmentFrame]) -> FEMesh:
@@ -286,6 +286,6 @@ def accurate(
     time = ProcessorTime(options.time_limit)
     mesh = filled(index, body, solid, shape, size, time, options.cache, _LONGER)
     mesh = _shaped(mesh, body, volume, size, attachments)
-    mesh = refined_for_frequencies(mesh, body, carrier, effort_after(time.triangles))
+    mesh = refined_for_frequencies(mesh, body, carrier, effort_after(time.triangles), attachments)
     repairs = (*mesh.quality.repairs, *remark(mesh.quality))
     return replace(mesh, quality=replace(mesh.quality, repairs=repairs))

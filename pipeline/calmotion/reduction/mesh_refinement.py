@@ -264,7 +264,9 @@ def refined_for_loads(
     return cached_reduction(key, lambda: with_finer_stiffness(first, estimate, effort, elements, mesh))
 
 
-def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, effort: Effort) -> FEMesh:
+def refined_for_frequencies(
+    mesh: FEMesh, body: Body, carrier: Frame | None, effort: Effort, attachments: Sequence[AttachmentFrame] = ()
+) -> FEMesh:
     """The mesh, refined where the first modes of the body, clamped at its parent joint, have their error.
 
     Args:
@@ -272,11 +274,13 @@ def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, eff
         body: With `flexible` settings.
         carrier: Frame of the parent joint on the body; None for a free body.
         effort: How far; errors are those of the compliance, twice those of the frequencies.
+        attachments: Frames of all its joints: what is nearer to another joint is not held by the parent's.
     """
     estimate = partial(
-        frequency_estimate, body=body, carrier=carrier, coarser=NestedModes(), algebraic=effort.algebraic
+        frequency_estimate, body=body, carrier=carrier, coarser=NestedModes(), algebraic=effort.algebraic,
+        attachments=attachments,
     )  # fmt: skip
-    key = ("for frequencies", mesh, replace(body, surfaces=()), carrier, effort)
+    key = ("for frequencies", mesh, replace(body, surfaces=()), carrier, effort, attachments)
     # the estimates of many links are still large with as many nodes; what the loads need is not known yet
     return cached_reduction(key, lambda: refined(mesh, estimate, effort, one_factor=True))
 

@@ -70,9 +70,11 @@ def levels(link: Link, nodes: int) -> list[LevelRow]:
     maker = mesher()
     solid = maker.solid_of(link.body, link.body.surfaces)
     size = element_size(shape_of(solid.points, solid.triangles))
-    options = maker.MeshOptions(element_size=size, cache=False)
-    mesh = maker.mesh_body(0, link.body, options, frames_of(link), attachments_of(link))
-    estimate = partial(frequency_estimate, body=link.body, carrier=link.carrier, coarser=NestedModes())
+    options, joints = maker.MeshOptions(element_size=size, cache=False), attachments_of(link)
+    mesh = maker.mesh_body(0, link.body, options, frames_of(link), joints)
+    estimate = partial(
+        frequency_estimate, body=link.body, carrier=link.carrier, coarser=NestedModes(), attachments=joints
+    )
     estimates: list[Estimate] = [estimate(mesh)]
     while estimates[-1].nodes < nodes:
         mesh = bisected_where(mesh, estimates[-1].indicators)

@@ -117,7 +117,7 @@ def _refined(link: Link, mesh: Any, nodes: int) -> Row:
 
     start = time.perf_counter()
     effort = Effort(_FINEST, int(nodes / 0.6), 0.0)
-    finer = refined_for_frequencies(mesh, link.body, link.carrier, effort)
+    finer = refined_for_frequencies(mesh, link.body, link.carrier, effort, attachments_of(link))
     row = _row(link, 0.0, finer, time.perf_counter() - start, False)
     return replace(row, estimate=100.0 * (finer.quality.frequency_error or 0.0))
 

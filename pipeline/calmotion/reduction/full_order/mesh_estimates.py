@@ -51,12 +51,13 @@ def load_estimate(linear: LinearModes, body: Body) -> Estimate:
 
 
 def frequency_estimate(
-    mesh: FEMesh, body: Body, carrier: Frame | None, coarser: NestedModes | None = None, algebraic: float = ALGEBRAIC
+    mesh: FEMesh, body: Body, carrier: Frame | None, coarser: NestedModes | None = None, algebraic: float = ALGEBRAIC,
+    attachments: Sequence[AttachmentFrame] = (),
 ) -> Estimate:  # fmt: skip
     """Error of the first modes, of which each counts by its compliance relative to that of the first.
 
     Args:
-        mesh, body, carrier: As of `refined_for_frequencies`.
+        mesh, body, carrier, attachments: As of `refined_for_frequencies`.
         coarser: Modes of the meshes that it is bisected from.
         algebraic: Relative error of the squares of frequencies that may be left with these.
 
@@ -65,7 +66,7 @@ def frequency_estimate(
     """
     assert body.flexible is not None
     model = assemble(mesh.points, mesh.tets, body.flexible.material)
-    clamped = _clamped_nodes(model.mesh, body, carrier, mesh.patches)
+    clamped = _clamped_nodes(model.mesh, body, carrier, mesh.patches, attachments)
     if coarser is None or clamped is None or not len(clamped):
         frequencies, modes = clamped_modes(model, _COUNT, clamped)
     else:
@@ -83,12 +84,21 @@ def frequency_estimate(
     return Estimate(total, squares, weights / weights.sum(), errors @ weights, len(model.mesh.nodes))
 
 
-def _clamped_nodes(mesh: QuadraticMesh, body: Body, carrier: Frame | None, cut: Sequence[CutPatch]) -> IntArray | None:
+def _clamped_nodes(
+    mesh: QuadraticMesh, body: Body, carrier: Frame | None, cut: Sequence[CutPatch],
+    attachments: Sequence[AttachmentFrame],
+) -> IntArray | None:  # fmt: skip
     assert body.flexible is not None
     if carrier is None:
         return None
+    own = [k for k, one in enumerate(attachments) if one.kind == "interface" and _together(one.frame, carrier)]
+    joints = attachments if own else [AttachmentFrame(body.path, carrier, "interface")]
     try:
-        attachment = AttachmentFrame(body.path, carrier, "interface")
-        return interface_patches(mesh, [attachment], body.flexible.interface_radius, body.path, cut)[0].nodes
+        patches = interface_patches(mesh, joints, body.flexible.interface_radius, body.path, cut)
     except ShotError:
         return None  # the reduction reports the error with the joint
+    return next(patch.nodes for patch in patches if (own or [0])[0] in patch.attachments)
+
+
+def _together(one: Frame, other: Frame) -> bool:
+    return bool(np.array_equal(one.position, other.position))
