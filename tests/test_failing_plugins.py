@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from small_shots import write_arm
 
 HEAD = """
     from dataclasses import dataclass
@@ -34,8 +35,8 @@ FAILING = {
 
 
 @pytest.fixture
-def shot(repository):
-    return repository / "samples" / "bartender" / "bartender.usda"
+def shot(tmp_path_factory):
+    return write_arm(tmp_path_factory.mktemp("shot") / "arm.usda")
 
 
 @pytest.mark.parametrize("how", FAILING)
