@@ -30,7 +30,8 @@ def test_sag_converges_from_above():
         return simulate_at(compile_shot(shot.character, at_rest, bodies), options, 1.0 / 480.0).positions[-1, 0, 2]
 
     heights = [height(part * shot.tolerance) for part in (1.0, 0.1, 1.0 / 30.0)]
-    assert heights[0] == pytest.approx(-0.0538, abs=1.5e-4)
+    # with finer elements they hang 54.33 mm; 0.6% are estimated
+    assert heights[0] == pytest.approx(-0.0540, abs=1.5e-4)
     assert np.all(np.diff(heights) < 1e-7)
     assert np.ptp(heights) < 3e-5
 
