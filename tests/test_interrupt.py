@@ -31,7 +31,7 @@ sys.exit(main())
 
 
 def command(repository, layer, waits):
-    shot = repository / "samples" / "lamp" / "lamp.usda"
+    shot = repository / "samples" / "bartender" / "bartender.usda"
     program = ["-c", WAITING] if waits else ["-m", "calmotion"]
     return [sys.executable, *program, "optimize", str(shot), "-o", str(layer), "--json", *OPTIONS]
 
@@ -71,8 +71,7 @@ def test_a_signal_writes_the_best_so_far_and_the_same_command_resumes(repository
     out, _ = process.communicate(timeout=600)
     late = json.loads(out)
     assert process.returncode == 0 and not late["interrupted"] and late["stopped"] == "converged"
-    # changes that gain nothing are taken back at the end
-    assert late["objective_after"] <= 1.01 * early["objective_after"]
+    assert late["objective_after"] <= early["objective_after"]
     assert not kept(layer).exists()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["calm.usda", "calm_root.usda"]
 

@@ -100,10 +100,8 @@ def honesty(rows: Sequence[LevelRow]) -> str:
     ratios = [row.off / row.claimed for row in rows if row.taken > 0.0 and not np.isnan(row.off)]
     if not ratios:
         return "no mesh has been extrapolated"
-    parts = [f"{np.quantile(ratios, q):.2f} for {100.0 * q:.0f}%" for q in _QUANTILES]
-    return f"largest error of three frequencies over what is claimed, of {len(ratios)} meshes: at most " + ", ".join(
-        parts
-    )
+    parts = ", ".join(f"{np.quantile(ratios, q):.2f} for {100.0 * q:.0f}%" for q in _QUANTILES)
+    return f"largest error of three frequencies over what is claimed, of {len(ratios)} meshes: at most {parts}"
 
 
 HEADS = ("link", "nodes", "f1, f2, f3 Hz", "estimate %", "taken %", "claimed %", "off %")

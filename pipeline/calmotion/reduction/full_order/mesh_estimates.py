@@ -91,14 +91,13 @@ def _clamped_nodes(
     assert body.flexible is not None
     if carrier is None:
         return None
-    own = [k for k, one in enumerate(attachments) if one.kind == "interface" and _together(one.frame, carrier)]
-    joints = attachments if own else [AttachmentFrame(body.path, carrier, "interface")]
+    at = carrier.position
+    own = next(
+        (k for k, a in enumerate(attachments) if a.kind == "interface" and np.array_equal(a.frame.position, at)), None
+    )
+    joints = [AttachmentFrame(body.path, carrier, "interface")] if own is None else attachments
     try:
         patches = interface_patches(mesh, joints, body.flexible.interface_radius, body.path, cut)
     except ShotError:
         return None  # the reduction reports the error with the joint
-    return next(patch.nodes for patch in patches if (own or [0])[0] in patch.attachments)
-
-
-def _together(one: Frame, other: Frame) -> bool:
-    return bool(np.array_equal(one.position, other.position))
+    return next(patch.nodes for patch in patches if (own or 0) in patch.attachments)
