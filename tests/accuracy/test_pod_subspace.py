@@ -8,6 +8,7 @@ from calmotion.accuracy import pod_subspace
 from calmotion.accuracy.integrator_choice import FAST
 from calmotion.accuracy.pod_subspace import ProjectedShot, project_to_subspace, reference_run
 from calmotion.accuracy.step_error import distance, simulate_at
+from calmotion.errors import ShotError
 from calmotion.shot import Track
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import with_elasticity
@@ -77,6 +78,46 @@ def test_a_pod_subspace_is_extended_by_curves_that_deflect_bodies_differently(no
     for tracks in (swing, lift):
         assert off(nonlinear, found.shot, tracks, STEP) <= ALLOWED
     assert found.is_accurate_for(found.complete_run(lift, STEP)) and 0.0 < found.error_m <= ALLOWED
+
+
+def trials(monkeypatch, fails=lambda shot, divides: False):
+    """Coordinates and division of steps of each simulation that is tried; those that are to fail do."""
+    tried, plain = [], pod_subspace.simulate_at
+
+    def simulated(shot, options, step, elastic=False, divides=True):
+        tried.append((count(shot.bodies), divides))
+        if fails(shot, divides):
+            raise ShotError("a step cannot be solved")
+        return plain(shot, options, step, elastic, divides)
+
+    monkeypatch.setattr(pod_subspace, "simulate_at", simulated)
+    return tried
+
+
+def test_subspaces_that_do_not_do_for_one_motion_are_not_tried_for_more(nonlinear, animation, known, monkeypatch):
+    found = held(nonlinear, known)
+    fewest = count(found.shot.bodies)
+    faster = reference_run(
+        nonlinear.with_tracks([Track(track.times, 2.0 * track.values) for track in animation.current]),
+        RunSettings(), STEP,
+    )  # fmt: skip
+    tried = trials(monkeypatch)
+    assert not found.is_accurate_for(faster)
+    assert all(sum(coordinates) >= sum(fewest) for coordinates, _ in tried)
+    sizes = [coordinates for coordinates, _ in tried[1:]]
+    assert sizes[-2:] == [count(found.shot.bodies)] * 2, "the last one does for both motions"
+    assert all(sizes.count(size) <= 2 for size in sizes), "and no size is tried again"
+
+
+def test_steps_of_bodies_in_few_directions_are_not_divided_unless_none_does_without(nonlinear, known, monkeypatch):
+    fewest = count(held(nonlinear, known).shot.bodies)
+    tried = trials(monkeypatch)
+    assert count(held(nonlinear, known).shot.bodies) == fewest
+    assert tried and not any(divides for _, divides in tried)
+    monkeypatch.undo()
+    tried = trials(monkeypatch, lambda shot, divides: not divides)
+    assert count(held(nonlinear, known).shot.bodies) == fewest
+    assert tried[0][0] == next(coordinates for coordinates, divides in tried if divides), "all of them once more"
 
 
 def test_linear_bodies_and_those_of_the_users_choice_keep_theirs(arm, nonlinear, bodies, animation, known):

@@ -11,7 +11,7 @@ import pytest
 from calmotion.usd.reading import read_shot
 from calmotion.usd.validation import validate_shot
 from pxr import Gf, Usd, UsdGeom, UsdPhysics
-from sample_recordings import check_recording
+from sample_recordings import check_recording, check_written_curves
 from sample_shots import FIGURE, KINDS, SAMPLES, path_of
 
 each_sample = pytest.mark.parametrize("name", KINDS)
@@ -176,12 +176,16 @@ def test_the_shake_falls_and_a_simulation_of_what_was_written_agrees(
     told = json.loads(run.stdout)
     again = calmotion("simulate", told["root_layer"], "--json")
     assert again.returncode == 0, again.stdout + again.stderr
-    measured = {row["path"]: row["max_error_m"] for row in json.loads(again.stdout)["targets"]}
+    simulated = json.loads(again.stdout)
+    measured = {row["path"]: row["max_error_m"] for row in simulated["targets"]}
+    # both choose their steps and meshes for the tolerance
+    either = told["estimated_error_m"] + simulated["estimated_error_m"]
     for row in told["targets"]:
         if row["path"].rpartition("/")[2] in mains:
             assert row["max_error_before_m"] > 0.02, "the input should shake visibly"
             assert fold * measured[row["path"]] < row["max_error_before_m"]
-        assert measured[row["path"]] == pytest.approx(row["max_error_after_m"], rel=1e-3, abs=1e-6)
+        assert abs(measured[row["path"]] - row["max_error_after_m"]) < either
+    check_written_curves(told["root_layer"], table)
     assert not [limit for limit in told["limits"] if limit["exceeded"]]
     check_recording(recording, table, path_of(name), "optimized")
     assert untouched <= {row["path"].rpartition("/")[2] for row in told["motors"] if row["max_offset_rad"] == 0.0}

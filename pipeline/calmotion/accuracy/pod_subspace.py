@@ -65,7 +65,7 @@ class ProjectedShot:
         self._complete, self._options = complete, options
         self._allowed, self._known = allowed, list(known)
         self._chosen = _candidates(complete, options)
-        self.shot, self.error_m, self._missing = complete, 0.0, 0.0
+        self.shot, self.error_m, self._missing = complete, 0.0, MISSING[0]
         if self._chosen:
             self._project()
 
@@ -109,23 +109,42 @@ class ProjectedShot:
         return few
 
     def _project(self) -> None:
-        complete = self._complete
-        for missing in MISSING:
-            few = self._few(missing)
-            shot = complete.with_bodies(few)
-            off = [self._off(shot, item) for item in self._known]
-            forced = self._options.directions == OFF and all(map(np.isfinite, off))
-            if forced or all(error <= self._allowed(item) for error, item in zip(off, self._known, strict=True)):
-                self.error_m, self._missing = max(off), missing
-                self.shot = complete.with_bodies(_told(complete.character, complete.bodies, few, self.error_m))
-                return
-        self.shot, self.error_m = complete, 0.0
+        # bodies in too few directions hardly move, and to divide their steps would take longer than all else
+        if not self._projected(divides=False) and not self._projected(divides=True):
+            self.shot, self.error_m = self._complete, 0.0
 
-    def _off(self, shot: CompiledShot, known: ReferenceRun) -> float:
+    def _projected(self, divides: bool) -> bool:
+        """Whether any of the subspaces is accurate; then the shot has it."""
+        complete, counts = self._complete, list[int]()
+        for missing in MISSING:
+            if missing > self._missing:  # it did not do for fewer known simulations
+                continue
+            few, last = self._few(missing), counts
+            counts = [len(body.stiffness) for body in few]
+            if counts == last:
+                continue
+            error = self._largest_off(complete.with_bodies(few), divides)
+            if np.isfinite(error):
+                self.error_m, self._missing = error, missing
+                self.shot = complete.with_bodies(_told(complete.character, complete.bodies, few, error))
+                return True
+        return False
+
+    def _largest_off(self, shot: CompiledShot, divides: bool) -> float:
+        """Largest distance of a target from any known simulation [m]; infinite where it is more than allowed."""
+        largest = 0.0
+        for item in self._known:
+            off = self._off(shot, item, divides)
+            if not np.isfinite(off) or (off > self._allowed(item) and self._options.directions != OFF):
+                return np.inf
+            largest = max(largest, off)
+        return largest
+
+    def _off(self, shot: CompiledShot, known: ReferenceRun, divides: bool = True) -> float:
         """Largest distance of a target from a known simulation, with the same step and integrator [m]."""
         options = replace(self._options, integrator=known.run.integrator or self._options.integrator)
         try:
-            run = simulate_at(shot.with_tracks(known.animation.current), options, known.run.step)
+            run = simulate_at(shot.with_tracks(known.animation.current), options, known.run.step, divides=divides)
         except ShotError:  # with too few coordinates a body may not even find its equilibrium
             return np.inf
         return distance(run.positions, known.run.positions)
@@ -149,10 +168,10 @@ class ProjectedShot:
         if more is None:
             return True
         off = self._off(self.shot, more)
+        self._known.append(more)
         if off <= self._allowed(more) or self._options.directions == OFF:
             self.error_m = off
             return True
-        self._known.append(more)
         self._project()
         return False
 

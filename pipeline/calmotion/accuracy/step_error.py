@@ -60,12 +60,15 @@ def order_of(character: Character) -> int:
     return ORDER_AT_IMPACTS if switched else ORDER
 
 
-def simulate_at(shot: CompiledShot, options: RunSettings, step: float, elastic: bool = False) -> StepRun:
+def simulate_at(
+    shot: CompiledShot, options: RunSettings, step: float, elastic: bool = False, divides: bool = True
+) -> StepRun:
     """One simulation of a shot's current curves.
 
     Args:
         step: [s].
         elastic: Whether the elastic coordinates are wanted.
+        divides: Whether a step that cannot be solved is divided into smaller ones, where the shot does not loop.
 
     Raises:
         ShotError: The shot cannot be simulated by this step.
@@ -79,7 +82,9 @@ def simulate_at(shot: CompiledShot, options: RunSettings, step: float, elastic: 
         if steady is not None:
             whole = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.scheme, steady)
             return _at_frames(prepared, [(slice(0, len(angles)), whole)], options.scheme, elastic)
-        pieces = run_in_pieces(model, workspace, angles, rates, grid.h, prepared.world, options.scheme, AT_ONCE)
+        pieces = run_in_pieces(
+            model, workspace, angles, rates, grid.h, prepared.world, options.scheme, AT_ONCE, divides
+        )
         return _at_frames(prepared, pieces, options.scheme, elastic)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure

@@ -96,8 +96,6 @@ def optimize_to_tolerance(
         step, _ = largest_step(trial, FIRST, LAST, lambda run: max(enough, FIRST_STEP * shake(run)))
     result, tracks, searches = None, animation.current, SuccessiveSearches(progress)
     for number in range(MOST):
-        if number:
-            memory.search = None  # a search that goes on from a checkpoint is to find the same
         reduced = projected.shot.with_tracks(tracks)
         of_step = replace(options, step=step) if chooses else options
         try:
@@ -109,12 +107,16 @@ def optimize_to_tolerance(
             tracks = found_tracks(result, animation)
             iterations = max((row.iterations for row in latest.windows), default=latest.iterations)
             ended = iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
-            result, complete = _with_accuracy(result, reduced, projected, tracks, options, not again and not ended)
+            unknown = not again and not number and not ended  # later searches end near the motion of the first
+            result, complete = _with_accuracy(result, reduced, projected, tracks, options, unknown)
             accuracy = result.accuracy
             assert accuracy is not None
             allowed = allowed_step_error(character, options, besides_step(accuracy)) if chooses else np.inf
             fine = accuracy.step_m <= allowed or step <= LAST
-            if fine and (ended or _is_accurate(projected, tracks, result, options, complete)):
+            accurate = ended or (
+                (fine or complete is not None) and _is_accurate(projected, tracks, result, options, complete)
+            )
+            if fine and accurate:
                 if again and not number:
                     memory.taken += [SUBSPACES, *([TIME_STEP] if chooses and memory.step else [])]
                 memory.projected, memory.step = projected, result.step_s
@@ -176,7 +178,7 @@ def _is_accurate(
     """Whether the subspaces do for the curves that were found; if not, they are chosen anew.
 
     Args:
-        complete: The curves with all coordinates; None where the subspaces are those of almost the same shot: then
+        complete: The curves with all coordinates; None where the subspaces are those of almost the same motion: then
             more directions tell, and all of them only where these do not do.
     """
     if complete is None:

@@ -77,13 +77,14 @@ def run_forward(
 
 def run_in_pieces(
     model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, world: Array | None,
-    integrator: str, size: int,
+    integrator: str, size: int, divides: bool = True,
 ) -> Iterator[tuple[slice, ForwardRun]]:  # fmt: skip
     """`run_forward` from rest, to the last bit, of which only a piece is held at once.
 
     Args:
         workspace: Nobody else may use it before the last piece.
         size: Largest number of instants of a piece.
+        divides: Whether a step that Newton's method cannot solve is divided into smaller ones.
 
     Yields:
         The instants of a piece, and the run over them.
@@ -91,7 +92,7 @@ def run_in_pieces(
     joint_angles, joint_rates = followed(model, angles, rates, h, False)
     start = rigid_state(model, start_angles(model, joint_angles[0]), None if world is None else world[0])
     pieces = integrate_in_pieces(
-        model.system, start, joint_angles, joint_rates, h, workspace, integrator, world, size
+        model.system, start, joint_angles, joint_rates, h, workspace, integrator, world, size, divides
     )  # fmt: skip
     for rows, trajectory in pieces:
         states = trajectory.states

@@ -21,6 +21,15 @@ def agree(columns, entity, times, values):
     np.testing.assert_allclose(np.ravel(scalars), values, rtol=1e-9, atol=1e-9)
 
 
+def check_written_curves(root_layer, table):
+    """The motor curves of a written layer against those that the run simulated last, which its table holds."""
+    (character, animation, _), table = read_shot(str(root_layer)), table_of(table)
+    for motor, track in zip(character.motors, animation.current, strict=True):
+        steps = np.searchsorted(table["time_s"], track.times - 1e-9)
+        np.testing.assert_allclose(table["time_s"][steps], track.times, atol=1e-9)
+        np.testing.assert_allclose(track.values, table[f"{motor.path}.output"][steps], atol=1e-6)
+
+
 def check_recording(recording, table, shot, root):
     """The recording against the table of its run: `root` is the motion that the table holds."""
     columns, table = read_recording(recording), table_of(table)

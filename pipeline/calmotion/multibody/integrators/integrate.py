@@ -36,7 +36,7 @@ def follows_roots(integrator: str) -> bool:
 def integrate(
     system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace,
     progress: Callable[[float], None] | None = None, from_equilibrium: bool = True, integrator: str = "bdf2",
-    world: Array | None = None,
+    world: Array | None = None, divides: bool = True,
 ) -> Trajectory:  # fmt: skip
     """`simulation.simulate` by any integrator of `INTEGRATORS`; same arguments, results and errors.
 
@@ -52,7 +52,9 @@ def integrate(
         )
     if integrator in IMPLICIT:
         try:
-            return simulate(system, start, angles, rates, h, workspace, progress, from_equilibrium, integrator, world)
+            return simulate(
+                system, start, angles, rates, h, workspace, progress, from_equilibrium, integrator, world, divides
+            )
         except ZeroDivisionError:  # of a kernel, whose numbers have left all bounds: it does not tell where
             raise SimulationFailure(float("nan"), 0, Reason.DIVERGED) from None
     if np.any(system.moving >= 0):

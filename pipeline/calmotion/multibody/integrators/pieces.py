@@ -24,7 +24,7 @@ NEEDED = 2  # instants before a step that its formulas read; what else they reme
 
 def integrate_in_pieces(
     system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace, integrator: str,
-    world: Array | None, size: int,
+    world: Array | None, size: int, divides: bool = True,
 ) -> Iterator[tuple[slice, Trajectory]]:  # fmt: skip
     """`integrate` from static equilibrium, to the last bit, piece by piece.
 
@@ -33,6 +33,7 @@ def integrate_in_pieces(
     Args:
         workspace: Nobody else may use it before the last piece.
         size: Largest number of instants of a piece; at least three.
+        divides: As of `integrate`.
 
     Yields:
         The instants of a piece, and their trajectory.
@@ -48,19 +49,19 @@ def integrate_in_pieces(
     first = slice(0, done)
     piece = integrate(
         system, start, angles[first], rates[first], h, workspace, integrator=integrator,
-        world=None if world is None else world[first],
+        world=None if world is None else world[first], divides=divides,
     )  # fmt: skip
     yield first, piece
     roots = rooted(world, total)
     while done < total:
         stop = min(done + size, total)
         rows = slice(done - NEEDED, stop)
-        piece = _gone_on(system, piece, Inputs(angles[rows], rates[rows], roots[rows]), workspace, done)
+        piece = _gone_on(system, piece, Inputs(angles[rows], rates[rows], roots[rows]), workspace, done, divides)
         yield slice(done, stop), piece
         done = stop
 
 
-def _gone_on(system: System, before: Trajectory, inputs: Inputs, ws: Workspace, done: int) -> Trajectory:
+def _gone_on(system: System, before: Trajectory, inputs: Inputs, ws: Workspace, done: int, divides: bool) -> Trajectory:
     """The piece after another one.
 
     Args:
@@ -73,7 +74,7 @@ def _gone_on(system: System, before: Trajectory, inputs: Inputs, ws: Workspace, 
         part[:NEEDED] = known[-NEEDED:]
     record = Record(copy_of_instant(states, 0), states, np.zeros(count), np.zeros((count, 3)))
     try:
-        found = march(system, before.integrator, before.h, NEEDED, inputs, record, ws, begin)
+        found = march(system, before.integrator, before.h, NEEDED, inputs, record, ws, begin, divides=divides)
     except SimulationFailure as failure:
         failure.time_s += (done - NEEDED) * before.h
         raise

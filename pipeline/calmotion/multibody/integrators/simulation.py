@@ -88,11 +88,9 @@ def _recall(system: System, h: float, record: Record, n: int, scratch: Scratch) 
 def simulate(
     system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace,
     progress: Callable[[float], None] | None = None, from_equilibrium: bool = True, integrator: str = "bdf2",
-    world: Array | None = None,
+    world: Array | None = None, divides: bool = True,
 ) -> Trajectory:  # fmt: skip
     """Simulate the system from static equilibrium, or from a state that is given.
-
-    A step that Newton's method cannot solve is divided into smaller ones (`refinement`).
 
     Args:
         system: The compiled system.
@@ -104,6 +102,7 @@ def simulate(
         from_equilibrium: False starts from `start`, with its velocities, in place of the equilibrium.
         integrator: A name of `coefficients.IMPLICIT`.
         world: Moving markers of the world, shape [T, W, 18]; needed where the system has any.
+        divides: Whether a step that Newton's method cannot solve is divided into smaller ones (`refinement`).
 
     Returns:
         The trajectory, T instants.
@@ -132,7 +131,7 @@ def simulate(
     margins, costs = np.zeros(total), np.zeros((total, 3))
     costs[0, 0] = solved
     inputs, record = Inputs(angles, rates, world), Record(earlier, states, margins, costs)
-    return march(system, integrator, h, 1, inputs, record, ws, begin, progress)
+    return march(system, integrator, h, 1, inputs, record, ws, begin, progress, divides=divides)
 
 
 def simulate_on(
@@ -192,13 +191,14 @@ def simulate_from(
 
 def march(
     system: System, integrator: str, h: float, done: int, inputs: Inputs, record: Record, ws: Workspace, begin: float,
-    progress: Callable[[float], None] | None = None, refined: Sequence[int] = (),
+    progress: Callable[[float], None] | None = None, refined: Sequence[int] = (), divides: bool = True,
 ) -> Trajectory:  # fmt: skip
     """All steps from instant `done` on, into the record, with what the workspace remembers of those before.
 
     Args:
         begin: Time when the simulation was started [s].
         refined: Those before `done`.
+        divides: As of `simulate`.
     """
     total, all_refined = len(inputs.angles), list(refined)
     chunk = total if progress is None else max(1, total // 50)
@@ -208,7 +208,7 @@ def march(
             if phase.restarts:
                 _restart(phase._replace(first=first, last=last), h, inputs, record, ws)
             else:
-                _steps(phase._replace(first=first, last=last), integrator, h, inputs, record, ws, all_refined)
+                _steps(phase._replace(first=first, last=last), integrator, h, inputs, record, ws, all_refined, divides)
             if progress is not None:
                 progress(last / total)
     solved, factorisations = (int(cost) for cost in record.costs[:, :2].sum(axis=0))
@@ -219,8 +219,9 @@ def march(
 
 
 def _steps(
-    phase: Phase, integrator: str, h: float, inputs: Inputs, record: Record, ws: Workspace, refined: list[int]
-) -> None:
+    phase: Phase, integrator: str, h: float, inputs: Inputs, record: Record, ws: Workspace, refined: list[int],
+    divides: bool,
+) -> None:  # fmt: skip
     """The steps of a phase, into the record; adds those that were refined.
 
     Raises:
@@ -239,7 +240,7 @@ def _steps(
             continue
         reason = Reason.SINGULAR if code == newton.SINGULAR else Reason.DIVERGED
         try:
-            exact = refined_step(system, integrator, h, done, inputs, record, ws)
+            exact = refined_step(system, integrator, h, done, inputs, record, ws) if divides else None
         except ZeroDivisionError:
             exact = None
         if exact is None:
