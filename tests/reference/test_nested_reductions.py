@@ -37,10 +37,12 @@ def test_sag_converges_from_above():
 
 
 def test_stiff_modes_that_bending_moves_do_not_hide_the_derivatives_of_bending():
-    """The soft linkage is off by 226.2 to 226.9 mm in reductions to a third, a tenth and a hundredth of its tolerance.
+    """The soft linkage is off by 228.3 to 228.8 mm in reductions to a third, a tenth and a hundredth of its tolerance.
 
-    By the larger of the two weights of derivatives alone, the first reduction was off by 170 mm.
+    By the larger of the two weights of derivatives alone, the first reduction was off by 170 mm. Elements of a quarter
+    of the length are off by 230.1 mm; by rules of eleven points in place of four these are, too, and the coarse ones by
+    226.8 mm.
     """
     shot, options = load("soft-linkage").compiled, RunSettings(step=1.0 / 480.0)
     off = simulate_at(shot, options, options.step).positions - intended_positions(shot, options)
-    assert np.linalg.norm(off, axis=2).max() == pytest.approx(0.2266, abs=2e-3)
+    assert np.linalg.norm(off, axis=2).max() == pytest.approx(0.2288, abs=2e-3)

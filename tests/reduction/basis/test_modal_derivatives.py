@@ -7,7 +7,7 @@ from calmotion.reduction.basis.craig_bampton import reduced_basis
 from calmotion.reduction.basis.modal_derivatives import Support, extended_basis, modal_derivatives
 from calmotion.reduction.basis.natural_modes import vector_mass
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, strain_gram
+from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, strain_gram
 from calmotion.reduction.material_laws.reduced_poses import equilibrium
 from calmotion.shot import FlexibleSettings
 
@@ -75,7 +75,7 @@ def test_without_them_the_arm_locks_and_with_them_it_does_not(arm):
     force = 10.27  # 30.8 mm of a linear beam
     deflections = []
     for candidate in (basis, extended_basis(model, support, basis, 6, material, "stvk")):
-        gram = strain_gram(GradientRule(model.mesh, 4), candidate.modes, *lame)
+        gram = strain_gram(GradientRule(model.mesh, LAW_ORDER), candidate.modes, *lame)
         u = equilibrium(gram, force * candidate.patch_motion[0, 2], np.zeros(len(candidate.omega_squared)), steps=6)
         deflections.append(candidate.patch_motion[0, :3] @ u)
     assert deflections[0][2] < 0.4 * deflections[1][2]

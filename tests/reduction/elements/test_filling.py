@@ -6,7 +6,7 @@ import trimesh
 from calmotion.reduction.damping import ratio_of_parts
 from calmotion.reduction.discretization_error import clamped_modes, frequency_errors
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, strain_gram
+from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, strain_gram
 from calmotion.shot.character import ElasticMaterial
 from calmotion.shot.materials.parts import Part
 from calmotion.shot.materials.printed import Core, core_of
@@ -70,7 +70,7 @@ def test_energies_of_large_deflections_begin_with_the_stiffness(helpers):
     core = core_of(0.3, 1.2e-3)
     model = assemble(np.asarray(points), tets, material(core))
     modes = np.random.default_rng(4).normal(size=(len(model.mesh.nodes), 3, 2))
-    gram = strain_gram(GradientRule(model.mesh, 4), modes, *lame_constants(MODULUS, 0.3))
+    gram = strain_gram(GradientRule(model.mesh, LAW_ORDER), modes, *lame_constants(MODULUS, 0.3))
     flat = modes.reshape(-1, 2)
     assert gram[:2, :2] == pytest.approx(flat.T @ (model.stiffness @ flat), rel=1e-9)
     assert np.linalg.eigvalsh(gram).min() > -1e-9 * np.linalg.eigvalsh(gram).max()

@@ -23,7 +23,7 @@ from calmotion.reduction.basis.craig_bampton import Basis, mode_signs
 from calmotion.reduction.basis.fixed_interface import FixedInterface
 from calmotion.reduction.basis.natural_modes import vector_mass
 from calmotion.reduction.elements.assembly import FEModel
-from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, second_order_force
+from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, second_order_force
 from calmotion.reduction.interfaces.patch_rotation import (
     shape_changes,
     spring_rows,
@@ -106,7 +106,7 @@ def modal_derivatives(
     nodes = model.mesh.nodes
     n, p = len(nodes), len(support.patches)
     lame, mu = lame_constants(material.youngs_modulus, material.poissons_ratio)
-    rule = GradientRule(model.mesh, 3)  # products of three gradients are cubic
+    rule = GradientRule(model.mesh, LAW_ORDER)
     gradients = rule.gradients(np.ascontiguousarray(basis.modes[:, :, :count]))
     first, second = np.triu_indices(count)
     pairs = len(first)

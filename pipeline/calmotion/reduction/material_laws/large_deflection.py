@@ -11,7 +11,7 @@ from calmotion.reduction.basis.craig_bampton import Basis
 from calmotion.reduction.basis.modal_derivatives import NEGLIGIBLE, Support, extended_basis
 from calmotion.reduction.basis.quadratic_strain_subspace import QuadraticStrainSubspace, quadratic_strain_subspace
 from calmotion.reduction.elements.assembly import FEModel
-from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, strain_gram
+from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, strain_gram
 from calmotion.reduction.interfaces.patch_rotation import spring_rows, springs, stiffer
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import work_of_loads
@@ -74,7 +74,7 @@ def _stvk(
     """The law in a basis, with the penalty springs of its patches; quadratic strain in a subspace, or in all of it."""
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
     directions = None if subspace is None else subspace.basis
-    gram = strain_gram(GradientRule(model.mesh, 4), basis.modes, *lame, directions)
+    gram = strain_gram(GradientRule(model.mesh, LAW_ORDER), basis.modes, *lame, directions)
     if basis.patch_squares is not None:
         roots = springs(model.mesh.nodes, support.patches, material.youngs_modulus, stiff)
         rows = spring_rows(roots, basis.patch_squares, basis.patch_motion[:, 3:], directions)
