@@ -11,6 +11,7 @@ import threading
 import time
 
 import pytest
+from small_shots import FORE, make_flexible, make_target, write_arm
 
 fcntl, termios = pytest.importorskip("fcntl"), pytest.importorskip("termios")
 
@@ -30,17 +31,27 @@ sys.exit(main())
 """
 
 
-def command(repository, layer, waits):
-    shot = repository / "samples" / "bartender" / "bartender.usda"
+@pytest.fixture
+def shot(tmp_path_factory):
+    """An arm so soft that its search has work left after its first checkpoint."""
+
+    def soften(stage):
+        make_flexible(stage, FORE, youngsModulus=3e7)
+        make_target(stage)
+
+    return write_arm(tmp_path_factory.mktemp("shot") / "arm.usda", soften)
+
+
+def command(shot, layer, waits):
     program = ["-c", WAITING] if waits else ["-m", "calmotion"]
     return [sys.executable, *program, "optimize", str(shot), "-o", str(layer), "--json", *OPTIONS]
 
 
-def started(repository, layer, waits=False):
+def started(repository, shot, layer, waits=False):
     environment = os.environ | {"PYTHONPATH": str(repository / "pipeline")}
     # a shell that runs the tests in the background ignores interrupts, and so would its children
     return subprocess.Popen(
-        command(repository, layer, waits),
+        command(shot, layer, waits),
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -54,9 +65,11 @@ def kept(layer):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
-def test_a_signal_writes_the_best_so_far_and_the_same_command_resumes(repository, tmp_path, number):
+def test_a_signal_writes_the_best_so_far_and_the_same_command_resumes(
+    calmotion, repository, shot, tmp_path_factory, tmp_path, number
+):
     layer = tmp_path / "calm.usda"
-    process = started(repository, layer, waits=True)
+    process = started(repository, shot, layer, waits=True)
     while not kept(layer).exists() and process.poll() is None:
         time.sleep(0.01)
     process.send_signal(number)
@@ -67,11 +80,13 @@ def test_a_signal_writes_the_best_so_far_and_the_same_command_resumes(repository
     assert early["objective_after"] < early["objective_before"]
     if number != signal.SIGINT:
         return
-    process = started(repository, layer)
-    out, _ = process.communicate(timeout=600)
-    late = json.loads(out)
-    assert process.returncode == 0 and not late["interrupted"] and late["stopped"] == "converged"
-    assert late["objective_after"] <= early["objective_after"]
+    done = calmotion("optimize", shot, "-o", layer, "--json", *OPTIONS)
+    late = json.loads(done.stdout)
+    assert done.returncode == 0 and not late["interrupted"] and late["stopped"] == "converged"
+    assert late["resumed_iterations"] == early["iterations"] and late["objective_after"] < early["objective_after"]
+    whole = tmp_path_factory.mktemp("whole") / "calm.usda"
+    expected = json.loads(calmotion("optimize", shot, "-o", whole, "--json", *OPTIONS).stdout)
+    assert late["objective_after"] == pytest.approx(expected["objective_after"], rel=1e-9)
     assert not kept(layer).exists()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["calm.usda", "calm_root.usda"]
 
@@ -144,11 +159,11 @@ def take_terminal():
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no pseudo terminals")
-def test_a_closed_terminal_writes_the_best_so_far(repository, tmp_path):
+def test_a_closed_terminal_writes_the_best_so_far(repository, shot, tmp_path):
     layer = tmp_path / "calm.usda"
     environment = os.environ | {"PYTHONPATH": str(repository / "pipeline")}
     ours, theirs = os.openpty()
-    line = [arg for arg in command(repository, layer, waits=True) if arg != "--json"]
+    line = [arg for arg in command(shot, layer, waits=True) if arg != "--json"]
     process = subprocess.Popen(
         line,
         env=environment,
@@ -178,18 +193,19 @@ def drain(descriptor):
 
 @pytest.mark.long
 def test_killed_at_any_moment_it_ends_at_the_same_result(repository, tmp_path):
-    whole = started(repository, tmp_path / "whole.usda")
+    shot = repository / "samples" / "bartender" / "bartender.usda"
+    whole = started(repository, shot, tmp_path / "whole.usda")
     begin = time.monotonic()
     expected = json.loads(whole.communicate(timeout=600)[0])
     seconds = time.monotonic() - begin
     rng = random.Random(0)
     layer = tmp_path / "calm.usda"
     for _ in range(20):
-        process = started(repository, layer)
+        process = started(repository, shot, layer)
         time.sleep(rng.uniform(0.0, seconds))
         process.kill()
         process.communicate()
-        process = started(repository, layer)
+        process = started(repository, shot, layer)
         found = json.loads(process.communicate(timeout=600)[0])
         assert process.returncode == 0
         assert found["objective_after"] == pytest.approx(expected["objective_after"], rel=1e-9)
