@@ -1,11 +1,11 @@
 """Every command on a terminal of 80 columns: lines are short, names are whole."""
 
-import json
 import tempfile
 
 import pytest
 from calmotion.cli.commands.setup.bench import BENCHMARKS
 from calmotion.support.naming import distinct_names
+from calmotion.usd.reading import read_shot
 from one_hinge import ONE_HINGE
 
 WIDTH = 80
@@ -57,20 +57,20 @@ def test_help_of_a_benchmark(name, monkeypatch, capsys):
     check(capsys.readouterr().out.splitlines())
 
 
-def inspected(lines_of, calmotion, shot):
-    report = json.loads(calmotion("inspect", shot, "--json").stdout)
+def inspected(lines_of, shot):
+    character, _, _ = read_shot(str(shot), still=True)
     lines = lines_of("inspect", shot)
-    for kind in ("bodies", "joints", "motors", "targets"):
-        check(lines, [row["path"] for row in report[kind]])
+    for items in (character.bodies, character.joints, character.motors, character.targets):
+        check(lines, [item.path for item in items])
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_the_content_of_a_real_robot(lines_of, calmotion, shared_data, robot):
-    inspected(lines_of, calmotion, shared_data / robot)
+def test_the_content_of_a_real_robot(lines_of, shared_data, robot):
+    inspected(lines_of, shared_data / robot)
 
 
-def test_the_content_of_a_sample(lines_of, calmotion, repository):
-    inspected(lines_of, calmotion, repository / "samples" / "bartender" / "bartender.usda")
+def test_the_content_of_a_sample(lines_of, repository):
+    inspected(lines_of, repository / "samples" / "bartender" / "bartender.usda")
 
 
 def test_the_report_of_a_simulation(lines_of, tmp_path):
