@@ -18,7 +18,7 @@ from calmotion.simulation.body_reduction import load_envelopes
 from calmotion.simulation.compiled_shot import compile_shot
 from posed import ignore_progress
 
-FAST = RunSettings(step=1 / 240)
+FAST = RunSettings(step=1 / 120)
 
 
 @pytest.fixture(scope="module")
