@@ -81,10 +81,10 @@ def test_gradient_matches_central_differences_of_the_whole_simulation(linearized
 
         # terms of limits have corners in their second derivative, so a step that crosses none of them must be found
         steps = (1e-4,) if problem.limits is None else (3e-4, 1e-4, 3e-5, 1e-5)
-        found = [(4.0 * difference(e) - difference(2 * e)) / 3.0 for e in steps]
+        found = ((4.0 * difference(e) - difference(2 * e)) / 3.0 for e in steps)
         # efforts come out of Newton's method with fewer digits than motions, those of loops with fewer still
         accuracy = 1e-7 if problem.limits is None else 2e-6 if problem.grid.cyclic else 1e-6
-        assert min(abs(gradient @ d - value) / abs(value) for value in found) < accuracy
+        assert any(abs(gradient @ d - value) / abs(value) < accuracy for value in found)
 
 
 def test_product_is_symmetric_and_follows_the_change_of_the_residuals(linearized):
