@@ -25,7 +25,10 @@ def bracket_surface(mirrored=False):
 
 
 def test_the_mirror_image_of_a_link_is_meshed_once(host, package, monkeypatch):
-    made = package("body_mesh")
+    made, accuracy = package("body_mesh"), package("accuracy")
+    # a twentieth of the nodes: the meshes are refined as usual, and less far
+    for name, nodes in (("_REFINED", 600), ("_POOR_REFINED", (2_000, 3_000)), ("_KEPT", 1_100)):
+        monkeypatch.setattr(accuracy, name, nodes)
     fill, count = made.filled, []
 
     def counted(*arguments):
