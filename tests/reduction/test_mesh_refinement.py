@@ -106,7 +106,7 @@ def test_modes_that_one_factor_does_not_serve_keep_finer_elements(helpers, beam,
 def test_a_bisection_that_would_be_too_many_nodes_is_smaller(helpers, beam, frames):
     coarse, carrier = mesh_of(helpers, (6, 1, 1)), frames[1].frame
     nodes = []
-    for most in range(500, 1_500, 125):
+    for most in range(600, 1_800, 150):
         fine = refined_for_frequencies(coarse, beam, carrier, Effort(0.0, 0, 0.0, most))
         nodes.append(frequency_estimate(fine, beam, carrier).nodes)
         assert 0.6 * most < nodes[-1] <= most

@@ -6,7 +6,6 @@ import json
 
 import pytest
 
-
 LAYER = """#usda 1.0
 (
     subLayers = [@{shot}@]
