@@ -7,7 +7,7 @@ import csv
 import numpy as np
 import pytest
 from calmotion.benchmarks.links import meshing
-from calmotion.benchmarks.scenes.links import read_links
+from calmotion.benchmarks.scenes.links import links_of_all, read_links
 from calmotion.errors import ShotError
 from small_shots import ELBOW, FORE, LENGTH, UPPER, WIDTH, write_arm
 
@@ -26,6 +26,10 @@ def test_links_are_named_by_path_or_name_or_taken_all(shot):
     assert {link.name for link in read_links(str(shot))} >= {"upper", "fore"}
     with pytest.raises(ShotError, match="no such link"):
         read_links(f"{shot}:foot")
+    told = []
+    found = links_of_all([f"{shot}:foot", f"{shot}:fore"], told.append)
+    assert [(source, link.body.path) for source, link in found] == [(f"{shot}:fore", FORE)]
+    assert len(told) == 1 and "no such link" in told[0], "one that is not there does not keep the others away"
 
 
 @pytest.mark.long

@@ -38,6 +38,13 @@ def output_options(parser: argparse.ArgumentParser, csv: str | None = None, mark
         parser.add_argument("--markdown", metavar="FILE", help="also write the table as Markdown")
 
 
+def links_parser(name: str, description: str | None) -> argparse.ArgumentParser:
+    """The arguments of a benchmark on links, as `scenes.links.read_links` takes them."""
+    parser = bench_parser(name, description)
+    parser.add_argument("links", nargs="+", metavar="FILE[:PRIM]", help="links; all bodies without a prim")
+    return parser
+
+
 def shots_parser(name: str, description: str | None) -> argparse.ArgumentParser:
     """The arguments of a benchmark that runs on shots, or on the synthetic ones of `MADE`."""
     made = "; ".join(f"{shot}: {text}" for shot, text in MADE.items())

@@ -16,9 +16,9 @@ from functools import partial
 
 import numpy as np
 
-from calmotion.benchmarks.common.parsers import bench_parser, output_options
+from calmotion.benchmarks.common.parsers import links_parser, output_options
 from calmotion.benchmarks.common.tables import markdown, write_rows
-from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, read_links
+from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, links_of_all
 from calmotion.benchmarks.scenes.mesher import mesher
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array
@@ -120,25 +120,22 @@ def cells(rows: Sequence[LevelRow]) -> list[list[str]]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command; exit status 1 when no link could be meshed."""
-    parser = bench_parser("mesh-extrapolation", __doc__)
-    parser.add_argument("links", nargs="+", metavar="FILE[:PRIM]", help="links; all bodies without a prim")
+    parser = links_parser("mesh-extrapolation", __doc__)
     parser.add_argument("--nodes", type=int, default=100_000, metavar="N", help="of the finest mesh (default: 100000)")
     output_options(parser, csv="a row for each mesh")
     options = parser.parse_args(arguments)
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
     rows: list[LevelRow] = []
-    for source in options.links:
+    for _, link in links_of_all(options.links, say):
         try:
-            found = read_links(source)
+            rows += levels(link, options.nodes)
         except ShotError as error:
-            print(error, file=sys.stderr, flush=True)
-            continue
-        for link in found:
-            try:
-                rows += levels(link, options.nodes)
-            except ShotError as error:
-                print(f"{link.name}: {error}", file=sys.stderr, flush=True)
-            if options.csv:
-                write_rows(options.csv, LevelRow, rows)  # the next may take long
+            say(f"{link.name}: {error}")
+        if options.csv:
+            write_rows(options.csv, LevelRow, rows)  # the next may take long
     if options.json:
         print(json.dumps({"rows": [asdict(row) | {"off": None if np.isnan(row.off) else row.off} for row in rows]}))
     else:

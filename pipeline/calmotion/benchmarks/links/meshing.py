@@ -26,11 +26,11 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.parsers import links_parser
 from calmotion.benchmarks.common.tables import markdown, write_table
 from calmotion.benchmarks.links.robots import file_of, survey_robots
 from calmotion.benchmarks.links.tables import done, summary, survey_table
-from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, read_links
+from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, links_of_all
 from calmotion.benchmarks.scenes.mesher import mesher
 from calmotion.errors import ShotError
 
@@ -225,8 +225,7 @@ def _cell(value: object) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; exit status 1 when no link could be meshed."""
-    parser = bench_parser("meshing", __doc__)
-    parser.add_argument("links", nargs="+", metavar="FILE[:PRIM]", help="links; all bodies without a prim")
+    parser = links_parser("meshing", __doc__)
     parser.add_argument("--sizes", nargs="+", help="multiples of the automatic element size, lengths (8mm), auto")
     parser.add_argument("--geometry-only", action="store_true", help="make solids, and no meshes")
     parser.add_argument("--time-limit", type=float, default=180.0, help="processor time of the meshes of a link [s]")
@@ -246,12 +245,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    found: list[tuple[Link, str]] = []
-    for source in options.links:
-        try:
-            found += [(link, Path(file_of(source)).stem) for link in read_links(source)]
-        except ShotError as error:
-            say(str(error))
+    found = [(link, Path(file_of(source)).stem) for source, link in links_of_all(options.links, say)]
     if options.sizes:
         return _study_all([link for link, _ in found], options, say)
     rows = survey_robots(found, options, say)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -83,6 +84,22 @@ def read_links(source: str) -> list[Link]:
             mass = mass_of(reading, prim, pose, shapes)
             links.append(Link(prim.GetName(), body, carriers.get(body.path), joints, mass))
     return links
+
+
+def links_of_all(sources: Iterable[str], say: Callable[[str], None]) -> Iterator[tuple[str, Link]]:
+    """The links that each of some sources names, with the source; of what cannot be read only the reason is told.
+
+    Args:
+        sources: As of `read_links`.
+        say: Takes the reasons.
+    """
+    for source in sources:
+        try:
+            links = read_links(source)
+        except ShotError as error:
+            say(str(error))
+            continue
+        yield from ((source, link) for link in links)
 
 
 def _split(source: str) -> tuple[str, str]:
