@@ -9,6 +9,7 @@ import pytest
 from calmotion.geometry.tetrahedra import measure_quality, tet_volumes
 from calmotion.reduction import mesh_refinement
 from calmotion.reduction.basis.natural_modes import frequencies
+from calmotion.reduction.cache import recomputed
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
@@ -89,9 +90,12 @@ def test_a_link_keeps_few_nodes_where_one_factor_is_that_of_finer_meshes(helpers
     estimates = [frequency_estimate(mesh, beam, carrier) for mesh in (finest, kept)]
     assert estimates[1].nodes <= 1_000 and 4_000 < estimates[0].nodes <= 9_000
     assert kept.quality.element_error > 3.0 * finest.quality.element_error
-    fine, own = (mesh.quality.stiffness_factor * e.squares for mesh, e in zip((finest, kept), estimates, strict=True))
+    # on the coarse mesh the fourth mode may be the third on finer ones, and counts
+    fine, own = (
+        mesh.quality.stiffness_factor * e.squares[:3] for mesh, e in zip((finest, kept), estimates, strict=True)
+    )
     off = np.abs(np.sqrt(own / fine) - 1.0)
-    assert off.max() < 0.005 and off[0] < 1e-3 < np.abs(estimates[1].squares / fine - 1.0).max()
+    assert off.max() < 0.005 and off[0] < 1e-3 < np.abs(estimates[1].squares[:3] / fine - 1.0).max()
     extra = kept.quality.frequency_error - finest.quality.frequency_error
     assert 0.5 * off.max() < extra < 0.005
 
@@ -99,7 +103,9 @@ def test_a_link_keeps_few_nodes_where_one_factor_is_that_of_finer_meshes(helpers
 def test_modes_that_one_factor_does_not_serve_keep_finer_elements(helpers, beam, frames, monkeypatch):
     monkeypatch.setattr(mesh_refinement, "_APART", 1e-4)
     effort = Effort(0.0, 0, 0.0, 9_000, 500)
-    kept = refined_for_frequencies(mesh_of(helpers, (6, 1, 1)), replace(beam, path="/Arm/own"), frames[1].frame, effort)
+    own = replace(beam, path="/Arm/own")  # no other test takes it from the cache
+    with recomputed():
+        kept = refined_for_frequencies(mesh_of(helpers, (6, 1, 1)), own, frames[1].frame, effort)
     assert frequency_estimate(kept, beam, frames[1].frame).nodes > 1_000
 
 
@@ -194,8 +200,10 @@ def test_a_mesh_near_the_limit_is_followed_by_finer_ones(helpers, beam, frames, 
         return found
 
     monkeypatch.setattr(mesh_refinement, "load_estimate", noted)
-    own = replace(beam, path="/Arm/near")  # not from the cache
-    refined_for_loads(mesh_of(helpers, (12, 2, 2)), own, frames, 1, loads, 1e-4, 1e-6, 700)
+    with recomputed():
+        refined_for_loads(
+            mesh_of(helpers, (12, 2, 2)), replace(beam, path="/Arm/near"), frames, 1, loads, 1e-4, 1e-6, 700
+        )
     assert nodes[0] > 0.6 * 700 and len(nodes) > 2 and nodes[-2] <= 0.6 * 3.3 * nodes[0] < nodes[-1]
 
 

@@ -7,15 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.geometry.tetrahedra import measure_quality
+from calmotion.geometry.tetrahedra import measure_quality, oriented_tets
 from calmotion.reduction.discretization_error import clamped_modes
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.elements.bisection import bisected
 from calmotion.reduction.full_order import mesh_estimates
-from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
+from calmotion.reduction.full_order.mesh_estimates import frequency_estimate, modes_that_count
 from calmotion.reduction.full_order.nested_modes import NestedModes
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
+from calmotion.reduction.mesh_refinement import bisected_where
 from calmotion.shot import Body, FEMesh, FlexibleSettings
+from skfem import MeshTet
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +42,37 @@ def test_estimates_begun_from_a_coarser_mesh_are_those_without(helpers, beam, he
         points, tets = bisected(mesh.points, mesh.tets, np.argsort(-found.indicators)[: len(mesh.tets) // 3])
         mesh = replace(mesh, points=points, tets=tets)
     assert found.error < 0.7 * frequency_estimate(mesh_of(helpers, (10, 2, 2)), beam, carrier).error
+
+
+def test_a_mode_counts_that_may_be_one_of_the_first_on_finer_meshes():
+    squares, honest = np.array([1.0, 2.0, 4.0, 5.0]), np.array([0.1, 0.1, 0.1, 0.1])
+    assert modes_that_count(squares, honest) == 3
+    assert modes_that_count(squares, np.array([0.1, 0.1, 0.1, 0.3])) == 4
+    assert modes_that_count(squares[:2], honest[:2]) == 2 and modes_that_count(squares[:3], honest[:3]) == 3
+
+
+def test_a_thin_flap_is_refined_before_its_mode_is_one_of_the_first(helpers, beam):
+    """A bar with a flap of 17 x 2 mm, whose mode is the fourth on coarse meshes and the third on finer ones."""
+    x, y, z = (
+        np.append(np.linspace(0.0, 0.12, 9), 0.137),
+        np.linspace(-0.02, 0.02, 4),
+        [-0.02, -0.005, 0.01, 0.018, 0.02],
+    )
+    grid = MeshTet.init_tensor(x, y, np.array(z))
+    centers = grid.p[:, grid.t].mean(axis=1)
+    kept = (centers[0] < 0.12) | (centers[2] > 0.018)
+    used, tets = np.unique(grid.t[:, kept].T, return_inverse=True)
+    points = np.ascontiguousarray(grid.p.T[used])
+    tets = oriented_tets(points, tets.reshape(-1, 4))[0]
+    mesh, nested = FEMesh(0, points, tets, measure_quality(points, tets)), NestedModes()
+    held = replace(beam, flexible=replace(beam.flexible, interface_radius=0.05))
+    found = []
+    for _ in range(4):
+        found.append(frequency_estimate(mesh, held, helpers.frame(-0.04, 0.0, 0.0), nested))
+        of_flap = mesh.points[mesh.tets].mean(axis=1)[:, 0] > 0.12
+        assert found[-1].indicators[of_flap].sum() > 0.2 * found[-1].indicators.sum()
+        mesh = bisected_where(mesh, found[-1].indicators)
+    assert len(found[0].squares) == 4 and found[-1].squares[2] < 0.9 * found[0].squares[2]
 
 
 @pytest.mark.parametrize("coarser", [None, NestedModes()])
