@@ -12,10 +12,9 @@ from calmotion.reduction.discretization_error import clamped_modes
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.elements.bisection import bisected
 from calmotion.reduction.full_order import mesh_estimates
-from calmotion.reduction.full_order.mesh_estimates import frequency_estimate, modes_that_count
+from calmotion.reduction.full_order.mesh_estimates import frequency_estimate, overtaken
 from calmotion.reduction.full_order.nested_modes import NestedModes
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
-from calmotion.reduction.mesh_refinement import bisected_where
 from calmotion.shot import Body, FEMesh, FlexibleSettings
 from skfem import MeshTet
 
@@ -44,14 +43,14 @@ def test_estimates_begun_from_a_coarser_mesh_are_those_without(helpers, beam, he
     assert found.error < 0.7 * frequency_estimate(mesh_of(helpers, (10, 2, 2)), beam, carrier).error
 
 
-def test_a_mode_counts_that_may_be_one_of_the_first_on_finer_meshes():
-    squares, honest = np.array([1.0, 2.0, 4.0, 5.0]), np.array([0.1, 0.1, 0.1, 0.1])
-    assert modes_that_count(squares, honest) == 3
-    assert modes_that_count(squares, np.array([0.1, 0.1, 0.1, 0.3])) == 4
-    assert modes_that_count(squares[:2], honest[:2]) == 2 and modes_that_count(squares[:3], honest[:3]) == 3
+def test_a_later_mode_with_a_large_error_overtakes_the_last():
+    squares, honest = np.array([1.0, 2.0, 4.0, 5.0]), np.full(4, 0.1)
+    assert overtaken(squares, honest) == 0.0 == overtaken(squares[:3], honest[:3]) == overtaken(squares[:2], honest[:2])
+    # it is likely at 5 (1 - 0.22), and the third at 4 (1 - 0.055)
+    assert overtaken(squares, np.array([0.1, 0.1, 0.0, 0.4])) == pytest.approx(1.0 - 3.9 / 4.0)
 
 
-def test_a_thin_flap_is_refined_before_its_mode_is_one_of_the_first(helpers, beam):
+def test_a_thin_flap_overtakes_the_third_mode_on_finer_meshes(helpers, beam):
     """A bar with a flap of 17 x 2 mm, whose mode is the fourth on coarse meshes and the third on finer ones."""
     x, y, z = (
         np.append(np.linspace(0.0, 0.12, 9), 0.137),
@@ -67,12 +66,13 @@ def test_a_thin_flap_is_refined_before_its_mode_is_one_of_the_first(helpers, bea
     mesh, nested = FEMesh(0, points, tets, measure_quality(points, tets)), NestedModes()
     held = replace(beam, flexible=replace(beam.flexible, interface_radius=0.05))
     found = []
-    for _ in range(4):
+    for _ in range(5):
         found.append(frequency_estimate(mesh, held, helpers.frame(-0.04, 0.0, 0.0), nested))
-        of_flap = mesh.points[mesh.tets].mean(axis=1)[:, 0] > 0.12
-        assert found[-1].indicators[of_flap].sum() > 0.2 * found[-1].indicators.sum()
-        mesh = bisected_where(mesh, found[-1].indicators)
-    assert len(found[0].squares) == 4 and found[-1].squares[2] < 0.9 * found[0].squares[2]
+        flap = mesh.points[mesh.tets].mean(axis=1)[:, 0] > 0.12
+        points, tets = bisected(mesh.points, mesh.tets, np.flatnonzero(flap))
+        mesh = replace(mesh, points=points, tets=tets)
+    lower = 1.0 - found[-1].squares[2] / found[0].squares[2]
+    assert found[-1].overtaken == 0.0 and lower > 0.15 and 0.7 * lower < found[0].overtaken < 1.5 * lower
 
 
 @pytest.mark.parametrize("coarser", [None, NestedModes()])

@@ -9,7 +9,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.reduction.discretization_error import clamped_modes, element_errors, errors_and_form
 from calmotion.reduction.elements.assembly import QuadraticMesh, assemble
-from calmotion.reduction.full_order.mesh_extrapolation import Estimate
+from calmotion.reduction.full_order.mesh_extrapolation import USUAL, Estimate
 from calmotion.reduction.full_order.nested_modes import NestedModes
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.material_laws.choice import amplitudes
@@ -57,8 +57,9 @@ def frequency_estimate(
 ) -> Estimate:  # fmt: skip
     """Error of the first modes, of which each counts by its compliance relative to that of the first.
 
-    A thin wall on a coarse mesh may be so much too stiff that one of its modes comes after these and is before them on
-    finer meshes. Where its estimated error allows that, the next mode counts with them.
+    A thin wall on a coarse mesh may be so much too stiff that one of its modes comes after these, and before the last
+    of them on finer meshes. The next mode is looked at for that alone: where it is one of a thousand hertz, more nodes
+    would take more time than it is worth.
 
     Args:
         mesh, body, carrier, attachments: As of `refined_for_frequencies`.
@@ -84,22 +85,23 @@ def frequency_estimate(
     squares = (2.0 * np.pi * frequencies) ** 2
     looked_at = _COUNT + int(len(squares) > _COUNT and squares[_COUNT] < _NEAR * squares[_COUNT - 1])
     errors = element_errors(model.mesh, body.flexible.material, modes[:, :, :looked_at])
-    count = modes_that_count(squares[:looked_at], errors.sum(axis=0))
-    squares, errors = squares[:count], errors[:, :count]
+    later = overtaken(squares[:looked_at], errors.sum(axis=0))
+    squares, errors = squares[:_COUNT], errors[:, :_COUNT]
     weights = squares[0] / squares
-    total = float((errors * weights).sum(axis=0).max())
-    return Estimate(total, squares, weights / weights.sum(), errors @ weights, len(model.mesh.nodes))
+    total, nodes = float((errors * weights).sum(axis=0).max()), len(model.mesh.nodes)
+    return Estimate(total, squares, weights / weights.sum(), errors @ weights, nodes, overtaken=later)
 
 
-def modes_that_count(squares: Array, errors: Array) -> int:
-    """The first modes, and the next where it may be one of them on finer meshes.
+def overtaken(squares: Array, errors: Array) -> float:
+    """`Estimate.overtaken` by the first modes and those after them.
 
     Args:
         squares: Of the frequencies, ascending, shape [k].
-        errors: Their relative errors, shape [k].
+        errors: Their relative errors as estimated, shape [k].
     """
-    softest = squares * (1.0 - errors)
-    return min(len(squares), _COUNT) + int(np.any(softest[_COUNT:] < softest[:_COUNT].max()))
+    likely = squares * (1.0 - USUAL * np.minimum(errors, 1.0))
+    lowest, last = likely[_COUNT:].min(initial=np.inf), likely[:_COUNT].max()
+    return max(0.0, 1.0 - float(lowest / last))
 
 
 def _clamped_nodes(
