@@ -37,7 +37,7 @@ def integrate(
     system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace,
     progress: Callable[[float], None] | None = None, from_equilibrium: bool = True, integrator: str = "bdf2",
     world: Array | None = None, divides: bool = True,
-) -> Trajectory:  # fmt: skip
+) -> Trajectory:  # fmt: skip  # parameters: those of `simulate`
     """`simulation.simulate` by any integrator of `INTEGRATORS`; same arguments, results and errors.
 
     Between instants `rk4` and `radau` use cubics through angles and rates, which is exact for a cubic spline with

@@ -89,7 +89,7 @@ def simulate(
     system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace,
     progress: Callable[[float], None] | None = None, from_equilibrium: bool = True, integrator: str = "bdf2",
     world: Array | None = None, divides: bool = True,
-) -> Trajectory:  # fmt: skip
+) -> Trajectory:  # fmt: skip  # parameters: a system, its start, its drives, its scheme
     """Simulate the system from static equilibrium, or from a state that is given.
 
     Args:
@@ -192,7 +192,7 @@ def simulate_from(
 def march(
     system: System, integrator: str, h: float, done: int, inputs: Inputs, record: Record, ws: Workspace, begin: float,
     progress: Callable[[float], None] | None = None, refined: Sequence[int] = (), divides: bool = True,
-) -> Trajectory:  # fmt: skip
+) -> Trajectory:  # fmt: skip  # parameters: those of a simulation, and where it is
     """All steps from instant `done` on, into the record, with what the workspace remembers of those before.
 
     Args:
