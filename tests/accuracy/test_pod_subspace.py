@@ -118,6 +118,10 @@ def test_steps_of_bodies_in_few_directions_are_not_divided_unless_none_does_with
     tried = trials(monkeypatch, lambda shot, divides: not divides)
     assert count(held(nonlinear, known).shot.bodies) == fewest
     assert tried[0][0] == next(coordinates for coordinates, divides in tried if divides), "all of them once more"
+    monkeypatch.undo()
+    tried = trials(monkeypatch)
+    assert held(nonlinear, known, 0.0).shot is nonlinear
+    assert not any(divides for _, divides in tried), "those that were simulated are not tried again"
 
 
 def test_linear_bodies_and_those_of_the_users_choice_keep_theirs(arm, nonlinear, bodies, animation, known):

@@ -109,36 +109,45 @@ class ProjectedShot:
         return few
 
     def _project(self) -> None:
+        # what did not do for fewer known simulations does not do for more
+        levels = [missing for missing in MISSING if missing <= self._missing]
         # bodies in too few directions hardly move, and to divide their steps would take longer than all else
-        if not self._projected(divides=False) and not self._projected(divides=True):
+        failed = self._tried(levels, divides=False)
+        if failed:
+            failed = self._tried(failed, divides=True)
+        if failed is not None:
             self.shot, self.error_m = self._complete, 0.0
 
-    def _projected(self, divides: bool) -> bool:
-        """Whether any of the subspaces is accurate; then the shot has it."""
-        complete, counts = self._complete, list[int]()
-        for missing in MISSING:
-            if missing > self._missing:  # it did not do for fewer known simulations
-                continue
+    def _tried(self, levels: Sequence[float], divides: bool) -> list[float] | None:
+        """Project the shot to the first subspace that is accurate; else those that cannot be simulated.
+
+        Args:
+            levels: Shares of energy that may be missing, as of `MISSING`.
+            divides: As of `simulate_at`.
+        """
+        complete, counts, failed = self._complete, list[int](), list[float]()
+        for missing in levels:
             few, last = self._few(missing), counts
             counts = [len(body.stiffness) for body in few]
             if counts == last:
                 continue
-            error = self._largest_off(complete.with_bodies(few), divides)
-            if np.isfinite(error):
+            accurate, error = self._largest_off(complete.with_bodies(few), divides)
+            if accurate:
                 self.error_m, self._missing = error, missing
                 self.shot = complete.with_bodies(_told(complete.character, complete.bodies, few, error))
-                return True
-        return False
+                return None
+            failed += [] if np.isfinite(error) else [missing]
+        return failed
 
-    def _largest_off(self, shot: CompiledShot, divides: bool) -> float:
-        """Largest distance of a target from any known simulation [m]; infinite where it is more than allowed."""
+    def _largest_off(self, shot: CompiledShot, divides: bool) -> tuple[bool, float]:
+        """Whether it is allowed, and the largest distance of a target from any known simulation, up to one too many."""
         largest = 0.0
         for item in self._known:
             off = self._off(shot, item, divides)
-            if not np.isfinite(off) or (off > self._allowed(item) and self._options.directions != OFF):
-                return np.inf
             largest = max(largest, off)
-        return largest
+            if not np.isfinite(off) or (off > self._allowed(item) and self._options.directions != OFF):
+                return False, largest
+        return True, largest
 
     def _off(self, shot: CompiledShot, known: ReferenceRun, divides: bool = True) -> float:
         """Largest distance of a target from a known simulation, with the same step and integrator [m]."""
