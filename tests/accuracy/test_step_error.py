@@ -140,6 +140,40 @@ def test_between_two_steps_only_where_joints_stay_closed_by_both():
         assert largest_step(run, 0.1, 1e-3, lambda run: allowed)[0] == pytest.approx(step, rel=1e-6)
 
 
+def steps_tried(places, gaps, refused):
+    """The step that is found with an allowed error of 0.1 m, and those that were tried, by functions of the step."""
+    tried = []
+
+    def run(step):
+        tried.append(step)
+        return StepRun(step, np.array([[[places(step), 0.0, 0.0]]]), gap=gaps(step))
+
+    return largest_step(run, 0.1, 1e-3, lambda run: 0.1, refused)[0], tried
+
+
+@pytest.mark.parametrize("gaps", [lambda h: 0.3, lambda h: 0.3 - 0.1 * h**2, lambda h: 0.3 + 1e-3 * h])
+def test_gaps_that_do_not_fall_with_the_step_end_the_search_after_three_runs(gaps):
+    step, tried = steps_tried(lambda h: 1.0 / h, gaps, 1e-4)  # the motion does not converge either
+    assert tried == [0.1, 0.05, 0.025] and step == 0.025
+
+
+@pytest.mark.parametrize(
+    "gaps",
+    [
+        lambda h: 0.9e-4,  # links that do not fit together exactly, which is not refused
+        lambda h: 1e-5 + 30.0 * h**2,
+        lambda h: 3.0 * h,  # where contacts come and go
+        lambda h: 0.02 * (1.0 + 0.05 * np.sin(1.0 / h)) if h > 0.01 else 1e-6,  # the motion is not resolved
+    ],
+)
+def test_a_search_for_a_step_ends_early_for_no_other_gap(gaps):
+    def places(h):
+        return 3e3 * h**2
+
+    assert steps_tried(places, gaps, 1e-4) == steps_tried(places, gaps, np.inf)
+    assert len(steps_tried(places, gaps, 1e-4)[1]) > 4
+
+
 def test_a_shot_that_no_step_can_simulate_is_tried_once():
     tried = []
 

@@ -37,6 +37,7 @@ from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.bodies import mode_tables
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_tracks
+from calmotion.simulation.inputs.open_chains import refused_gap
 from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
 from calmotion.simulation.prepare import prepare
 from calmotion.simulation.simulate import Progress, intended_motion, simulate_shot
@@ -237,7 +238,7 @@ def chosen_step(
         return allowed_step_error(shot.character, options, left_out + known[1])
 
     known: list[float] = []  # the step by which they were estimated, and what they cost
-    step, error = largest_step(trial, FIRST, LAST, allowed)
+    step, error = largest_step(trial, FIRST, LAST, allowed, refused_gap(shot.character, options))
     if not np.isfinite(error):
         trial(step)
     whole = make_grid(shot.animation.frame_times, step, 0.0).h

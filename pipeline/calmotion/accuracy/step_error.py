@@ -26,6 +26,7 @@ from calmotion.simulation.report import elastic_by_body
 CLOSED_GAP = 1e-6  # largest position gap of a joint that counts as none [m]
 ORDER = 2  # of BDF2; the global error goes with this power of the step
 ORDER_AT_IMPACTS = 1  # a change of contacts excites vibration that no step resolves, as sharply as steps allow
+SAME_GAP = 0.01  # differences of a gap by three steps, of the gap: less than those of any gap that steps cause
 MARGIN, WORTH = 0.9, 1.1  # of a step between two that were tried; how much longer it must be than the shorter of them
 
 
@@ -165,8 +166,9 @@ def step_gaps(coarse: StepRun, fine: StepRun) -> tuple[float, float]:
 
 
 def largest_step(
-    run: Callable[[float], StepRun], first: float, last: float, allowed: Callable[[StepRun], float]
-) -> tuple[float, float]:
+    run: Callable[[float], StepRun], first: float, last: float, allowed: Callable[[StepRun], float],
+    refused_gap: float = np.inf,
+) -> tuple[float, float]:  # fmt: skip
     """The largest step whose error is allowed and which keeps joints closed: by halving the first, and then between
     two of these by the order that three of them show.
 
@@ -178,9 +180,11 @@ def largest_step(
         run: Simulates by a step [s]; may raise IntegrationError where that is too large.
         first, last: Steps to begin and to end with [s].
         allowed: Error at the targets [m] that may be, from the finest run so far.
+        refused_gap: Position gap of a joint above which the simulation by the step that is found is refused [m].
 
     Returns:
-        The step [s] and its estimated error [m]; where not even the last is fine enough, that and its error.
+        The step [s] and its estimated error [m]; where not even the last is fine enough, that and its error, and where
+        no step closes the joints, the first that shows it.
 
     Raises:
         IntegrationError: Joints come apart by a step half as long as the error allows: the safe integrator, which
@@ -208,12 +212,29 @@ def largest_step(
                 return _between(fine, error, enough, order) if coarse_closed else (fine.step, error)
             if by_coarse <= enough and fine.integrator not in ("", SAFE):
                 raise open_joints(fine.gap, fine.integrator, fine.step)
-            if step <= last:
+            if step <= last or no_step_closes(before, coarse, fine, refused_gap):
                 return fine.step, error
             before = coarse
         elif step <= last:
             return fine.step, np.inf
         coarse = fine
+
+
+def no_step_closes(before: StepRun | None, coarse: StepRun, fine: StepRun, refused_gap: float) -> bool:
+    """Whether joints stay open by more than is allowed, whatever the step: motors of a closed chain contradict each
+    other, or its links do not fit together.
+
+    Gaps that steps cause fall at least with the step, and those of steps by which the motion is not resolved differ
+    from each other: three that hardly differ, over two successive shorter steps, are of neither kind.
+
+    Args:
+        before: A run by a longer step than the coarse one; None: not known.
+        refused_gap: Largest that is allowed [m].
+    """
+    if before is None or not before.step > coarse.step > fine.step:
+        return False
+    gaps = (before.gap, coarse.gap, fine.gap)
+    return min(gaps) > refused_gap and max(gaps) - min(gaps) <= SAME_GAP * fine.gap
 
 
 def observed_order(before: StepRun | None, coarse: StepRun, fine: StepRun) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -50,6 +51,7 @@ from calmotion.shot.model_choice import OFF
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.simulation.inputs.open_chains import refused_gap
 from calmotion.simulation.simulate import Progress
 
 MARGIN, MOST = 0.8, 3  # safety factor of a new step, and most searches
@@ -91,9 +93,7 @@ def optimize_to_tolerance(
         step = memory.step
     elif chooses:
         progress(0.0, "choosing the time step")
-        enough = allowed_step_error(character, options, omitted_error(projected.shot.bodies))
-        trial = partial(simulate_at, projected.shot, options)
-        step, _ = largest_step(trial, FIRST, LAST, lambda run: max(enough, FIRST_STEP * shake(run)))
+        step = _first_step(projected.shot, options, shake)
     result, tracks, searches = None, animation.current, SuccessiveSearches(progress)
     for number in range(MOST):
         reduced = projected.shot.with_tracks(tracks)
@@ -136,6 +136,16 @@ def optimize_to_tolerance(
     if not chooses or again or result.interrupted or result.windows:
         return result
     return with_input_resolved(result, reduced.with_tracks(animation.tracks), options)
+
+
+def _first_step(shot: CompiledShot, options: RunSettings, shake: Callable[[StepRun], float]) -> float:
+    """The step of the first search [s], by how far a run of the input is from what is intended [m]."""
+    enough = allowed_step_error(shot.character, options, omitted_error(shot.bodies))
+    step, _ = largest_step(
+        partial(simulate_at, shot, options), FIRST, LAST, lambda run: max(enough, FIRST_STEP * shake(run)),
+        refused_gap(shot.character, options),
+    )  # fmt: skip
+    return step
 
 
 def _robustly(

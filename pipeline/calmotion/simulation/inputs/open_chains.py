@@ -23,6 +23,11 @@ CLOSED = 0.1  # of the tolerance: joints that come apart by less are closed
 _NAMED = 6  # motors in a message
 
 
+def refused_gap(character: Character, options: RunSettings) -> float:
+    """Largest position gap of a joint with which a simulation is not refused [m]."""
+    return CLOSED * tolerance_of(character, options.tolerance)
+
+
 def refuse_open_joints(
     character: Character, model: Model, grid: TimeGrid, run: ForwardRun, options: RunSettings
 ) -> None:
@@ -32,7 +37,7 @@ def refuse_open_joints(
     Raises:
         ShotError: Joints come apart by a tenth of the tolerance, with the first of them and the time.
     """
-    gap, allowed = run.trajectory.max_joint_gap, CLOSED * tolerance_of(character, options.tolerance)
+    gap, allowed = run.trajectory.max_joint_gap, refused_gap(character, options)
     if gap <= allowed:
         return
     found = _first_open(model, run, allowed)
