@@ -1,3 +1,5 @@
+from importlib import invalidate_caches
+
 import pytest
 from calmotion.host import PluginError, read_manifest
 from calmotion.host.manifest import check_requirements
@@ -48,6 +50,33 @@ def test_what_is_installed_is_checked_without_importing(make_plugin):
             check_requirements(read_manifest(make_plugin(f"lacks{index}", EMPTY, requires=requires)), "0.1.0")
     with pytest.raises(PluginError, match=r"needs Calmotion >=7"):
         check_requirements(read_manifest(make_plugin("newer", EMPTY, calmotion=">=7")), "0.1.0")
+
+
+def test_what_was_installed_since_the_last_check_is_found(make_plugin, tmp_path, monkeypatch):
+    def install(version):
+        for folder in tmp_path.glob("late_tongs-*"):
+            folder.rename(tmp_path / "gone")
+        folder = tmp_path / f"late_tongs-{version}.dist-info"
+        folder.mkdir()
+        (folder / "METADATA").write_text(f"Metadata-Version: 2.1\nName: late-tongs\nVersion: {version}\n")
+        invalidate_caches()
+
+    monkeypatch.syspath_prepend(tmp_path)
+    manifest = read_manifest(make_plugin("anvil", EMPTY, requires=["late-tongs>=2"]))
+    with pytest.raises(PluginError, match="not installed"):
+        check_requirements(manifest, "0.1.0")
+    install("1.5")
+    with pytest.raises(PluginError, match=r"1\.5"):
+        check_requirements(manifest, "0.1.0")
+    install("2.0")
+    check_requirements(manifest, "0.1.0")
+
+
+def test_metadata_of_a_distribution_is_read_once(make_plugin, monkeypatch):
+    manifest = read_manifest(make_plugin("anvil", EMPTY, requires=["numpy>=1", "numpy<999"]))
+    check_requirements(manifest, "0.1.0")
+    monkeypatch.setattr("importlib.metadata.version", lambda name: pytest.fail(f"{name} was read again"))
+    check_requirements(manifest, "0.1.0")
 
 
 def test_a_requirement_for_another_system_does_not_count(make_plugin):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -129,7 +130,7 @@ def check_requirements(manifest: Manifest, calmotion_version: str) -> None:
     Raises:
         PluginError: When this Calmotion or an installed distribution does not fit, or one is missing.
     """
-    from importlib.metadata import PackageNotFoundError, version
+    from importlib.metadata import PackageNotFoundError
 
     from packaging.requirements import Requirement
     from packaging.specifiers import SpecifierSet
@@ -147,10 +148,25 @@ def check_requirements(manifest: Manifest, calmotion_version: str) -> None:
             continue
         remedy = f"Install it: pip install '{text}'."
         try:
-            found = version(requirement.name)
+            found = _installed(requirement.name)
+            if not requirement.specifier.contains(found, prereleases=True):
+                _installed.cache_clear()  # another one may have been installed since it was read
+                found = _installed(requirement.name)
         except PackageNotFoundError:
             raise PluginError(
                 f"the plugin needs {text}", path=manifest.id, found="not installed", remedy=remedy
             ) from None
         if not requirement.specifier.contains(found, prereleases=True):
             raise PluginError(f"the plugin needs {text}", path=manifest.id, found=found, remedy=remedy)
+
+
+@cache
+def _installed(name: str) -> str:
+    """The version of a distribution, read once: its metadata is long, and plugins of each host need the same few.
+
+    Raises:
+        PackageNotFoundError: It is not installed; the next call looks again.
+    """
+    from importlib.metadata import version
+
+    return version(name)
