@@ -6,19 +6,18 @@ product exp(a_1 q_1) exp(a_2 q_2) ... of rotations about axes a_k, which are giv
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from calmotion.rigging.hinge_pairs import hinge_pair, least_residual
 from calmotion.shot.character import Array
 
 _STEPS, _SMALL = 60, 1e-13
 STILL = 1e-6  # largest rotation of a body that does not rotate [rad]
-_STARTS = 6  # starting points of the search for the axes of two hinges
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +50,7 @@ def hinges_for(D: Array, tolerance: float) -> HingeRow:
         return HingeRow(np.zeros((0, 3)), np.zeros((len(D), 0)), np.linalg.norm(vectors, axis=1))
     principal = _right_handed(np.linalg.svd(vectors, full_matrices=True)[2])
     best: HingeRow | None = None
-    for axes in _candidates(principal, D):
+    for axes in _candidates(principal, D, tolerance):
         row = HingeRow(axes, *follow(axes, D))
         if best is None or row.residual.max() < best.residual.max():
             best = row
@@ -67,34 +66,19 @@ def _right_handed(axes: Array) -> Array:
     return np.asarray(axes * signs[:, None], dtype=np.float64)
 
 
-def _candidates(principal: Array, D: Array) -> Iterator[Array]:
-    """Candidates for the axes, the fewest first."""
+def _candidates(principal: Array, D: Array, tolerance: float) -> Iterator[Array]:
+    """Candidates for the axes, the fewest first; two that cannot keep the tolerance come last, as the best of all they
+    may be all the same."""
     yield principal[:1]
-    yield _two(principal, D)
+    pair = hinge_pair(principal, D)
+    keeps = least_residual(pair, D) <= tolerance
+    if keeps:
+        yield pair
     # the middle hinge has the smallest angles: at a right angle there, the other two axes would be parallel
     for order in ((0, 2, 1), (1, 2, 0), (0, 1, 2)):
         yield principal[list(order)]
-
-
-def _two(principal: Array, D: Array) -> Array:
-    """Axes of the two hinges with the least residual.
-
-    The angle between the axes is constant: a_1 . (D - I) a_2 = 0. This residual is divided by the sine of the angle
-    between the axes, because it is small for any parallel ones. For small rotations both axes are in the plane of the
-    rotation vectors, so the least-squares search starts from pairs in that plane.
-    """
-    W = D - np.eye(3)
-
-    def residual(x: Array) -> Array:
-        first, second = x.reshape(2, 3) / np.linalg.norm(x.reshape(2, 3), axis=1)[:, None]
-        return np.asarray(np.einsum("i,nij,j->n", first, W, second) / np.linalg.norm(np.cross(first, second)))
-
-    fits: list[Any] = []
-    for angle in np.linspace(0.0, np.pi, _STARTS, endpoint=False):
-        across = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]) @ principal[:2]
-        fits.append(least_squares(residual, across.ravel(), xtol=1e-12, ftol=1e-12, max_nfev=100))
-    best = min(fits, key=lambda fit: float(fit.cost)).x.reshape(2, 3)
-    return np.asarray(best / np.linalg.norm(best, axis=1)[:, None], dtype=np.float64)
+    if not keeps:
+        yield pair
 
 
 def follow(axes: Array, D: Array) -> tuple[Array, Array]:
@@ -144,31 +128,32 @@ def _first(axes: Array, rotation: Array) -> Array:
 
 def _nearest(axes: Array, rotation: Array, q: Array) -> Array:
     """Angles of the product nearest to a rotation matrix, by damped Gauss-Newton."""
+    across, damping = _cross_matrices(axes), 1e-9 * np.eye(len(axes))
+    twice = across @ across
+    J = np.zeros((3, len(axes)))
     for _ in range(_STEPS):
+        turns = np.eye(3) + np.sin(q)[:, None, None] * across + (1.0 - np.cos(q))[:, None, None] * twice  # Rodrigues
         product = np.eye(3)
-        columns = []
-        for k, axis in enumerate(axes):
-            columns.append(product @ axis)
-            product = product @ _rotation(axis, q[k])
-        J = np.array(columns).T
-        step = np.linalg.solve(J.T @ J + 1e-9 * np.eye(len(axes)), J.T @ _vector(rotation @ product.T))
-        q = q + step * min(1.0, 0.7 / max(float(np.max(np.abs(step))), 1e-300))
-        if np.max(np.abs(step)) < _SMALL:
+        for k, turn in enumerate(turns):
+            J[:, k] = product @ axes[k]
+            product = product @ turn
+        step = np.linalg.solve(J.T @ J + damping, J.T @ _vector(rotation @ product.T))
+        largest = float(np.abs(step).max())
+        q = q + step * min(1.0, 0.7 / max(largest, 1e-300))
+        if largest < _SMALL:
             break
     return q
 
 
-def _rotation(axis: Array, angle: float) -> Array:
-    """Rotation matrix about a unit axis (Rodrigues)."""
-    x, y, z = axis
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K))
+def _cross_matrices(axes: Array) -> Array:
+    """The matrices of cross products with axes, shape [m, 3, 3]."""
+    return np.asarray(np.cross(axes[:, None], np.eye(3)).swapaxes(1, 2))
 
 
 def _vector(R: Array) -> Array:
     """Rotation vector of a rotation matrix; by SciPy near half a turn, where the short formula is singular."""
     skew = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    sine, cosine = float(np.linalg.norm(skew)), 0.5 * (float(np.trace(R)) - 1.0)
+    sine, cosine = math.sqrt(skew @ skew), 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
     if cosine < -0.99:
         return np.asarray(Rotation.from_matrix(R).as_rotvec(), dtype=np.float64)
-    return skew * (np.arctan2(sine, cosine) / sine if sine > 1e-9 else 1.0)
+    return skew * (math.atan2(sine, cosine) / sine if sine > 1e-9 else 1.0)
