@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -96,23 +95,6 @@ def test_a_link_keeps_few_nodes_where_one_factor_is_that_of_finer_meshes(helpers
     assert off.max() < 0.005 and off[0] < 1e-3 < np.abs(estimates[1].squares / fine - 1.0).max()
     extra = kept.quality.frequency_error - finest.quality.frequency_error
     assert 0.5 * off.max() < extra < 0.005
-
-
-def test_a_mode_that_overtakes_the_last_is_part_of_the_error(helpers, beam, frames, monkeypatch):
-    def quality(overtaken):
-        estimated = partial(frequency_estimate_with, overtaken)
-        monkeypatch.setattr(mesh_refinement, "frequency_estimate", estimated)
-        with recomputed():
-            mesh, own = mesh_of(helpers, (6, 1, 1)), replace(beam, path=f"/Arm/overtaken{overtaken}")
-            return refined_for_frequencies(mesh, own, frames[1].frame, Effort(0.05, 2_000)).quality
-
-    without, with_it = quality(0.0), quality(0.1)
-    assert with_it.frequency_error == pytest.approx(without.frequency_error + 0.05)
-    assert with_it.stiffness_factor == without.stiffness_factor
-
-
-def frequency_estimate_with(overtaken, *arguments, **named):
-    return replace(frequency_estimate(*arguments, **named), overtaken=overtaken)
 
 
 def test_modes_that_one_factor_does_not_serve_keep_finer_elements(helpers, beam, frames, monkeypatch):

@@ -92,9 +92,8 @@ def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort
     if not one_factor:
         return _with_quality(meshes[-1], _quality(mesh, estimates[-1], estimates, 1.0 - excess, error))
     kept, factor, apart = _smallest(estimates, effort.kept_nodes, max(_APART, _APART_OF_ERROR * error))
-    left = error + apart + estimates[-1].overtaken + _of_volume(mesh)
     quality = replace(
-        mesh.quality, frequency_error=0.5 * left, element_error=estimates[kept].error,
+        mesh.quality, frequency_error=0.5 * (error + apart + _of_volume(mesh)), element_error=estimates[kept].error,
         stiffness_factor=factor * (1.0 - excess),
     )  # fmt: skip
     return _with_quality(meshes[kept], quality)

@@ -86,8 +86,7 @@ def levels(link: Link, nodes: int) -> list[LevelRow]:
         f1, f2, f3 = map(float, _frequencies(one.squares, 0.0))
         taken = 100.0 * (1.0 - np.sqrt(1.0 - excess))
         off = 100.0 * float(np.abs(found[k] / found[-1] - 1.0).max()) if one is not estimates[-1] else float("nan")
-        claimed = 50.0 * (left + one.overtaken)
-        rows.append(LevelRow(link.name, one.nodes, f1, f2, f3, 50.0 * one.error, taken, claimed, off))
+        rows.append(LevelRow(link.name, one.nodes, f1, f2, f3, 50.0 * one.error, taken, 50.0 * left, off))
     return rows
 
 

@@ -9,16 +9,15 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.reduction.discretization_error import clamped_modes, element_errors, errors_and_form
 from calmotion.reduction.elements.assembly import QuadraticMesh, assemble
-from calmotion.reduction.full_order.mesh_extrapolation import USUAL, Estimate
+from calmotion.reduction.full_order.mesh_extrapolation import Estimate
 from calmotion.reduction.full_order.nested_modes import NestedModes
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.material_laws.choice import amplitudes
 from calmotion.reduction.reduce import LinearModes
-from calmotion.shot.character import Array, Body, Frame, IntArray
+from calmotion.shot.character import Body, Frame, IntArray
 from calmotion.shot.meshes import CutPatch, FEMesh
 
 _MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
-_NEAR = 2.0  # square of the next frequency, over that of the last of these, from which on it is not looked at
 ALGEBRAIC = 3e-5  # relative error of the squares of frequencies whose mesh is wrong by a hundred times that and more
 
 
@@ -57,10 +56,6 @@ def frequency_estimate(
 ) -> Estimate:  # fmt: skip
     """Error of the first modes, of which each counts by its compliance relative to that of the first.
 
-    A thin wall on a coarse mesh may be so much too stiff that one of its modes comes after these, and before the last
-    of them on finer meshes. The next mode is looked at for that alone: where it is one of a thousand hertz, more nodes
-    would take more time than it is worth.
-
     Args:
         mesh, body, carrier, attachments: As of `refined_for_frequencies`.
         coarser: Modes of the meshes that it is bisected from.
@@ -73,7 +68,7 @@ def frequency_estimate(
     model = assemble(mesh.points, mesh.tets, body.flexible.material)
     clamped = _clamped_nodes(model.mesh, body, carrier, mesh.patches, attachments)
     if coarser is None or clamped is None or not len(clamped):
-        frequencies, modes = clamped_modes(model, _COUNT + 1, clamped)
+        frequencies, modes = clamped_modes(model, _COUNT, clamped)
     else:
         frequencies, modes = coarser.lowest(model, _COUNT, clamped, algebraic)
     if not len(frequencies):
@@ -82,26 +77,11 @@ def frequency_estimate(
             attribute="calm:flexible:interfaceRadius", found=f"{len(mesh.tets)} tetrahedra",
             remedy="Use a finer mesh or a smaller interface, or set calm:flexible:enabled to false.",
         )  # fmt: skip
+    weights = (frequencies[0] / frequencies) ** 2
+    errors = element_errors(model.mesh, body.flexible.material, modes)
+    total = float((errors * weights).sum(axis=0).max())
     squares = (2.0 * np.pi * frequencies) ** 2
-    looked_at = _COUNT + int(len(squares) > _COUNT and squares[_COUNT] < _NEAR * squares[_COUNT - 1])
-    errors = element_errors(model.mesh, body.flexible.material, modes[:, :, :looked_at])
-    later = overtaken(squares[:looked_at], errors.sum(axis=0))
-    squares, errors = squares[:_COUNT], errors[:, :_COUNT]
-    weights = squares[0] / squares
-    total, nodes = float((errors * weights).sum(axis=0).max()), len(model.mesh.nodes)
-    return Estimate(total, squares, weights / weights.sum(), errors @ weights, nodes, overtaken=later)
-
-
-def overtaken(squares: Array, errors: Array) -> float:
-    """`Estimate.overtaken` by the first modes and those after them.
-
-    Args:
-        squares: Of the frequencies, ascending, shape [k].
-        errors: Their relative errors as estimated, shape [k].
-    """
-    likely = squares * (1.0 - USUAL * np.minimum(errors, 1.0))
-    lowest, last = likely[_COUNT:].min(initial=np.inf), likely[:_COUNT].max()
-    return max(0.0, 1.0 - float(lowest / last))
+    return Estimate(total, squares, weights / weights.sum(), errors @ weights, len(model.mesh.nodes))
 
 
 def _clamped_nodes(

@@ -13,7 +13,7 @@ import numpy as np
 from calmotion.shot.character import Array
 
 _GAIN = 1.2  # least ratio of estimates that are compared
-USUAL = 0.55  # error over the estimate of it, mostly
+_USUAL = 0.55  # error over the estimate of it, mostly
 # Error that is left: of what was extrapolated, where only two meshes are compared, and of the difference of what the
 # estimate and the change of the stiffness tell
 _LEFT, _LEFT_BY_TWO, _DOUBTED = 0.2, 0.5, 0.7
@@ -38,8 +38,6 @@ class Estimate:
         forms: Error of the static responses to their motions x: it has the energy x^T Q x / 2, shape [6p, 6p].
         wrenches: Largest loads on the interfaces, shape [6p].
         levers: How far a unit motion of an interface moves the farthest target at most, shape [6p].
-        overtaken: How much lower the square of the last frequency may be since a mode that comes after these would come
-            before it on finer meshes, relative.
     """
 
     error: float
@@ -51,7 +49,6 @@ class Estimate:
     forms: Array = field(default_factory=lambda: np.zeros((0, 0)))
     wrenches: Array = field(default_factory=lambda: np.zeros(0))
     levers: Array = field(default_factory=lambda: np.zeros(0))
-    overtaken: float = 0.0
 
 
 def extrapolation(estimates: Sequence[Estimate], one_factor: bool = False) -> tuple[float, float]:
@@ -75,7 +72,7 @@ def extrapolation(estimates: Sequence[Estimate], one_factor: bool = False) -> tu
         return 0.0, fine.error
     ratios, weights = mode_ratios(coarser[-1], fine)
     each = (1.0 / ratios - 1.0) / (coarser[-1].error / max(fine.error, np.finfo(float).tiny) - 1.0)
-    by_change, by_estimate = float(weights @ each), USUAL * fine.error
+    by_change, by_estimate = float(weights @ each), _USUAL * fine.error
     if by_change <= 0.0:  # a finer mesh that is not softer tells nothing
         return 0.0, fine.error
     excess = min(float(np.sqrt(by_change * by_estimate)), fine.error)  # of the stiffness of ever finer meshes

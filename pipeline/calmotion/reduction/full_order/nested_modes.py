@@ -44,12 +44,12 @@ class NestedModes:
 
         Args:
             model: Matrices of a mesh.
-            count: Number of modes that are accurate, less than `WIDTH`.
+            count: Number of modes, less than `WIDTH`.
             clamped: Clamped nodes, at least one.
             accuracy: Relative error of the squares of the frequencies: about that.
 
         Returns:
-            Frequencies [Hz], shape [k], and modes, shape [n, 3, k]; k is `WIDTH` where the mesh has so many.
+            Frequencies [Hz], shape [count], and modes, shape [n, 3, count].
         """
         n = len(model.mesh.nodes)
         free = np.ones(n, dtype=bool)
@@ -57,7 +57,7 @@ class NestedModes:
         dofs = np.flatnonzero(np.repeat(free, 3))
         K, m = model.stiffness[dofs][:, dofs], model.mass[free][:, free]
         found = self._finer(model.mesh, free, K, m, count, accuracy) or self._factorised(model.mesh, free, K, m)
-        values, vectors = found
+        values, vectors = found[0][:count], found[1][:, :count]
         modes = np.zeros((3 * n, vectors.shape[1]))
         modes[dofs] = vectors
         return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), modes.reshape(n, 3, -1)
