@@ -5,7 +5,7 @@ import pytest
 from arms import chain, compiled
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.failure import SimulationFailure
-from calmotion.multibody.integrators import newton, refinement
+from calmotion.multibody.integrators import newton, refinement, simulation
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.sensitivity.linearization import linearize
@@ -21,15 +21,9 @@ def driven(model, turn, h=1.0 / 24.0, steps=12, divides=True):
     return simulate(model.system, start, angles, rates, h, ws, divides=divides), angles, rates, ws
 
 
-def test_the_end_of_smaller_steps_is_a_guess_for_the_step_itself(monkeypatch):
-    """Made to fail once, the step is found again, and its equations hold as if nothing had happened."""
-    model = compiled(chain(2, driven=(0, 1), length=0.3))
-    expected, angles, rates, ws = driven(model, 0.4)
-    failed = []
-
-    from calmotion.multibody.integrators import simulation
-
-    advance = simulation._advance
+def fail_once(monkeypatch):
+    """Make the step to instant 5 fail the first time; the list that is returned holds 5 then."""
+    advance, failed = simulation._advance, []
 
     def once(system, integrator, first, last, *others):
         if first <= 5 < last and not failed:
@@ -39,6 +33,14 @@ def test_the_end_of_smaller_steps_is_a_guess_for_the_step_itself(monkeypatch):
         return advance(system, integrator, first, last, *others)
 
     monkeypatch.setattr(simulation, "_advance", once)
+    return failed
+
+
+def test_the_end_of_smaller_steps_is_a_guess_for_the_step_itself(monkeypatch):
+    """Made to fail once, the step is found again, and its equations hold as if nothing had happened."""
+    model = compiled(chain(2, driven=(0, 1), length=0.3))
+    expected, angles, rates, ws = driven(model, 0.4)
+    failed = fail_once(monkeypatch)
     with pytest.raises(SimulationFailure, match=f"{5 / 24:.4f}"):
         driven(model, 0.4, divides=False)
     failed.clear()
@@ -53,19 +55,8 @@ def test_the_end_of_smaller_steps_is_a_guess_for_the_step_itself(monkeypatch):
 def test_a_run_with_subdivided_steps_has_no_gradient(monkeypatch):
     model = compiled(chain(2, driven=(0, 1), length=0.3))
     expected, angles, rates, ws = driven(model, 0.4)
-    from calmotion.multibody.integrators import simulation
-
     refined = refinement.refined_step
-    advance, failed = simulation._advance, []
-
-    def once(system, integrator, first, last, *others):
-        if first <= 5 < last and not failed:
-            advance(system, integrator, first, 5, *others)
-            failed.append(5)
-            return newton.NOT_CONVERGED, 5, 0
-        return advance(system, integrator, first, last, *others)
-
-    monkeypatch.setattr(simulation, "_advance", once)
+    fail_once(monkeypatch)
     monkeypatch.setattr(simulation, "refined_step", lambda *arguments: refined(*arguments) and False)
     found, *_ = driven(model, 0.4)
     assert found.refined == (5,)

@@ -16,6 +16,7 @@ from functools import partial
 
 import numpy as np
 
+from calmotion.benchmarks.common.messages import say
 from calmotion.benchmarks.common.parsers import links_parser, output_options
 from calmotion.benchmarks.common.tables import markdown, write_rows
 from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, links_of_all
@@ -124,10 +125,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--nodes", type=int, default=100_000, metavar="N", help="of the finest mesh (default: 100000)")
     output_options(parser, csv="a row for each mesh")
     options = parser.parse_args(arguments)
-
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
     rows: list[LevelRow] = []
     for _, link in links_of_all(options.links, say):
         try:

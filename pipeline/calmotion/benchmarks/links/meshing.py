@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.benchmarks.common.messages import say
 from calmotion.benchmarks.common.parsers import links_parser
 from calmotion.benchmarks.common.tables import markdown, write_table
 from calmotion.benchmarks.links.robots import file_of, survey_robots
@@ -241,9 +242,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.resume and not str(options.output).lower().endswith(".csv"):
         parser.error("--resume needs --output FILE.csv, with the links that are kept")
-
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
 
     found = [(link, Path(file_of(source)).stem) for source, link in links_of_all(options.links, say)]
     if options.sizes:
