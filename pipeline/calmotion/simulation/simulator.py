@@ -94,7 +94,7 @@ class Simulator:
         if np.all(same):
             return known
         first = int(np.argmin(same))
-        if first < 2 or first - 1 in known.trajectory.refined:
+        if first < 2 or {first - 1, first - 2} & set(known.trajectory.refined):
             return run_forward(self.model, self._workspace, angles, rates, self.h, self.world)
         return self._from(known, first, angles, (joint_angles, joint_rates))
 

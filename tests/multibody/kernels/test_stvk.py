@@ -22,7 +22,7 @@ class Law:
         self.call(u, v, True, res, P, K)
         alone = np.zeros(6 + r)
         self.call(u, v, False, alone, P.copy(), K.copy())
-        assert np.array_equal(alone, res)
+        assert np.abs(alone - res).max() <= 1e-13 * np.abs(res).max()
         for array in (res[:6], P[:6], K[:6], P[:, :6], K[:, :6]):
             assert not array.any()
         return res[6:], P[6:, 6:], K[6:, 6:]

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from calmotion.multibody.integrators import bdf2, newmark
+from calmotion.multibody.integrators.predictor import predict, remember_missed
 from calmotion.multibody.integrators.workspace import Scratch, Workspace
 from calmotion.multibody.kernels.assembly import assemble
 from calmotion.multibody.kernels.sliders import LENGTH, slides_freely
@@ -87,15 +88,9 @@ def worst_component(system: System, x: Array) -> int:
 
 
 @inlined_kernel
-def _predict(system: System, h: float, before: State, now: State, memory: Array) -> None:
-    """The new instant by Taylor's formula."""
-    for b in range(len(system.parent)):
-        for i in range(3):
-            now.c[b, i] = before.c[b, i] + h * (before.V[b, i] + 0.5 * h * memory[0, b, i])
-            now.turn[b, i] = h * (before.V[b, 3 + i] + 0.5 * h * memory[0, b, 3 + i])
-        for j in range(system.elastic[b]):
-            now.u[b, j] = before.u[b, j] + h * (before.V[b, 6 + j] + 0.5 * h * memory[0, b, 6 + j])
-        turn(before.q[b], now.turn[b], now.q[b])
+def _start(system: System, h: float, before: State, now: State, memory: Array) -> None:
+    """The new instant as it is predicted, with the multipliers of the one before."""
+    predict(system, h, before, now, memory)
     copy_rows(before.lam, now.lam)
     for joint in range(len(system.parent), len(system.rows)):
         if system.rows[joint] == 0:  # a contact that no longer holds
@@ -195,12 +190,16 @@ def _correction(
 
 
 @inlined_kernel
-def _is_enough(size: float, last: float, fresh: bool, floor: float) -> bool:
-    """Whether the state is exact after a correction, by its size and that of the one before."""
+def _is_enough(size: float, last: float, fresh: bool, first: bool, floor: float) -> bool:
+    """Whether the state is exact after a correction, by its size and that of the one before.
+
+    The first correction by factors that are kept tells nothing: where these are those of a state whose stiff directions
+    are far from rest, it takes what is left in them, and hides that the soft ones hardly move.
+    """
     if fresh:
         return size < QUADRATIC
     ratio = size / last
-    return size < floor or ratio * size < (1.0 - ratio) * LEFT
+    return size < floor or (not first and ratio * size < (1.0 - ratio) * LEFT)
 
 
 @shared_kernel
@@ -221,7 +220,7 @@ def step(
     """
     scratch, before, now = ws.scratch, instants.before, instants.now
     if not predicted:
-        _predict(system, integrator.h, before, now, scratch.memory)
+        _start(system, integrator.h, before, now, scratch.memory)
     _copy_positions(now, scratch.start)
     floor = rounding_floor(system, before)
     found, factorisations, residuals = _whole(system, integrator, instants, angle, rate, floor, ws)
@@ -242,6 +241,7 @@ def _whole(
     """Whole corrections; whether they ended, factorisations and residuals."""
     scratch = ws.scratch
     fresh = True  # whether to linearise here
+    taken_fresh = True  # whether the correction taken last came from a tangent at its own state
     first, last = np.inf, np.inf  # sizes of the first correction and of the one taken last
     factorisations = 0
     for iteration in range(WHOLE):
@@ -256,10 +256,10 @@ def _whole(
             fresh = True
             continue
         correct(system, instants.before, instants.now, ws.work.R, scratch.x, scratch.lam, 1.0, scratch.T)
-        if _is_enough(size, last, fresh, floor):
+        if _is_enough(size, last, fresh, taken_fresh, floor):
             return True, factorisations, iteration + 1
         # where new tangents converge slowly, factors that are kept would not do
-        last, fresh = size, slow
+        last, taken_fresh, fresh = size, fresh, slow
     return False, factorisations, WHOLE
 
 
@@ -302,7 +302,7 @@ def _safeguarded(
         copy_rows(scratch.x, scratch.taken)
         copy_rows(scratch.lam, scratch.taken_lam)
         correct(system, before, now, ws.work.R, scratch.x, scratch.lam, 1.0, scratch.T)
-        if _is_enough(size, last, fresh, floor):
+        if _is_enough(size, last, fresh, taken_fresh, floor):
             return CONVERGED, factorisations, iteration + 1, -1
         taken_fresh, last, fresh = fresh, size, False
     return NOT_CONVERGED, factorisations, LIMIT, worst_component(system, scratch.x)
@@ -311,6 +311,7 @@ def _safeguarded(
 @inlined_kernel
 def _finish(system: System, integrator: Integrator, instants: Instants, scratch: Scratch) -> None:
     """Velocities of the converged instant, the memory of the next step, and multipliers of least norm."""
+    remember_missed(system, integrator.h, instants.before, instants.now, scratch.memory)
     _velocities(system, integrator, instants, scratch)
     copy_rows(scratch.Vd, scratch.memory[0])
     copy_rows(scratch.memory[2], scratch.memory[1])

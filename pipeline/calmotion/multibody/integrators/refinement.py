@@ -11,6 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from calmotion.multibody.integrators import newton
 from calmotion.multibody.integrators.coefficients import IMPLICIT
+from calmotion.multibody.integrators.predictor import MISSED
 from calmotion.multibody.integrators.trajectory import Inputs, Record
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.so3 import logarithm, matrix_of
@@ -71,6 +72,7 @@ def refined_step(
             return True
         _copy(end, now)
         ws.scratch.memory[:] = after
+        ws.scratch.memory[MISSED] = 0.0  # of small steps
         return False
     return None
 
@@ -81,6 +83,7 @@ def _small_steps(
 ) -> State | None:  # fmt: skip
     """The state after so many steps of length k, or None where one of them fails."""
     coefficients = IMPLICIT[integrator](k)
+    ws.scratch.memory[MISSED] = 0.0  # of a step of another length
     here = State(*[part.copy() for part in before])
     earlier, here.turn[:] = instant_before(system, here, acceleration, k)
     for part in range(1, parts + 1):

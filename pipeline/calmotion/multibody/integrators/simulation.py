@@ -10,6 +10,7 @@ import numpy as np
 from calmotion.multibody.failure import NOWHERE, Reason, SimulationFailure
 from calmotion.multibody.integrators import bdf2, newton
 from calmotion.multibody.integrators.coefficients import IMPLICIT
+from calmotion.multibody.integrators.predictor import MISSED, remember_missed
 from calmotion.multibody.integrators.refinement import refined_step
 from calmotion.multibody.integrators.trajectory import (
     Inputs,
@@ -80,7 +81,11 @@ def _advance(
 
 @kernel
 def _recall(system: System, h: float, record: Record, n: int, scratch: Scratch) -> None:
-    """The memory of BDF2 after instant n >= 1 of a trajectory."""
+    """The memory of BDF2 after instant n >= 1 of a trajectory that began at rest; scratch.memory is zero before."""
+    if n > 1:
+        bdf2.velocities(system, h, instants_of(record.earlier, record.states, n - 1), scratch.J, scratch.Vd)
+        copy_rows(scratch.Vd, scratch.memory[0])
+    remember_missed(system, h, instant_of(record.states, n - 1), instant_of(record.states, n), scratch.memory)
     bdf2.velocities(system, h, instants_of(record.earlier, record.states, n), scratch.J, scratch.Vd)
     copy_rows(scratch.Vd, scratch.memory[0])
 
@@ -154,7 +159,8 @@ def simulate_on(
     states = State(*[np.zeros((total,) + part.shape) for part in before])
     for part, first, second in zip(states, before2, before, strict=True):
         part[0], part[1] = first, second
-    ws.scratch.memory[:] = (before.V - before2.V) / h
+    ws.scratch.memory[:] = 0.0
+    ws.scratch.memory[:2] = (before.V - before2.V) / h
     record = Record(before2, states, np.zeros(total), np.zeros((total, 3)))
     return march(system, "bdf2", h, 2, Inputs(angles, rates, rooted(world, total)), record, ws, begin)
 
@@ -166,7 +172,7 @@ def simulate_from(
 
     Args:
         known: Simulated by BDF2 from static equilibrium; not changed.
-        first: Its instants before this one are kept, two or more, the last of them not a refined one.
+        first: Its instants before this one are kept, two or more, the last two of them not refined ones.
         angles, rates: As `simulate` takes them; up to `first` those of the known simulation.
 
     Returns:
@@ -272,3 +278,4 @@ def _restart(phase: Phase, h: float, inputs: Inputs, record: Record, ws: Workspa
             raise SimulationFailure(n * h, component, reason, copy_of_instant(record.states, n - 1))
         record.margins[n] = ws.scratch.border.margin[0]
         record.costs[n, 2] = _largest_gap(phase.system, angle, rate, instants.now, ws.work)
+    ws.scratch.memory[MISSED] = 0.0  # of steps of another length

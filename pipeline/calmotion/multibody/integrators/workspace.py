@@ -31,7 +31,8 @@ class Scratch(NamedTuple):
         x, lam: Correction, shapes [B, N] and [J, 6].
         solution, border: Scratch of the linear system.
         memory: Accelerations of the instant before: those of the motion, those of Newmark's formulas, and room for the
-            new ones of these, shape [3, B, N]. Zero before a start at rest.
+            new ones of these; then what the prediction of that instant missed (`predictor`), shape [4, B, N]. Zero
+            before a start at rest.
         start: The state that was predicted.
         kept: The state before a correction.
         taken, taken_lam: That correction.
@@ -66,7 +67,7 @@ def allocate_scratch(system: System) -> Scratch:
         lam=np.zeros((joints, JOINT_ROWS)),
         solution=allocate_solution(system),
         border=allocate_border(system),
-        memory=np.zeros((3, count, size)),
+        memory=np.zeros((4, count, size)),
         start=allocate_state(system),
         kept=allocate_state(system),
         taken=np.zeros((count, size)),

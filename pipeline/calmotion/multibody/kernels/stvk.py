@@ -126,17 +126,46 @@ def _stress(law: ElasticLaw, z: Array, stress: Array) -> None:
 
 
 @kernel
+def _stress_of_rows(law: ElasticLaw, u: Array, v: Array, w: Array, rate: Array, Y: Array, stress: Array) -> None:
+    """The same from the rows of `_gram_rows`, without reading all of A again: pairs are J(w) w / 2."""
+    r, p, beta, at, A, size = law.r, law.points, law.retardation, law.start, law.data, _size(law)
+    for m in range(size):
+        stress[m] = 0.0
+    for k in range(r):
+        # where w is u, the rows contain those of the single coordinates
+        single = 0.5 * u[k] if p == r else u[k] + beta * v[k]
+        line = A[at + k * size : at + (k + 1) * size]
+        for m in range(size):
+            stress[m] += single * line[m]
+    for a in range(p):
+        pairs, y = 0.5 * w[a] + beta * rate[a], Y[a]
+        for m in range(size):
+            stress[m] += pairs * y[m]
+
+
+@kernel
 def _times_pairs(p: int, pairs: Array, x: Array, row: Array) -> None:
     """row = pairs^T J_w(x), shape [p]: a row of A by the coordinates of the subspace, at w = x."""
     for a in range(p):
         row[a] = 0.0
     n = 0
     for k in range(p):
-        for l in range(k, p):
-            y = pairs[n]
-            row[k] += y * x[l]
-            row[l] += y * x[k]
+        # two sums, as each addition to one waits for the one before
+        factor, even, odd = x[k], 0.0, 0.0
+        l = k
+        while l + 2 <= p:
+            y0, y1 = pairs[n], pairs[n + 1]
+            even += y0 * x[l]
+            odd += y1 * x[l + 1]
+            row[l] += factor * y0
+            row[l + 1] += factor * y1
+            n += 2
+            l += 2
+        if l < p:
+            even += pairs[n] * x[l]
+            row[l] += factor * pairs[n]
             n += 1
+        row[k] += even + odd
 
 
 @kernel
@@ -221,8 +250,12 @@ def stvk_forces(
     z, stress = work.strain, work.strain[size:]
     _project_to_subspace(law, u, w)
     _project_to_subspace(law, v, rate)
-    strain_coordinates(law, u, v, w, rate, z)
-    _stress(law, z, stress)
+    if tangent:
+        _gram_rows(law, w, work.rows)
+        _stress_of_rows(law, u, v, w, rate, work.rows, stress)
+    else:
+        strain_coordinates(law, u, v, w, rate, z)
+        _stress(law, z, stress)
     elastic = res[6:]
     for k in range(r):
         elastic[k] += stress[k]
@@ -230,7 +263,6 @@ def stvk_forces(
     _add_from_subspace(law, 1.0, work.row, elastic)
     if not tangent:
         return
-    _gram_rows(law, w, work.rows)
     for a in range(p):
         x[a] = w[a] + beta * rate[a]
     _add_tangent(law, x, stress, 1.0, work, K)
