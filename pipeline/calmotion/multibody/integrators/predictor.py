@@ -18,7 +18,8 @@ JUMP = 0.5  # rotation that is missed [rad] by which a motion jumps, and tells n
 @kernel
 def _moved(h: float, before: State, memory: Array, b: int, i: int) -> float:
     """Change of position i of component b over a step, by Taylor's formula."""
-    return h * (before.V[b, i] + 0.5 * h * memory[0, b, i])
+    moved: float = h * (before.V[b, i] + 0.5 * h * memory[0, b, i])
+    return moved
 
 
 @shared_kernel
