@@ -111,6 +111,7 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
     """A failed step in the user's words: which body, which joint, when; an `IntegrationError` where another step or
     integrator may succeed."""
     tree, character, system = prepared.model.tree, prepared.character, prepared.model.system
+    closed = len(system.rows) > len(system.parent)
     if failure.reason == Reason.NOT_PERIODIC:
         return IntegrationError(
             "no periodic motion of the robot was found",
@@ -126,7 +127,7 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
         return IntegrationError(
             f"the simulation {_REASONS[failure.reason]}",
             path=character.path,
-            remedy=_REMEDY,
+            remedy=_remedy(closed),
         )
     # the static start depends neither on the step nor on the integrator
     static = failure.reason == Reason.NO_EQUILIBRIUM
@@ -143,7 +144,7 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
             remedy="Check physics:youngsModulus (in the stage's units), the loads and the speed of the motion.",
         )
     if failure.component == NOWHERE:
-        return IntegrationError(f"the simulation {what}", path=character.path, remedy=_REMEDY)
+        return IntegrationError(f"the simulation {what}", path=character.path, remedy=_remedy(closed))
     joint = character.joints[tree.joint[failure.component]]
     body = character.bodies[tree.body[failure.component]].path
     if static:
@@ -153,13 +154,17 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
             path=body,
             remedy=_remedy_at_rest(prepared, failure.component),
         )
-    closed = len(system.rows) > len(system.parent)
     return kind(
         f"the simulation {what}, first at the joint {joint.path}",
         path=body,
         remedy="Try a smaller --step; check the masses, the material and the motion of this joint there"
-        + (", and whether the closed chains can reach the poses that their motors ask for." if closed else "."),
+        + (f", and {_CLOSED}." if closed else "."),
     )
+
+
+def _remedy(closed: bool) -> str:
+    """What may help where no body is known to fail first."""
+    return "Use a smaller --step or --integrator bdf2" + (f"; check {_CLOSED}." if closed else ".")
 
 
 def _weight_at_failure(failure: SimulationFailure) -> str:
@@ -184,8 +189,8 @@ def _remedy_at_rest(prepared: Prepared, component: int) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-_REMEDY = "Use a smaller --step or --integrator bdf2; check whether motors of a closed chain contradict each other."
 _FAR = 0.25  # deflection over length that explains a failure
+_CLOSED = "whether the closed chains can reach the poses that their motors ask for"
 _REASONS = {
     Reason.SINGULAR: "meets a singular system",
     Reason.DIVERGED: "diverges",

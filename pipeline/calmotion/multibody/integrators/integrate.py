@@ -15,13 +15,13 @@ from calmotion.errors import IntegrationError
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators import radau, runge_kutta
 from calmotion.multibody.integrators.coefficients import IMPLICIT
-from calmotion.multibody.integrators.drives import hermite_drive, stage_inputs
 from calmotion.multibody.integrators.simulation import largest_gap, simulate
 from calmotion.multibody.integrators.trajectory import Inputs, Trajectory, copy_of_instant
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.moving_markers import rooted
 from calmotion.multibody.model.phases import has_contacts
 from calmotion.multibody.model.system import State, System
+from calmotion.multibody.motors.between_instants import hermite_drive, stage_inputs
 from calmotion.multibody.statics.equilibrium import equilibrium
 from calmotion.shot.character import Array
 

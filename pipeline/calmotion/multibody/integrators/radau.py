@@ -15,7 +15,6 @@ from __future__ import annotations
 import numpy as np
 
 from calmotion.multibody.failure import Reason, SimulationFailure
-from calmotion.multibody.integrators.drives import Drive, stage_inputs
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.assembly import assemble
 from calmotion.multibody.kernels.sliders import LENGTH, has_row, slides_freely
@@ -28,6 +27,7 @@ from calmotion.multibody.kernels.so3 import (
 )
 from calmotion.multibody.linear_solver.index1 import VELOCITY_ROWS
 from calmotion.multibody.model.system import JOINT_ROWS, State, System, allocate_state
+from calmotion.multibody.motors.between_instants import Drive, stage_inputs
 from calmotion.shot.character import Array
 
 _ROOT = np.sqrt(6.0)

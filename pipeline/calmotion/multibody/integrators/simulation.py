@@ -240,8 +240,7 @@ def _steps(
         except ZeroDivisionError:  # of a kernel, whose numbers have left all bounds
             # steps that are done have counted their solutions
             done += int(np.argmin(record.costs[done : phase.last, 0] > 0.0))
-            state = copy_of_instant(record.states, done - 1)
-            raise SimulationFailure(done * h, NOWHERE, Reason.DIVERGED, state) from None
+            code, component = newton.NOT_CONVERGED, NOWHERE
         if code == newton.CONVERGED:
             continue
         reason = Reason.SINGULAR if code == newton.SINGULAR else Reason.DIVERGED

@@ -1,7 +1,7 @@
 """Motor inputs between instants."""
 
 import numpy as np
-from calmotion.multibody.integrators.drives import hermite_drive, stage_inputs
+from calmotion.multibody.motors.between_instants import hermite_drive, stage_inputs
 from scipy.interpolate import CubicSpline
 
 
