@@ -133,8 +133,8 @@ class ProjectedShot:
                 continue
             accurate, error = self._largest_off(complete.with_bodies(few), divides)
             if accurate:
-                self.error_m, self._missing = error, missing
-                self.shot = complete.with_bodies(_told(complete.character, complete.bodies, few, error))
+                self.shot, self._missing = complete.with_bodies(few), missing
+                self.tell(error)
                 return None
             failed += [] if np.isfinite(error) else [missing]
         return failed
@@ -179,10 +179,17 @@ class ProjectedShot:
         off = self._off(self.shot, more)
         self._known.append(more)
         if off <= self._allowed(more) or self._options.directions == OFF:
-            self.error_m = off
+            self.tell(off)
             return True
         self._project()
         return False
+
+    def tell(self, error: float) -> None:
+        """The bodies' directions are off by this much in the motion that counts from now on [m]."""
+        complete = self._complete
+        self.error_m = error
+        if self.shot is not complete:
+            self.shot = complete.with_bodies(_told(complete.character, complete.bodies, self.shot.bodies, error))
 
 
 def project_to_subspace(
@@ -235,5 +242,6 @@ def _told(
         count, left = len(bodies[b].stiffness), len(few[b].stiffness)
         what = f"{character.bodies[b].path}: POD subspace of {left} of {count} elastic coordinates"
         row = Simplification(what, "the shot does not excite the others", error / len(fewer), SUBSPACE)
-        told[b] = replace(few[b], left_out=(*few[b].left_out, row))
+        others = [other for other in few[b].left_out if other.source != SUBSPACE]
+        told[b] = replace(few[b], left_out=(*others, row))
     return tuple(told)

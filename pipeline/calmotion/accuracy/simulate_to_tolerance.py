@@ -134,6 +134,20 @@ def with_accuracy(result: Result, shot: CompiledShot, options: RunSettings, left
     return with_step(result, shot.character, options, accuracy)
 
 
+def with_subspaces(result: Result, shot: CompiledShot) -> Result:
+    """The result with what bodies in POD subspaces tell of their error by now.
+
+    Args:
+        shot: With these bodies.
+    """
+    told = {row.what: row for body in shot.bodies for row in body.left_out if row.source == SUBSPACE}
+    known = result.accuracy
+    assert known is not None
+    accuracy = _estimates(known.step_m, omitted_error(shot.bodies), shot, known.mesh_m, known.patches_m)
+    left_out = tuple(told.get(row.what, row) for row in result.left_out)
+    return replace(result, left_out=left_out, accuracy=replace(accuracy, efforts=known.efforts))
+
+
 def project_to_tolerance(
     shot: CompiledShot, options: RunSettings, known: ReferenceRun | None,
     shake: Callable[[StepRun], float] = lambda run: 0.0,

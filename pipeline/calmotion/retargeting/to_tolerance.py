@@ -28,6 +28,7 @@ from calmotion.accuracy.simulate_to_tolerance import (
     project_to_tolerance,
     with_accuracy,
     with_modes,
+    with_subspaces,
 )
 from calmotion.accuracy.step_error import (
     StepRun,
@@ -109,13 +110,16 @@ def optimize_to_tolerance(
             ended = iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
             unknown = not again and not number and not ended  # later searches end near the motion of the first
             result, complete = _with_accuracy(result, reduced, projected, tracks, options, unknown)
+            accurate = ended or (complete is not None and projected.is_accurate_for(complete))
+            if accurate and complete is not None:  # the motion found leaves the directions less than that of the input
+                result = with_subspaces(result, projected.shot)
             accuracy = result.accuracy
             assert accuracy is not None
             allowed = allowed_step_error(character, options, besides_step(accuracy)) if chooses else np.inf
             fine = accuracy.step_m <= allowed or step <= LAST
-            accurate = ended or (
-                (fine or complete is not None) and _is_accurate(projected, tracks, result, options, complete)
-            )
+            if fine and complete is None and not ended:
+                accurate = _is_accurate(projected, tracks, result, options)
+                result = with_subspaces(result, projected.shot) if accurate else result
             if fine and accurate:
                 if again and not number:
                     memory.taken += [SUBSPACES, *([TIME_STEP] if chooses and memory.step else [])]
@@ -182,24 +186,21 @@ def _complete_run(
 
 
 def _is_accurate(
-    projected: ProjectedShot, tracks: tuple[Track, ...], result: Result, options: RunSettings,
-    complete: ReferenceRun | None,
+    projected: ProjectedShot, tracks: tuple[Track, ...], result: Result, options: RunSettings
 ) -> bool:  # fmt: skip
-    """Whether the subspaces do for the curves that were found; if not, they are chosen anew.
+    """Whether the subspaces of almost the same motion do for the curves that were found; if not, they are chosen anew.
 
-    Args:
-        complete: The curves with all coordinates; None where the subspaces are those of almost the same motion: then
-            more directions tell, and all of them only where these do not do.
+    More directions tell, and all of them only where these do not do.
     """
-    if complete is None:
-        animation, character = projected.shot.animation, projected.shot.character
-        finer = projected.finer_run(result.step_s, options, tracks)
-        run = frames_of(result, animation.frame_times)
-        off = 0.0 if finer is None else distance(finer.positions, run.positions)
-        if off <= HELD * tolerance_of(character, options.tolerance):
-            return True
-        complete = _complete_run(projected, tracks, result, options)
-    return projected.is_accurate_for(complete)
+    animation, character = projected.shot.animation, projected.shot.character
+    finer = projected.finer_run(result.step_s, options, tracks)
+    if finer is None:
+        return True
+    off = distance(finer.positions, frames_of(result, animation.frame_times).positions)
+    if off <= HELD * tolerance_of(character, options.tolerance):
+        projected.tell(max(off, projected.error_m))
+        return True
+    return projected.is_accurate_for(_complete_run(projected, tracks, result, options))
 
 
 def _searched(

@@ -7,6 +7,7 @@ from calmotion.multibody.linear_solver.closed_chains import (
     factor_closed_chains,
     solve_system,
     solve_system_transposed,
+    solve_with_border,
 )
 from calmotion.multibody.linear_solver.step_matrix import allocate_border, allocate_solution
 from dense import join, split
@@ -15,16 +16,18 @@ from trees import TREES
 
 
 @pytest.mark.parametrize("name", TREES)
-@pytest.mark.parametrize("transposed", [False, True], ids=["plain", "transposed"])
-def test_solution_is_that_of_the_dense_matrix(name, transposed):
+@pytest.mark.parametrize("kind", ["plain", "transposed", "with the border"])
+def test_solution_is_that_of_the_dense_matrix(name, kind):
     system, _, matrix, A = eliminated(name)
     b = np.random.default_rng(3).normal(size=len(A))
     x, lam = split(system, b)
     border, scratch = allocate_border(system), allocate_solution(system)
-    factor_closed_chains(system, matrix, border, scratch)
-    solve = solve_system_transposed if transposed else solve_system
-    solve(system, matrix, x, lam, scratch)
-    M = A.T if transposed else A
+    factor_closed_chains(system, matrix, border)
+    if kind == "with the border":
+        solve_with_border(system, matrix, border, x, lam, scratch)
+    else:
+        (solve_system_transposed if kind == "transposed" else solve_system)(system, matrix, x, lam, scratch)
+    M = A.T if kind == "transposed" else A
     found = join(system, x, lam)
     assert np.abs(M @ found - b).max() < 1e-12 * (np.abs(M) @ np.abs(found)).max()
     assert np.allclose(found, np.linalg.solve(M, b), rtol=1e-7, atol=1e-9)

@@ -57,7 +57,7 @@ def test_solutions_are_those_of_the_whole_matrix(made, transposed):
     b = A @ np.random.default_rng(3).normal(size=len(A))  # that has a solution, though multipliers are redundant
     regularize(system, blocks.K, blocks.Lc, blocks.Nc)
     assert factor(system, blocks, matrix, solution.block) == -1
-    factor_closed_chains(system, matrix, ws.scratch.border, solution)
+    factor_closed_chains(system, matrix, ws.scratch.border)
     x, lam = split(system, b)
     solve = solve_statics_transposed if transposed else solve_statics
     solve(system, matrix, x, lam, solution)

@@ -58,7 +58,7 @@ def motor_responses(
         if bad >= 0:
             raise SimulationFailure(float(times[n]), bad, Reason.SINGULAR)
         if joints > count:
-            factor_closed_chains(held, ws.matrix, scratch.border, scratch.solution)
+            factor_closed_chains(held, ws.matrix, scratch.border)
         for m, imposed in enumerate(imposed_by):
             x[:] = 0.0
             lam[:] = -blocks.by_angle * imposed[:, None]

@@ -19,7 +19,7 @@ from calmotion.multibody.integrators.workspace import Scratch, Workspace
 from calmotion.multibody.kernels.assembly import assemble
 from calmotion.multibody.kernels.sliders import LENGTH, slides_freely
 from calmotion.multibody.kernels.so3 import inverse_right_jacobian, matrix_of, turn
-from calmotion.multibody.linear_solver.closed_chains import copy_rows, factor_closed_chains, solve_system
+from calmotion.multibody.linear_solver.closed_chains import copy_rows, factor_closed_chains, solve_with_border
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.least_multipliers import least_multipliers
 from calmotion.multibody.linear_solver.step_matrix import StepMatrix
@@ -130,7 +130,7 @@ def _linearize(
     assemble(system, integrator, now, scratch.Vd, angle, rate, scratch.Hv, YES, ws.work, ws.blocks)
     bad = factor(system, ws.blocks, ws.matrix, scratch.solution.block)
     if bad < 0 and len(system.rows) > len(system.parent):
-        factor_closed_chains(system, ws.matrix, scratch.border, scratch.solution)
+        factor_closed_chains(system, ws.matrix, scratch.border)
     return bad
 
 
@@ -144,7 +144,7 @@ def solve_correction(system: System, blocks: Blocks, matrix: StepMatrix, scratch
     for j in range(len(system.rows)):
         for i in range(JOINT_ROWS):
             lam[j, i] = -blocks.gap[j, i]
-    solve_system(system, matrix, x, lam, scratch.solution)
+    solve_with_border(system, matrix, scratch.border, x, lam, scratch.solution)
 
 
 @kernel

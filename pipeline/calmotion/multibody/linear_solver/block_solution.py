@@ -15,7 +15,7 @@ from calmotion.multibody.linear_solver.step_matrix import UNKNOWNS, StepMatrix
 from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.shot.character import Array, IntArray
 from calmotion.support.by_reference import by_reference
-from calmotion.support.compilation import kernel
+from calmotion.support.compilation import kernel, shared_kernel
 
 
 @by_reference
@@ -64,9 +64,9 @@ def _swap(a: Array, b: Array) -> None:
         b[q] = t
 
 
-@kernel
-def _solve(system: System, matrix: StepMatrix, x: Array, lam: Array, block: Array) -> None:
-    """`elimination.solve` for all columns."""
+@shared_kernel
+def solve_tree(system: System, matrix: StepMatrix, x: Array, lam: Array, block: Array) -> None:
+    """`elimination.solve` for all columns; `block` is scratch, shape [N + 6, Q]."""
     m = JOINT_ROWS
     Lp, Hp, Nc, Jp, Z = matrix.Lp, matrix.Hp, matrix.Nc, matrix.Jp, matrix.Z
     count = len(system.parent)
@@ -152,8 +152,8 @@ def _copy(source: Array, out: Array) -> None:
                 out[i, k, q] = source[i, k, q]
 
 
-@kernel
-def _closing_rows(system: System, matrix: StepMatrix, x: Array, y: Array) -> None:
+@shared_kernel
+def closing_rows(system: System, matrix: StepMatrix, x: Array, y: Array) -> None:
     """y -= F x, as in `closed_chains`."""
     count = len(system.parent)
     for joint in range(count, len(system.rows)):
@@ -172,8 +172,8 @@ def _closing_rows(system: System, matrix: StepMatrix, x: Array, y: Array) -> Non
                     add(matrix.Jp[joint, k, i], x[p, i], y[at + JOINT_ROWS + k])
 
 
-@kernel
-def _subtract_border(system: System, matrix: StepMatrix, y: Array, x: Array) -> None:
+@shared_kernel
+def subtract_border(system: System, matrix: StepMatrix, y: Array, x: Array) -> None:
     """x -= E y, as in `closed_chains`."""
     count = len(system.parent)
     for joint in range(count, len(system.rows)):
@@ -201,20 +201,20 @@ def solve_block(system: System, matrix: StepMatrix, x: Array, lam: Array, scratc
         X, y, g = scratch.X, scratch.y, scratch.g
         _copy(x, X)
         _copy(lam, scratch.lam)
-        _solve(system, matrix, X, scratch.lam, scratch.block)
+        solve_tree(system, matrix, X, scratch.lam, scratch.block)
         for i in range(n):
             joint, k = count + i // UNKNOWNS, i % UNKNOWNS
             for q in range(g.shape[1]):
                 y[i, q] = 0.0
                 g[i, q] = lam[joint, k, q] if k < JOINT_ROWS else 0.0
-        _closing_rows(system, matrix, X, g)
+        closing_rows(system, matrix, X, g)
         for i in range(n):
             for k in range(n):
                 add(matrix.inverse[i, k], g[k], y[i])
-        _subtract_border(system, matrix, y, x)
+        subtract_border(system, matrix, y, x)
         for i in range(n):
             joint, k = count + i // UNKNOWNS, i % UNKNOWNS
             if k < JOINT_ROWS:
                 for q in range(g.shape[1]):
                     lam[joint, k, q] = y[i, q]
-    _solve(system, matrix, x, lam, scratch.block)
+    solve_tree(system, matrix, x, lam, scratch.block)

@@ -14,6 +14,7 @@ least norm. The transposed system uses the same matrices.
 from __future__ import annotations
 
 from calmotion.multibody.kernels.sliders import has_row
+from calmotion.multibody.linear_solver.block_solution import closing_rows, solve_tree, subtract_border
 from calmotion.multibody.linear_solver.elimination import solve, solve_transposed
 from calmotion.multibody.linear_solver.pseudo_inverse import pseudo_inverse
 from calmotion.multibody.linear_solver.step_matrix import UNKNOWNS, Border, SolutionScratch, StepMatrix
@@ -129,27 +130,22 @@ def _closing_rows_transposed(system: System, matrix: StepMatrix, y: Array, x: Ar
 
 
 @inlined_kernel
-def _schur_complement(system: System, matrix: StepMatrix, border: Border, scratch: SolutionScratch) -> None:
-    """S = G - F A^-1 E and the multipliers `free` into the border."""
+def _schur_complement(system: System, matrix: StepMatrix, border: Border) -> None:
+    """S = G - F A^-1 E and A^-1 E into the border."""
     count = len(system.parent)
     n = UNKNOWNS * (len(system.rows) - count)
-    y = scratch.y
-    for column in range(n):
-        for i in range(n):
-            y[i] = 0.0
-        y[column] = 1.0
-        scratch.X[:] = 0.0
-        scratch.lam[:] = 0.0
-        _add_border(system, matrix, y, 1.0, scratch.X)
-        solve(system, matrix, scratch.X, scratch.lam, scratch.block)
-        joint, k = count + column // UNKNOWNS, column % UNKNOWNS
-        y[column] = 1.0 if k >= JOINT_ROWS or not has_row(system, joint, k) else 0.0
-        _closing_rows(system, matrix, scratch.X, y)
-        for i in range(n):
-            border.S[i, column] = y[i]
-        for b in range(count):
-            for i in range(JOINT_ROWS):
-                border.free[column, b, i] = -scratch.lam[b, i]
+    S = border.S
+    border.moved[:] = 0.0
+    border.forces[:] = 0.0
+    for i in range(n):
+        for k in range(n):
+            S[i, k] = -1.0 if i == k else 0.0
+    subtract_border(system, matrix, S, border.moved)
+    solve_tree(system, matrix, border.moved, border.forces, border.block)
+    for i in range(n):
+        joint, k = count + i // UNKNOWNS, i % UNKNOWNS
+        S[i, i] = 1.0 if k >= JOINT_ROWS or not has_row(system, joint, k) else 0.0
+    closing_rows(system, matrix, border.moved, S)
 
 
 @inlined_kernel
@@ -211,10 +207,10 @@ def _scale_contacts(system: System, n: int, S: Array) -> float:
 
 
 @shared_kernel
-def factor_closed_chains(system: System, matrix: StepMatrix, border: Border, scratch: SolutionScratch) -> None:
+def factor_closed_chains(system: System, matrix: StepMatrix, border: Border) -> None:
     """S^+ of the closed chains into matrix.inverse, after the tree has been eliminated."""
     n = UNKNOWNS * (len(system.rows) - len(system.parent))
-    _schur_complement(system, matrix, border, scratch)
+    _schur_complement(system, matrix, border)
     length = system.unit[0, 0]
     contacts = _scale_contacts(system, n, border.S)
     rows, largest = _scale(n, length, border.S)
@@ -271,6 +267,43 @@ def solve_system(system: System, matrix: StepMatrix, x: Array, lam: Array, scrat
             if k < JOINT_ROWS:
                 lam[joint, k] = y[i]
     solve(system, matrix, x, lam, scratch.block)
+
+
+@shared_kernel
+def solve_with_border(
+    system: System, matrix: StepMatrix, border: Border, x: Array, lam: Array, scratch: SolutionScratch
+) -> None:
+    """`solve_system` where the border is that of the matrix: one solution of the tree in place of two."""
+    count, joints = len(system.parent), len(system.rows)
+    solve(system, matrix, x, lam, scratch.block)
+    if joints == count:
+        return
+    n = UNKNOWNS * (joints - count)
+    y, g = scratch.y, scratch.g
+    for i in range(n):
+        joint, k = count + i // UNKNOWNS, i % UNKNOWNS
+        g[i] = lam[joint, k] if k < JOINT_ROWS else 0.0
+    _closing_rows(system, matrix, x, g)
+    for i in range(n):
+        t = 0.0
+        for k in range(n):
+            t += matrix.inverse[i, k] * g[k]
+        y[i] = t
+    for b in range(count):
+        for i in range(6 + system.elastic[b]):
+            t = 0.0
+            for k in range(n):
+                t += border.moved[b, i, k] * y[k]
+            x[b, i] -= t
+        for i in range(JOINT_ROWS):
+            t = 0.0
+            for k in range(n):
+                t += border.forces[b, i, k] * y[k]
+            lam[b, i] -= t
+    for i in range(n):
+        joint, k = count + i // UNKNOWNS, i % UNKNOWNS
+        if k < JOINT_ROWS:
+            lam[joint, k] = y[i]
 
 
 @shared_kernel

@@ -105,7 +105,7 @@ def accelerations(
     if bad >= 0:
         return bad
     if joints > count:
-        factor_closed_chains(system, ws.matrix, scratch.border, scratch.solution)
+        factor_closed_chains(system, ws.matrix, scratch.border)
     solve_correction(system, blocks, ws.matrix, scratch)
     if joints > count:
         least_multipliers(system, scratch.border, lam)

@@ -29,7 +29,7 @@ def least_multipliers(system: System, border: Border, lam: Array) -> None:
                 t = 0.0
                 if joint < count:
                     for column in range(n):
-                        t += border.free[column, joint, i] * border.null[column, s]
+                        t -= border.forces[joint, i, column] * border.null[column, s]
                 else:
                     t = border.null[UNKNOWNS * (joint - count) + i, s]
                 if not has_row(system, joint, i):

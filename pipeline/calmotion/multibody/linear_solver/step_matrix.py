@@ -73,8 +73,10 @@ class Border(NamedTuple):
         margin: Distance of S from a lower rank: its smallest pivot over the largest, shape [1].
         S: Shape [9 L, 9 L]; overwritten by its decomposition.
         decomposition: Scratch of `pseudo_inverse`.
-        free: Multipliers of the tree's joints for each unknown of the border, shape [9 L, J, 6].
-        sets: Scratch of `least_multipliers`, same shape.
+        moved, forces: What each unknown of the border moves in the tree, and the multipliers of the tree's joints with
+            it, of opposite sign: A^-1 E, shapes [B, N, 9 L] and [J, 6, 9 L].
+        block: Scratch, shape [N + 6, 9 L].
+        sets: Scratch of `least_multipliers`, shape [9 L, J, 6].
     """
 
     null: Array
@@ -82,7 +84,9 @@ class Border(NamedTuple):
     margin: Array
     S: Array
     decomposition: Decomposition
-    free: Array
+    moved: Array
+    forces: Array
+    block: Array
     sets: Array
 
 
@@ -130,15 +134,17 @@ def matrices_between(matrices: StepMatrix, instants: slice) -> StepMatrix:
 
 def allocate_border(system: System) -> Border:
     """Scratch for one system; empty where it has no closed chains."""
-    joints = len(system.rows)
-    n = UNKNOWNS * (joints - len(system.parent))
+    count, joints = len(system.parent), len(system.rows)
+    n = UNKNOWNS * (joints - count)
     return Border(
         null=np.zeros((n, n)),
         rank=np.zeros(1, np.int64),
         margin=np.zeros(1),
         S=np.zeros((n, n)),
         decomposition=allocate_decomposition(n),
-        free=np.zeros((n, joints, JOINT_ROWS)),
+        moved=np.zeros((count, system.size, n)),
+        forces=np.zeros((joints, JOINT_ROWS, n)),
+        block=np.zeros((system.size + JOINT_ROWS, n)),
         sets=np.zeros((n, joints, JOINT_ROWS)),
     )
 

@@ -121,7 +121,7 @@ def _linearize(
         if joints > count:
             for j in range(count, joints):
                 copy_rows(blocks.Hc[j], matrix.Hc[j - count])
-            factor_closed_chains(system, matrix, scratch.border, scratch.solution)
+            factor_closed_chains(system, matrix, scratch.border)
         for b in range(count):
             copy_rows(work.R[b], steps.R[at, b])
     return -1, 0

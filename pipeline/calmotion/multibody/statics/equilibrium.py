@@ -143,7 +143,7 @@ def _iterate(
         x[:] = -blocks.res
         lam[:] = -blocks.gap
         if chains_closed:
-            factor_closed_chains(system, ws.matrix, border, solution)
+            factor_closed_chains(system, ws.matrix, border)
         solve_system(system, ws.matrix, x, lam, solution)
         size = float(largest_entry(system, x))
         if not np.isfinite(size):
