@@ -10,6 +10,7 @@ from calmotion.accuracy.pod_subspace import ProjectedShot, project_to_subspace, 
 from calmotion.accuracy.step_error import distance, simulate_at
 from calmotion.errors import ShotError
 from calmotion.shot import Track
+from calmotion.shot.budget import SUBSPACE
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import with_elasticity
 from calmotion.simulation.body_reduction import reduced_shot
@@ -65,6 +66,20 @@ def test_simplifications_are_reported(nonlinear, known):
         few_of_all = f"{len(few.stiffness)} of {len(all_of_them.stiffness)}"
         assert row.what == f"{body.path}: POD subspace of {few_of_all} elastic coordinates"
     assert sum(row.estimated_error_m for row in rows) == pytest.approx(found.error_m)
+
+
+def test_bodies_tell_the_error_of_the_motion_that_was_judged_last(nonlinear, animation, known):
+    """Half of a motion deflects bodies by half, and leaves the directions of the whole by less."""
+    found = held(nonlinear, known)
+    before = found.error_m
+    half = tuple(Track(track.times, 0.5 * track.values) for track in animation.current)
+    assert found.is_accurate_for(found.complete_run(half, STEP)) and 0.0 < found.error_m < 0.8 * before
+    assert found.error_m == off(nonlinear, found.shot, half, STEP)
+    for few, all_of_them in zip(found.shot.bodies, nonlinear.bodies, strict=True):
+        rows = [row for row in few.left_out if row.source == SUBSPACE]
+        assert len(rows) == (len(few.stiffness) < len(all_of_them.stiffness))
+    told = [row.estimated_error_m for body in found.shot.bodies for row in body.left_out if row.source == SUBSPACE]
+    assert sum(told) == pytest.approx(found.error_m)
 
 
 def test_a_pod_subspace_is_extended_by_curves_that_deflect_bodies_differently(nonlinear, animation):
