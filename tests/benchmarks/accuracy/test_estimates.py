@@ -31,9 +31,20 @@ def test_meshes_of_a_reference_are_regular_and_of_the_same_links():
 
 def test_every_shot_is_counted_once():
     table = counts([row(k, ratio) for k, ratio in enumerate([0.01, 0.3, 0.4, 0.9, 1.2, 7.0])])
-    assert [int(n) for _, n, _ in table[:-1]] == [1, 0, 0, 2, 1, 1, 1, 0, 3]
+    assert [int(n) for _, n, _ in table[:-1]] == [1, 0, 0, 2, 1, 1, 1, 0, 3, 3]
     assert table[0][0] == "0 to 0.05" and table[6] == ["above 1.5", "1", "17%"]
-    assert table[-2:] == [["0.05 to 1", "3", "50.0%"], ["largest", "7.00", "-"]]
+    assert [table[-3], table[-1]] == [["0.05 to 1", "3", "50.0%"], ["largest", "7.00", "-"]]
+
+
+def test_shots_at_a_border_may_be_on_either_side_of_it():
+    """Of an estimate of 1 mm: 0.04, 0.04, 1.1 and 1.1 mm, known to 0.02, 0.005, 0.2 and 0.05 mm."""
+    cases = ((0.04, 2e-5), (0.04, 5e-6), (1.1, 2e-4), (1.1, 5e-5), (0.5, 1e-5))
+    rows = [row(k, ratio, reference) for k, (ratio, reference) in enumerate(cases)]
+    assert [one.may_be_honest for one in rows] == [True, False, True, False, True]
+    assert counts(rows)[-3:-1] == [
+        ["0.05 to 1", "1", "20.0%"],
+        ["0.05 to 1, as far as the reference is known", "3", "60.0%"],
+    ]
 
 
 def test_a_reference_known_to_half_of_what_it_judges_decides():
