@@ -109,16 +109,13 @@ def optimize_to_tolerance(
             iterations = max((row.iterations for row in latest.windows), default=latest.iterations)
             ended = iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
             unknown = not again and not number and not ended  # later searches end near the motion of the first
-            result, complete = _with_accuracy(result, reduced, projected, tracks, options, unknown)
-            accurate = ended or (complete is not None and projected.is_accurate_for(complete))
-            if accurate and complete is not None:  # the motion found leaves the directions less than that of the input
-                result = with_subspaces(result, projected.shot)
+            result, accurate = _with_accuracy(result, reduced, projected, tracks, options, unknown)
             accuracy = result.accuracy
             assert accuracy is not None
             allowed = allowed_step_error(character, options, besides_step(accuracy)) if chooses else np.inf
             fine = accuracy.step_m <= allowed or step <= LAST
-            if fine and complete is None and not ended:
-                accurate = _is_accurate(projected, tracks, result, options)
+            if fine and accurate is None:
+                accurate = ended or _is_accurate(projected, tracks, result, options)
                 result = with_subspaces(result, projected.shot) if accurate else result
             if fine and accurate:
                 if again and not number:
@@ -170,13 +167,19 @@ def _robustly(
 def _with_accuracy(
     result: Result, shot: CompiledShot, projected: ProjectedShot, tracks: tuple[Track, ...], options: RunSettings,
     complete: bool,
-) -> tuple[Result, ReferenceRun | None]:  # fmt: skip
-    """The result with its accuracy, and, where wanted, its curves simulated with all coordinates, at the same time."""
+) -> tuple[Result, bool | None]:  # fmt: skip
+    """The result with its accuracy, and whether the subspaces do for its curves: None where that was not asked.
+
+    Args:
+        complete: Whether the curves are simulated with all coordinates, at the same time.
+    """
     told = partial(with_accuracy, result, shot.with_tracks(tracks), options, omitted_error(shot.bodies))
     if not complete:
         return told(), None
     with_all, known = at_once(told, partial(_complete_run, projected, tracks, result, options))
-    return with_all, known
+    accurate = None if known is None else projected.is_accurate_for(known)
+    # the motion that was found leaves the directions by less than that of the input
+    return (with_subspaces(with_all, projected.shot) if accurate else with_all), accurate
 
 
 def _complete_run(

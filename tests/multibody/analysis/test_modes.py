@@ -6,7 +6,7 @@ from arms import chain, compiled
 from calmotion.benchmarks.scenes.beam_arm import beam_arm
 from calmotion.benchmarks.scenes.four_bar import four_bar
 from calmotion.multibody.analysis.kinematics import rigid_state
-from calmotion.multibody.analysis.modes import elastic_modes, system_modes
+from calmotion.multibody.analysis.modes import elastic_modes, falling_rate, system_modes
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import compile_model
 from calmotion.multibody.model.topology import span_tree
@@ -115,3 +115,12 @@ def test_joints_that_form_a_loop_or_leave_a_child_free_are_not_a_tree_of_welds()
     assert modes._tree_motions(system, rows, offset) is None, "no row tells anything of a child"
     loop = system._replace(side=np.concatenate([system.side, system.side[:1]]))
     assert modes._tree_motions(loop, rows, offset) is None
+
+
+def test_an_upright_pendulum_falls_and_a_hanging_one_does_not():
+    """exp(t sqrt(g / L)) of a mass on a rod of 0.4 m."""
+    model = compiled(chain(1, length=0.4))
+    world = Workspace.for_system(model.system).work.world
+    for angle, rate in ((-np.pi / 2, np.sqrt(9.81 / 0.4)), (np.pi / 2, 0.0)):
+        angles = np.array([angle])
+        assert falling_rate(model, rigid_state(model, angles), angles, world) == pytest.approx(rate, rel=1e-6)

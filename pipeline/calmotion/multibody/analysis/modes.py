@@ -38,6 +38,20 @@ def system_modes(model: Model, joint_angles: Array, world: Array | None = None) 
     return omega / (2.0 * np.pi), np.where(omega > 0.0, damping / np.maximum(2.0 * omega, 1e-300), 0.0)
 
 
+def falling_rate(model: Model, state: State, joint_angles: Array, world: Array) -> float:
+    """With what rate a robot leaves an equilibrium by itself [1/s]; 0 where it is stable.
+
+    Args:
+        state: The equilibrium; an iteration may end in one that is not stable.
+        joint_angles: Shape [B].
+        world: Moving markers, shape [W, 18].
+    """
+    workspace = Workspace.for_system(model.system)
+    workspace.work.world[:] = world
+    squares, *_ = _squares(system_held(model.system, world), state, joint_angles, workspace)
+    return float(np.sqrt(max(0.0, -float(squares.min(initial=0.0)))))
+
+
 def elastic_modes(model: Model) -> tuple[Array, list[Array]]:
     """Natural modes of the undeformed character in the pose in which the shot was authored, without gravity.
 
@@ -74,13 +88,19 @@ def _natural_modes(
     system: System, state: State, joint_angles: Array, workspace: Workspace
 ) -> tuple[Array, Array, Array]:
     """Angular frequencies [rad/s], modes of mass one, shape [N, n], and damping, shape [N, N], in all coordinates."""
+    squares, shapes, C = _squares(system, state, joint_angles, workspace)
+    return np.sqrt(np.maximum(squares, 0.0)), shapes, C
+
+
+def _squares(system: System, state: State, joint_angles: Array, workspace: Workspace) -> tuple[Array, Array, Array]:
+    """Squares of the angular frequencies [1/s^2], negative where the pose is unstable, and the rest of the same."""
     K, M, C, allowed = _matrices(system, state, joint_angles, workspace)
     if not allowed.shape[1]:
         return np.zeros(0), allowed, C
     stiffness = allowed.T @ K @ allowed
     # symmetric but for a part from the axes of the moments, which vanishes on allowed motions
     values, shapes = eigh(0.5 * (stiffness + stiffness.T), allowed.T @ M @ allowed)
-    return np.sqrt(np.maximum(values, 0.0)), allowed @ shapes, C
+    return values, allowed @ shapes, C
 
 
 def _matrices(

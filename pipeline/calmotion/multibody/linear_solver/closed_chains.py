@@ -32,8 +32,8 @@ def copy_rows(source: Array, out: Array) -> None:
 
 
 @kernel
-def _add_border(system: System, matrix: StepMatrix, y: Array, sign: float, x: Array) -> None:
-    """x += sign E y."""
+def _subtract_border(system: System, matrix: StepMatrix, y: Array, x: Array) -> None:
+    """x -= E y."""
     Lc, Lp, Nc = matrix.Lc, matrix.Lp, matrix.Nc
     count = len(system.parent)
     for joint in range(count, len(system.rows)):
@@ -41,19 +41,19 @@ def _add_border(system: System, matrix: StepMatrix, y: Array, sign: float, x: Ar
         p = system.side[joint, 0]
         b = system.side[joint, 1]
         for k in range(JOINT_ROWS):
-            t = sign * y[at + k]
+            t = y[at + k]
             if t == 0.0:
                 continue
             for i in range(6 + system.elastic[b]):
-                x[b, i] += Lc[joint, i, k] * t
+                x[b, i] -= Lc[joint, i, k] * t
             if p >= 0:
                 for i in range(6 + system.elastic[p]):
-                    x[p, i] += Lp[joint, i, k] * t
+                    x[p, i] -= Lp[joint, i, k] * t
         if p >= 0:
             for k in range(3):
-                t = sign * y[at + JOINT_ROWS + k]
+                t = y[at + JOINT_ROWS + k]
                 for i in range(6 + system.elastic[b]):
-                    x[b, i] += Nc[joint, i, k] * t
+                    x[b, i] -= Nc[joint, i, k] * t
 
 
 @kernel
@@ -241,6 +241,25 @@ def _unit(i: int, length: float) -> float:
     return length if 3 <= i % UNKNOWNS < JOINT_ROWS else 1.0
 
 
+@kernel
+def _closing_part(system: System, lam: Array, g: Array) -> None:
+    """Right-hand side of the border from that of all constraint rows, shape [J, 6]."""
+    count = len(system.parent)
+    for joint in range(count, len(system.rows)):
+        at = UNKNOWNS * (joint - count)
+        for k in range(UNKNOWNS):
+            g[at + k] = lam[joint, k] if k < JOINT_ROWS else 0.0
+
+
+@kernel
+def _set_closing_part(system: System, y: Array, lam: Array) -> None:
+    """Multipliers of the joints that close chains, from the unknowns of the border."""
+    count = len(system.parent)
+    for joint in range(count, len(system.rows)):
+        for k in range(JOINT_ROWS):
+            lam[joint, k] = y[UNKNOWNS * (joint - count) + k]
+
+
 @shared_kernel
 def solve_system(system: System, matrix: StepMatrix, x: Array, lam: Array, scratch: SolutionScratch) -> None:
     """(x, lam) <- solution of the whole linear system, closed chains included; shapes [B, N] and [J, 6]."""
@@ -252,20 +271,15 @@ def solve_system(system: System, matrix: StepMatrix, x: Array, lam: Array, scrat
         copy_rows(x, X)
         copy_rows(lam, scratch.lam)
         solve(system, matrix, X, scratch.lam, scratch.block)
-        for i in range(n):
-            joint, k = count + i // UNKNOWNS, i % UNKNOWNS
-            g[i] = lam[joint, k] if k < JOINT_ROWS else 0.0
+        _closing_part(system, lam, g)
         _closing_rows(system, matrix, X, g)
         for i in range(n):
             t = 0.0
             for k in range(n):
                 t += matrix.inverse[i, k] * g[k]
             y[i] = t
-        _add_border(system, matrix, y, -1.0, x)
-        for i in range(n):
-            joint, k = count + i // UNKNOWNS, i % UNKNOWNS
-            if k < JOINT_ROWS:
-                lam[joint, k] = y[i]
+        _subtract_border(system, matrix, y, x)
+        _set_closing_part(system, y, lam)
     solve(system, matrix, x, lam, scratch.block)
 
 
@@ -280,9 +294,7 @@ def solve_with_border(
         return
     n = UNKNOWNS * (joints - count)
     y, g = scratch.y, scratch.g
-    for i in range(n):
-        joint, k = count + i // UNKNOWNS, i % UNKNOWNS
-        g[i] = lam[joint, k] if k < JOINT_ROWS else 0.0
+    _closing_part(system, lam, g)
     _closing_rows(system, matrix, x, g)
     for i in range(n):
         t = 0.0
@@ -300,10 +312,7 @@ def solve_with_border(
             for k in range(n):
                 t += border.forces[b, i, k] * y[k]
             lam[b, i] -= t
-    for i in range(n):
-        joint, k = count + i // UNKNOWNS, i % UNKNOWNS
-        if k < JOINT_ROWS:
-            lam[joint, k] = y[i]
+    _set_closing_part(system, y, lam)
 
 
 @shared_kernel
@@ -317,9 +326,7 @@ def solve_system_transposed(system: System, matrix: StepMatrix, x: Array, lam: A
         copy_rows(x, X)
         copy_rows(lam, scratch.lam)
         solve_transposed(system, matrix, X, scratch.lam, scratch.block)
-        for i in range(n):
-            joint, k = count + i // UNKNOWNS, i % UNKNOWNS
-            g[i] = lam[joint, k] if k < JOINT_ROWS else 0.0
+        _closing_part(system, lam, g)
         _border_transposed(system, matrix, X, g)
         for i in range(n):
             t = 0.0
@@ -327,8 +334,5 @@ def solve_system_transposed(system: System, matrix: StepMatrix, x: Array, lam: A
                 t += matrix.inverse[k, i] * g[k]
             y[i] = t
         _closing_rows_transposed(system, matrix, y, x)
-        for i in range(n):
-            joint, k = count + i // UNKNOWNS, i % UNKNOWNS
-            if k < JOINT_ROWS:
-                lam[joint, k] = y[i]
+        _set_closing_part(system, y, lam)
     solve_transposed(system, matrix, x, lam, scratch.block)

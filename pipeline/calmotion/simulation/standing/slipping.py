@@ -11,6 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from calmotion.errors import ShotError
 from calmotion.multibody.analysis.kinematics import rigid_state
+from calmotion.multibody.analysis.modes import falling_rate
+from calmotion.multibody.integrators.trajectory import copy_of_instant
 from calmotion.multibody.model.model import Model, start_angles
 from calmotion.multibody.model.phases import held_contacts
 from calmotion.shot import Character
@@ -21,6 +23,7 @@ from calmotion.simulation.inputs.time_grid import TimeGrid
 
 ABOVE = 1.1  # of a slip: the tolerance that lets it be
 TOPPLED = 0.2  # turn of a base at rest that is no sag [rad]
+FALLING = 0.1  # rate with which an equilibrium is left [1/s]; a pendulum of a kilometre upside down has as much
 
 
 def refuse_slipping(
@@ -76,17 +79,22 @@ def _largest_slip(places: Array, held: BoolArray) -> tuple[float, int]:
 
 
 def _refuse_toppled(character: Character, model: Model, run: ForwardRun) -> None:
-    """Refuse a robot whose static start is far from the pose of its first frame."""
-    world = run.trajectory.world[0]
-    pose = rigid_state(model, start_angles(model, run.joint_angles[0]), world)
-    for base in np.flatnonzero(model.system.rows[: len(model.system.parent)] == 0):
-        turns = Rotation.from_quat(np.stack([pose.q[base], run.trajectory.states.q[0, base]]), scalar_first=True)
-        angle = float((turns[0].inv() * turns[1]).magnitude())
-        if angle > TOPPLED:
-            body = character.bodies[model.tree.body[base]].path
-            raise ShotError(
-                f"the robot falls over at rest: its contacts leave it free to turn, by {np.degrees(angle):.0f} degrees",
-                path=body,
-                attribute="calm:contact:kind",
-                remedy="Hold a foot as a sole, or by three points or more that are not in a line",
-            )
+    """Refuse a robot whose static start is far from the pose of its first frame, or is not stable: which of the two the
+    search for an equilibrium ends in is a matter of rounding."""
+    world, angles = run.trajectory.world[0], run.joint_angles[0]
+    bases = np.flatnonzero(model.system.rows[: len(model.system.parent)] == 0)
+    if not len(bases):
+        return
+    pose, start = rigid_state(model, start_angles(model, angles), world), copy_of_instant(run.trajectory.states, 0)
+    turns = [Rotation.from_quat(state.q[bases], scalar_first=True) for state in (pose, start)]
+    turned = (turns[0].inv() * turns[1]).magnitude()
+    far = int(np.argmax(turned))
+    if turned[far] <= TOPPLED and falling_rate(model, start, angles, world) <= FALLING:
+        return
+    by = f", by {np.degrees(turned[far]):.0f} degrees" if turned[far] > TOPPLED else ""
+    raise ShotError(
+        f"the robot falls over at rest: its contacts leave it free to turn{by}",
+        path=character.bodies[model.tree.body[bases[far]]].path,
+        attribute="calm:contact:kind",
+        remedy="Hold a foot as a sole, or by three points or more that are not in a line",
+    )
