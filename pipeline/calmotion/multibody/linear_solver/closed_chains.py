@@ -252,6 +252,16 @@ def _closing_part(system: System, lam: Array, g: Array) -> None:
 
 
 @kernel
+def _unknowns(n: int, inverse: Array, g: Array, y: Array) -> None:
+    """y = S^+ g."""
+    for i in range(n):
+        t = 0.0
+        for k in range(n):
+            t += inverse[i, k] * g[k]
+        y[i] = t
+
+
+@kernel
 def _set_closing_part(system: System, y: Array, lam: Array) -> None:
     """Multipliers of the joints that close chains, from the unknowns of the border."""
     count = len(system.parent)
@@ -273,11 +283,7 @@ def solve_system(system: System, matrix: StepMatrix, x: Array, lam: Array, scrat
         solve(system, matrix, X, scratch.lam, scratch.block)
         _closing_part(system, lam, g)
         _closing_rows(system, matrix, X, g)
-        for i in range(n):
-            t = 0.0
-            for k in range(n):
-                t += matrix.inverse[i, k] * g[k]
-            y[i] = t
+        _unknowns(n, matrix.inverse, g, y)
         _subtract_border(system, matrix, y, x)
         _set_closing_part(system, y, lam)
     solve(system, matrix, x, lam, scratch.block)
@@ -296,11 +302,7 @@ def solve_with_border(
     y, g = scratch.y, scratch.g
     _closing_part(system, lam, g)
     _closing_rows(system, matrix, x, g)
-    for i in range(n):
-        t = 0.0
-        for k in range(n):
-            t += matrix.inverse[i, k] * g[k]
-        y[i] = t
+    _unknowns(n, matrix.inverse, g, y)
     for b in range(count):
         for i in range(6 + system.elastic[b]):
             t = 0.0
