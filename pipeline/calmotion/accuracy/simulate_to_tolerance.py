@@ -143,9 +143,8 @@ def with_subspaces(result: Result, shot: CompiledShot) -> Result:
     told = {row.what: row for body in shot.bodies for row in body.left_out if row.source == SUBSPACE}
     known = result.accuracy
     assert known is not None
-    accuracy = _estimates(known.step_m, omitted_error(shot.bodies), shot, known.mesh_m, known.patches_m)
-    left_out = tuple(told.get(row.what, row) for row in result.left_out)
-    return replace(result, left_out=left_out, accuracy=replace(accuracy, efforts=known.efforts))
+    accuracy = replace(known, left_out_m=omitted_error(shot.bodies), subspace_m=_subspace_error(shot.bodies))
+    return replace(result, left_out=tuple(told.get(row.what, row) for row in result.left_out), accuracy=accuracy)
 
 
 def project_to_tolerance(
@@ -295,6 +294,12 @@ def omitted_error(bodies: Sequence[ReducedBody]) -> float:
     return sum(row.estimated_error_m or 0.0 for body in bodies for row in body.left_out)
 
 
+def _subspace_error(bodies: Sequence[ReducedBody]) -> float:
+    """The part of it of their POD subspaces [m]."""
+    rows = [row for body in bodies for row in body.left_out]
+    return sum(row.estimated_error_m or 0.0 for row in rows if row.source == SUBSPACE)
+
+
 def _accuracy(step: float, left_out: float, shot: CompiledShot, options: RunSettings, run: StepRun) -> Accuracy:
     """The estimates for a run: of its step, of what its bodies do without, of their meshes and patches [m]."""
     mesh, patch = at_once(partial(mesh_error, shot, options, run), partial(patch_error, shot, options, run))
@@ -303,9 +308,7 @@ def _accuracy(step: float, left_out: float, shot: CompiledShot, options: RunSett
 
 def _estimates(step: float, left_out: float, shot: CompiledShot, mesh: float | None, patch: float) -> Accuracy:
     """The same, those of meshes and patches known."""
-    rows = [row for body in shot.bodies for row in body.left_out]
-    subspace = sum(row.estimated_error_m or 0.0 for row in rows if row.source == SUBSPACE)
-    return Accuracy(step, left_out, mesh, subspace, patch)
+    return Accuracy(step, left_out, mesh, _subspace_error(shot.bodies), patch)
 
 
 def intended_positions(shot: CompiledShot, options: RunSettings) -> Array:
