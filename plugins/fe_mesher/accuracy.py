@@ -30,6 +30,9 @@ _REFINED = 12_000
 # of the surface and 0.2 ms for each node)
 _POOR, _POOR_REFINED = 0.0125, (40_000, 60_000)
 _IN_TIME, _OF_TRIANGLE = 100_000, 16.5
+# Error of the frequencies, that of the volume included, for which a mesh may take minutes, and its nodes at most: six
+# of 160 links need it, most of all arms of many thin webs, whose frequencies are 8 to 30% too high with 30,000 nodes
+_BAD, _BAD_REFINED = 0.019, 250_000
 _KEPT = 22_000  # nodes of the mesh that takes the stiffness of these, where one factor is enough
 # Relative error of the squares of frequencies that a solver may leave on dense surfaces: of the G1's wrist 40% fewer
 # steps, with frequencies that differ by 0.07% where 1.6% are estimated
@@ -47,7 +50,7 @@ def effort_after(triangles: int) -> Effort:
 
     least, most = _POOR_REFINED
     poor = int(min(max(_IN_TIME - _OF_TRIANGLE * triangles, least), most))
-    effort = Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, poor, _KEPT)
+    effort = Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, poor, _KEPT, bad=2.0 * _BAD, bad_nodes=_BAD_REFINED)
     return replace(effort, algebraic=_ALGEBRAIC) if triangles > DENSE else effort
 
 

@@ -17,6 +17,7 @@ from calmotion.accuracy.element_size import (
 )
 from calmotion.errors import ShotError
 from calmotion.geometry.matching.congruence import Isometry
+from calmotion.geometry.solid import mass_of_solid
 from calmotion.geometry.tetrahedra import (
     connected_parts,
     measure_quality,
@@ -139,22 +140,27 @@ def _refuse_far(mesh: FEMesh, body: Body, frames: Sequence[Frame]) -> None:
 def _simpler(
     index: int, body: Body, geometry: FEMesh | Volume, options: MeshOptions, frames: Sequence[Frame], reason: ShotError
 ) -> Iterator[Volume]:  # fmt: skip
-    """The collision surface of a body, and a beam, in place of a visual surface that takes too long."""
+    """The collision surface of a body, and a beam, in place of a visual surface that takes too long.
+
+    A body without a stated mass has that of its solid.
+    """
     if body.flexible is None or body.flexible.geometry != "auto" or not isinstance(geometry, Volume):
         return
     if geometry.solid.source in _SIMPLE:
         return
     hidden = any(not surface.visible and len(surface.triangles) for surface in body.surfaces)
+    solid = geometry.solid
+    mass = body.mass or mass_of_solid(solid.points, solid.triangles, body.flexible.material.density)
     for source in ("collision", "beam") if hidden else ("beam",):
         settings = replace(body.flexible, geometry=source, mesh_file="", wall_thickness=-1.0)
         try:
-            found = geometry_of(index, replace(body, flexible=settings, tets=None), options, frames)
+            found = geometry_of(index, replace(body, flexible=settings, tets=None, mass=mass), options, frames)
         except ShotError:
             continue
         if isinstance(found, Volume) and found.solid.source in _SIMPLE:
-            if len(found.solid.triangles) >= max(len(geometry.solid.triangles), DENSE):
+            if len(found.solid.triangles) >= max(len(solid.triangles), DENSE):
                 continue  # a copy of the visual surface takes as long
-            ratio = found.solid.volume / geometry.solid.volume
+            ratio = found.solid.volume / solid.volume
             note = (
                 f"meshed the {found.solid.source}, with {ratio:.2g} of the volume of the visual surface, which takes "
                 f"too long ({reason.found}): its stiffness differs; give a TetMesh or a simpler mesh file"

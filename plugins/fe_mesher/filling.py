@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.accuracy.element_size import Shape, envelope, expected_nodes, smallest_size
 from calmotion.errors import ShotError
 from calmotion.geometry.closed_surfaces import enclosed_volume
+from calmotion.geometry.grids.contacts import without_contacts
 from calmotion.geometry.surfaces.decimation import decimated
 from calmotion.geometry.tetrahedra import (
     connected_parts,
@@ -241,15 +242,19 @@ def _accepted(mesh: FEMesh, solid: Solid, volumes: list[float], path: str) -> FE
 
 
 def _whole(mesh: FEMesh, path: str) -> FEMesh:
-    """The mesh without small parts that a connection thinner than the distance to the surface held."""
+    """The mesh without what a connection thinner than the distance to the surface made.
+
+    Those are contacts in points and edges, and small parts that they held.
+    """
     kept = largest_part(mesh.points, mesh.tets)
     if len(kept) == len(mesh.tets):
-        return mesh
+        points, tets = without_contacts(mesh.points, mesh.tets)
+        return replace(mesh, points=points, tets=tets)
     volume = float(tet_volumes(mesh.points, kept).sum())
     lost = 1.0 - volume / mesh.quality.volume
     if lost > _LOOSE:
         refuse_loose_parts(mesh.tets, path)
-    points, tets = without_unused_points(mesh.points, kept)
+    points, tets = without_contacts(*without_unused_points(mesh.points, kept))
     notes = (*mesh.quality.repairs, f"removed loose parts of the mesh, {100.0 * lost:.2g}% of the volume")
     return replace(mesh, points=points, tets=tets, quality=replace(mesh.quality, volume=volume, repairs=notes))
 

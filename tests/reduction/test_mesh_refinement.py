@@ -78,9 +78,30 @@ def test_more_nodes_are_spent_on_meshes_with_a_poor_estimate():
     effort = Effort(0.02, 12_000, 0.08, 20_000)
     assert effort.ends(0.01, 500) and not effort.ends(0.03, 500)
     assert effort.ends(0.07, 8_000) and not effort.ends(0.09, 8_000)
-    assert effort.allows(8_000, 19_000) and not effort.allows(8_000, 21_000)
-    assert effort.allows(7_000, 21_000)  # few as they are, whatever one bisection makes of them
-    assert not Effort(0.02, 12_000).allows(8_000, 8_100)
+    assert effort.allows(0.1, 8_000, 19_000) and not effort.allows(0.1, 8_000, 21_000)
+    assert effort.allows(0.1, 7_000, 21_000)  # few as they are, whatever one bisection makes of them
+    assert not Effort(0.02, 12_000).allows(0.1, 8_000, 8_100)
+
+
+def test_still_more_nodes_are_spent_on_meshes_whose_frequencies_tell_nothing():
+    effort = Effort(0.02, 12_000, 0.08, 20_000, bad=0.2, bad_nodes=50_000)
+    assert not effort.allows(0.19, 15_000, 30_000) and effort.allows(0.21, 15_000, 49_000)
+    assert not effort.allows(0.21, 15_000, 51_000)
+    assert effort.allows(0.1, 30_000, 45_000)  # until the error is no longer poor
+    assert effort.ends(0.07, 30_000) and not effort.ends(0.09, 30_000)
+    assert not replace(effort, bad=0.05).ends(0.07, 8_000)  # what the volume leaves of it may be less than poor
+
+
+def test_what_the_volume_is_off_by_counts_for_a_bad_error(helpers, beam, frames):
+    coarse, carrier = mesh_of(helpers, (8, 2, 2)), frames[1].frame
+    error = frequency_estimate(coarse, beam, carrier).error
+    effort = Effort(0.0, 0, np.inf, 430, bad=1.4 * error, bad_nodes=1_500)
+    nodes = []
+    for volume_error in (0.0, 0.3 * error):
+        quality = replace(coarse.quality, volume_error=volume_error)
+        fine = refined_for_frequencies(replace(coarse, quality=quality), beam, carrier, effort)
+        nodes.append(frequency_estimate(fine, beam, carrier).nodes)
+    assert nodes[0] <= 430 < nodes[1] <= 1_500
 
 
 def test_a_link_keeps_few_nodes_where_one_factor_is_that_of_finer_meshes(helpers, beam, frames):

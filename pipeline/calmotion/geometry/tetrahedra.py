@@ -14,7 +14,7 @@ from calmotion.shot.meshes import MeshQuality
 Indices = NDArray[np.integer[Any]]  # integers of any width
 
 MOST_POINTS = 2**21  # three numbers of corners fit in the 63 bits of one integer
-_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # face i is opposite corner i, outward
+FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # face i is opposite corner i, outward
 
 
 def tet_volumes(points: Array, tets: IntArray) -> Array:
@@ -26,14 +26,14 @@ def tet_volumes(points: Array, tets: IntArray) -> Array:
 def face_normals(points: Array, tets: IntArray) -> Array:
     """Outward unit normals of the four faces, face i opposite corner i, shape [m, 4, 3] (positive volumes)."""
     x = points[tets]
-    a, b, c = (x[:, _FACES[:, k]] for k in range(3))
+    a, b, c = (x[:, FACES[:, k]] for k in range(3))
     n = np.cross(b - a, c - a)
     return np.asarray(n / np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), np.finfo(float).tiny))
 
 
 def boundary_triangles(tets: IntArray) -> IntArray:
     """Triangles that belong to one tetrahedron only, outward, shape [k, 3] (positive volumes)."""
-    faces = tets[:, _FACES].reshape(-1, 3)
+    faces = tets[:, FACES].reshape(-1, 3)
     _, first, count = np.unique(corner_keys(faces), return_index=True, return_counts=True)
     return np.ascontiguousarray(faces[np.sort(first[count == 1])])
 
@@ -210,13 +210,19 @@ def largest_part(points: Array, tets: IntArray) -> IntArray:
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    side = np.unique(corner_keys(tets[:, _FACES].reshape(-1, 3)), return_inverse=True)[1]
-    owner, order = np.repeat(np.arange(len(tets)), 4), np.argsort(side, kind="stable")
-    twice = np.flatnonzero(side[order][1:] == side[order][:-1])
-    graph = coo_matrix((np.ones(len(twice)), (owner[order][twice], owner[order][twice + 1])), shape=(len(tets),) * 2)
+    first, second = shared_sides(tets)
+    graph = coo_matrix((np.ones(len(first)), (first // 4, second // 4)), shape=(len(tets),) * 2)
     part = connected_components(graph, directed=False)[1]
     volumes = np.bincount(part, np.abs(tet_volumes(points, tets)))
     return np.asarray(tets[part == volumes.argmax()])
+
+
+def shared_sides(tets: IntArray) -> tuple[Indices, Indices]:
+    """Pairs of sides that two tetrahedra have in common, as 4 t + i for that of tetrahedron t opposite its corner i."""
+    side = corner_keys(tets[:, FACES].reshape(-1, 3))
+    order = np.argsort(side, kind="stable")
+    twice = np.flatnonzero(side[order][1:] == side[order][:-1])
+    return order[twice], order[twice + 1]
 
 
 def part_of_each(cells: Indices) -> Indices:

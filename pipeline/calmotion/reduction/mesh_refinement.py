@@ -56,6 +56,8 @@ class Effort:
         poor_nodes: Largest number of nodes of a mesh with a larger error.
         kept_nodes: Largest number of nodes of the mesh that takes the stiffness of finer ones, if by one factor.
         algebraic: Relative error of the squares of frequencies of a mesh that the solver may leave.
+        bad: An error, that of the volume included, for which still more nodes are spent.
+        bad_nodes: Largest number of nodes of a mesh that follows one with a larger error.
     """
 
     wanted: float
@@ -64,14 +66,17 @@ class Effort:
     poor_nodes: int = 0
     kept_nodes: float = np.inf
     algebraic: float = ALGEBRAIC
+    bad: float = np.inf
+    bad_nodes: int = 0
 
     def ends(self, error: float, nodes: int) -> bool:
         """Whether a mesh with an error is enough."""
-        return error <= self.wanted or (not self._few(nodes) and error <= self.poor)
+        return error <= self.wanted or (not self._few(nodes) and error <= min(self.poor, self.bad))
 
-    def allows(self, nodes: int, finer: int) -> bool:
-        """Whether a mesh may be followed by one with so many nodes."""
-        return self._few(nodes) or finer <= self.poor_nodes
+    def allows(self, error: float, nodes: int, finer: int) -> bool:
+        """Whether a mesh with an error may be followed by one with so many nodes."""
+        spent = error > self.bad or nodes > self.poor_nodes > 0  # what was begun because of a bad error goes on
+        return self._few(nodes) or finer <= (self.bad_nodes if spent else self.poor_nodes)
 
     def _few(self, nodes: int) -> bool:
         return nodes <= 0.6 * self.max_nodes  # the next bisection may exceed the limit by its factor
@@ -187,7 +192,10 @@ def _bisected(
     meshes, estimates = [mesh], [estimate(mesh)]
     # elements do not repair the volume, and far below its error they gain nothing
     by_volume = _of_volume(mesh)
-    effort = replace(effort, wanted=max(effort.wanted - by_volume, 0.5 * by_volume, 0.3 * effort.wanted))
+    effort = replace(
+        effort, wanted=max(effort.wanted - by_volume, 0.5 * by_volume, 0.3 * effort.wanted),
+        bad=max(effort.bad - by_volume, 0.5 * by_volume),
+    )  # fmt: skip
     for _ in range(_ROUNDS):
         by_interfaces = interface_factors(estimates[-1], estimates)
         error = max(extrapolation(estimates, one_factor)[1], by_interfaces[2] if by_interfaces else 0.0)
@@ -195,7 +203,7 @@ def _bisected(
             break
         for marked in (MARKED, _FEWER):
             finer = bisected_where(meshes[-1], estimates[-1].indicators, marked)
-            allowed = effort.allows(estimates[-1].nodes, quadratic_nodes(finer.points, finer.tets))
+            allowed = effort.allows(error, estimates[-1].nodes, quadratic_nodes(finer.points, finer.tets))
             if allowed or not effort.poor_nodes:
                 break
         if not allowed:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from calmotion.geometry.grids import grid_tets as grid_tets_module
 from calmotion.geometry.grids.grid_tets import grid_tets
 from calmotion.geometry.tetrahedra import boundary_triangles, connected_parts, min_dihedral_deg, tet_volumes
 
@@ -45,6 +46,21 @@ def test_parts_that_overlap_are_one_and_what_is_separate_is_left_out():
     points, tets = made(two, 0.003)
     assert tet_volumes(points, tets).sum() == pytest.approx(2 * 9e-5 - 2.7e-5, rel=0.05)
     assert points[:, 0].max() < 0.06
+
+
+def test_arms_of_a_fork_do_not_touch_along_edges(monkeypatch):
+    """Half a millimetre apart, they are as near as the corners of a grid of 6 mm."""
+    arm = trimesh.creation.box((0.1, 0.02, 0.02))
+    base = trimesh.creation.box((0.02, 0.06, 0.06)).apply_translation([-0.05, 0.01, 0.01])
+    fork = trimesh.util.concatenate([arm, arm.copy().apply_translation([0.0, 0.0205, 0.0205]), base])
+
+    def several_sides_at_edges():
+        sides = np.sort(boundary_triangles(made(fork, 0.006)[1])[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        return int((np.unique(sides, axis=0, return_counts=True)[1] != 2).sum())
+
+    assert several_sides_at_edges() == 0
+    monkeypatch.setattr(grid_tets_module, "without_contacts", lambda *mesh: mesh)
+    assert several_sides_at_edges() > 0
 
 
 def test_a_grid_that_does_not_resolve_the_surface_is_refused():

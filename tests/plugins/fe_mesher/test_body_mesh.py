@@ -119,6 +119,11 @@ def test_a_visual_surface_that_takes_too_long_gives_way_to_the_collision_surface
     mass = MassProperties(0.1, np.array([0.1, 0.0, 0.0]), np.diag([1e-6, 1e-4, 1e-4]))
     beam = made.mesh_body(0, replace(link(shown), mass=mass), options, frames)
     assert beam.quality.source == "equivalent beam"
+    at_its_end = (Frame(np.array([-0.1, 0.0, 0.0]), np.array([1.0, 0.0, 0.0, 0.0])),)
+    beam = made.mesh_body(0, link(shown), options, at_its_end)  # without a stated mass: that of the surface
+    assert beam.quality.source == "equivalent beam"
+    assert beam.quality.volume == pytest.approx(box().volume, rel=1e-3)
+    assert np.ptp(beam.points, axis=0) == pytest.approx([0.2, 0.02, 0.02], rel=1e-3)
     with pytest.raises(tetwild.OutOfTime):  # nothing else is there, or the shot asks for this surface
         made.mesh_body(0, link(shown), options, frames)
     with pytest.raises(tetwild.OutOfTime):

@@ -1,1 +1,1 @@
-"""Tetrahedra of a regular grid, and their fit to a surface."""
+"""Tetrahedra of a regular grid, and what meshes made for a surface need: the fit of their boundary, no contacts."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.geometry.grids.contacts import without_contacts
 from calmotion.geometry.nearby_triangles import NearbyTriangles
 from calmotion.geometry.tetrahedra import Indices, largest_part, tet_volumes, without_unused_points
 from calmotion.shot.character import Array, BoolArray, IntArray
@@ -117,11 +118,11 @@ def _cut(at: Array, depth: Array, tets: IntArray) -> tuple[Array, IntArray]:
 
 
 def _in_one_piece(points: Array, tets: IntArray) -> tuple[Array, IntArray]:
-    """The largest part of the tetrahedra, with positive volumes."""
+    """The largest part of the tetrahedra, with positive volumes and without contacts in points and edges."""
     tets = largest_part(points, tets)
     inverted = tet_volumes(points, tets) < 0.0
     tets[inverted] = tets[inverted][:, [1, 0, 2, 3]]
-    return without_unused_points(points, tets)
+    return without_contacts(*without_unused_points(points, tets))
 
 
 def _wound(points: Array, triangles: Indices, low: Array, counts: Array, spacing: float) -> Array:
