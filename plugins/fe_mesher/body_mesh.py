@@ -8,14 +8,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from calmotion.accuracy.element_size import (
-    MAX_NODES,
-    Shape,
-    element_size,
-    envelope,
-    shape_of,
-)
+from calmotion.accuracy.element_size import MAX_NODES, Shape, element_size, envelope, shape_of
 from calmotion.errors import ShotError
+from calmotion.geometry.grids.contacts import without_contacts
 from calmotion.geometry.matching.congruence import Isometry
 from calmotion.geometry.solid import mass_of_solid
 from calmotion.geometry.tetrahedra import (
@@ -251,6 +246,12 @@ def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FE
             repairs += (f"merged {merged} coincident points of separate parts",)
     refuse_loose_parts(tets, geometry.path)
     refuse_bad_neighbours(tets, geometry.path)
+    touching = len(without_contacts(points, tets)[0]) - len(points)
+    if touching:
+        repairs += (
+            f"at {touching} points tetrahedra have a corner or an edge in common, but no face, and hold each other the "
+            "less the finer they are: give them faces in common, or points of their own",
+        )
     quality = replace(measure_quality(points, tets, repairs=repairs), source="tetrahedra")
     return FEMesh(index, points, tets, quality)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.geometry.tetrahedra import connected_parts, tet_volumes
+from calmotion.geometry.tetrahedra import connected_parts, tet_volumes, welded_tets
 from calmotion.host import PluginError
 from calmotion.shot import Body, TetGeometry
 from calmotion.testing import check_plugin
@@ -55,6 +55,21 @@ def test_authored_tetrahedra_are_taken_as_they_are_but_turned(host):
     assert mesh.quality.volume == pytest.approx(np.abs(volumes).sum()) and mesh.quality.volume_error == 0.0
     assert any("points that no tetrahedron uses" in repair for repair in mesh.quality.repairs)
     assert any("inverted" in repair for repair in mesh.quality.repairs) == bool((volumes < 0).any())
+
+
+def test_authored_tetrahedra_that_touch_along_an_edge_are_told(host, helpers):
+    points, tets = helpers.box((1, 1, 1), (1.0, 1.0, 1.0))
+    ring = [(1, 0, 0), (0, 0, 0), (0, 1, 0), (0, 2, 0), (1, 2, 0), (2, 2, 0), (2, 1, 0)]  # the last touches the first
+    stacked = np.vstack([points + np.array(cell, float) for cell in ring])
+    told = []
+    for cells in (ring, ring[:-1]):
+        count = len(cells) * len(points)
+        joined = np.vstack([tets + k * len(points) for k in range(len(cells))])
+        given = TetGeometry("/Arm/link/tets", *welded_tets(stacked[:count], joined, 1e-9)[:2])
+        (mesh,) = run(host, replace(link(surface(box())), tets=given))
+        told.append([repair for repair in mesh.quality.repairs if "no face" in repair])
+        assert np.array_equal(mesh.points, given.points)
+    assert "at 2 points" in told[0][0] and not told[1]
 
 
 def test_a_link_of_a_real_robot_is_meshed(host, shared_data):
