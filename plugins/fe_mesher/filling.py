@@ -93,6 +93,7 @@ def filled(
     refuse_too_many(shape, size, time, body.path)
     volumes: list[float] = []
     best: FEMesh | None = None
+    distance = 0.0
     notes: tuple[str, ...] = ()
     begun, dense = time.used, len(solid.triangles) > DENSE
     for number in range(_ATTEMPTS):
@@ -129,7 +130,7 @@ def filled(
         quality = measure_quality(points, tets, surface_volume=solid.volume, repairs=(*solid.repairs, *notes))
         volumes.append(quality.volume)
         if best is None or quality.volume_error < best.quality.volume_error:
-            best = FEMesh(index, points, tets, quality)
+            best, distance = FEMesh(index, points, tets, quality), attempt.distance
         # a mesh that is closer to the surface takes about twice as long
         late = time.used - begun > _LATE * time.limit and best.quality.volume_error <= _ACCEPTED
         enough = MAX_VOLUME_ERROR if number or dense else _GOOD_VOLUME
@@ -144,7 +145,7 @@ def filled(
         if found is None:
             raise
         return found
-    return _whole(accepted, body.path)
+    return _whole(accepted, body.path, solid, distance)
 
 
 def _attempt(solid: Solid, shape: Shape, size: float, number: int, longer: float) -> _Attempt:
@@ -241,20 +242,24 @@ def _accepted(mesh: FEMesh, solid: Solid, volumes: list[float], path: str) -> FE
     return replace(mesh, quality=replace(mesh.quality, volume_error=error, repairs=notes))
 
 
-def _whole(mesh: FEMesh, path: str) -> FEMesh:
+def _whole(mesh: FEMesh, path: str, solid: Solid, distance: float) -> FEMesh:
     """The mesh without what a connection thinner than the distance to the surface made.
 
     Those are contacts in points and edges, and small parts that they held.
     """
+
+    def apart(points: np.ndarray, tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return without_contacts(points, tets, solid.points, solid.triangles, distance)
+
     kept = largest_part(mesh.points, mesh.tets)
     if len(kept) == len(mesh.tets):
-        points, tets = without_contacts(mesh.points, mesh.tets)
+        points, tets = apart(mesh.points, mesh.tets)
         return replace(mesh, points=points, tets=tets)
     volume = float(tet_volumes(mesh.points, kept).sum())
     lost = 1.0 - volume / mesh.quality.volume
     if lost > _LOOSE:
         refuse_loose_parts(mesh.tets, path)
-    points, tets = without_contacts(*without_unused_points(mesh.points, kept))
+    points, tets = apart(*without_unused_points(mesh.points, kept))
     notes = (*mesh.quality.repairs, f"removed loose parts of the mesh, {100.0 * lost:.2g}% of the volume")
     return replace(mesh, points=points, tets=tets, quality=replace(mesh.quality, volume=volume, repairs=notes))
 

@@ -42,6 +42,7 @@ _KEPT = 0.005  # of their own error, what elements leave with the statics of fin
 _APART, _APART_OF_ERROR = 0.01, 0.3
 # Nodes of the finest mesh after a first one that is itself near the limit: of its own, for two bisections, and at most
 _FOLLOWED, _MOST = 3.3, 50_000
+_PAYS = 0.85  # of the error before: less must be left by a mesh that is made because of a bad one
 _FEW = 6_000  # nodes of elements on which a nonlinear body is reduced within a minute
 
 
@@ -196,11 +197,15 @@ def _bisected(
         effort, wanted=max(effort.wanted - by_volume, 0.5 * by_volume, 0.3 * effort.wanted),
         bad=max(effort.bad - by_volume, 0.5 * by_volume),
     )  # fmt: skip
+    last = np.inf
     for _ in range(_ROUNDS):
         by_interfaces = interface_factors(estimates[-1], estimates)
         error = max(extrapolation(estimates, one_factor)[1], by_interfaces[2] if by_interfaces else 0.0)
         if effort.ends(error, estimates[-1].nodes):
             break
+        if estimates[-1].nodes > effort.poor_nodes > 0 and error > _PAYS * last:
+            break  # as where parts hang on a hinge, which ever finer elements hold less and less
+        last = error
         for marked in (MARKED, _FEWER):
             finer = bisected_where(meshes[-1], estimates[-1].indicators, marked)
             allowed = effort.allows(error, estimates[-1].nodes, quadratic_nodes(finer.points, finer.tets))

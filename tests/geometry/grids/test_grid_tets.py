@@ -49,10 +49,10 @@ def test_parts_that_overlap_are_one_and_what_is_separate_is_left_out():
 
 
 def test_arms_of_a_fork_do_not_touch_along_edges(monkeypatch):
-    """Half a millimetre apart, they are as near as the corners of a grid of 6 mm."""
+    """One and a half millimetres apart, they are as near as the corners of a grid of 6 mm."""
     arm = trimesh.creation.box((0.1, 0.02, 0.02))
     base = trimesh.creation.box((0.02, 0.06, 0.06)).apply_translation([-0.05, 0.01, 0.01])
-    fork = trimesh.util.concatenate([arm, arm.copy().apply_translation([0.0, 0.0205, 0.0205]), base])
+    fork = trimesh.util.concatenate([arm, arm.copy().apply_translation([0.0, 0.0215, 0.0215]), base])
 
     def several_sides_at_edges():
         sides = np.sort(boundary_triangles(made(fork, 0.006)[1])[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)

@@ -9,48 +9,111 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.geometry.tetrahedra import FACES, shared_sides, tet_volumes
+from calmotion.geometry.grids.winding import wound
+from calmotion.geometry.tetrahedra import FACES, Indices, shared_sides, tet_volumes
 from calmotion.shot.character import Array, BoolArray, IntArray
 
 _APART = 0.05  # of the way to the middle of its elements, which a copy is moved
 _THINNEST = 0.5  # least part of its volume that an element keeps
+_REACH, _CELLS = 3.0, 16  # around a contact: of the distance of the mesh to the surface, and cells to each side
+_THIN = 2  # cells from both sides: a connection is none that is thinner than three quarters of the distance
+_WAYS = np.vstack(
+    [np.eye(3), 0.5 * (1.0 - np.eye(3)), np.full((1, 3), 1.0 / 3.0)]
+)  # from a corner to the face opposite
+_SHARES = np.array([0.3, 0.6, 0.9])  # of the reach
 
 
-def without_contacts(points: Array, tets: IntArray) -> tuple[Array, IntArray]:
+def without_contacts(
+    points: Array, tets: IntArray, surface: Array | None = None, triangles: Indices | None = None, distance: float = 0.0
+) -> tuple[Array, IntArray]:
     """The tetrahedra with a point of its own for each side of a contact.
 
     Elements at a point are on one side where a way leads from one to the other through faces at this point; an edge
-    both of whose ends are held in this way stays. Points of a contact are moved a little into their own sides: two in
-    one place cannot be told apart.
+    both of whose ends are held in this way stays. So does a contact whose sides the solid itself connects nearby, as
+    where a rib is attached whose foot the mesh does not follow. Points of a contact are moved a little into their own
+    sides: two in one place cannot be told apart.
 
     Args:
         points: [m], shape [n, 3].
         tets: Of positive volume, shape [m, 4].
+        surface: Points of the closed surface that was meshed [m], shape [k, 3]; None: no contact stays.
+        triangles: Of the surface, shape [l, 3].
+        distance: How far the mesh may leave the surface [m].
 
     Returns:
         Points [m], shape [k, 3], and tetrahedra, shape [m, 4]; the same where there is no contact.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    first, second = shared_sides(tets)  # sides as 4 t + i
-    corners = np.arange(4 * len(tets)).reshape(-1, 4)
-    ways = []
-    for sides in (first, second):  # the three corners of the side, in the order of their numbers in the mesh
-        at = corners[sides // 4][np.arange(len(sides))[:, None], FACES[sides % 4]]
-        ways.append(np.take_along_axis(at, np.argsort(tets.ravel()[at], axis=1), axis=1).ravel())
-    graph = coo_matrix((np.ones(len(ways[0])), tuple(ways)), shape=(corners.size,) * 2)
-    count, label = connected_components(graph, directed=False)
-    source = np.zeros(count, np.int64)
-    source[label] = tets.ravel()
+    label, source = _sides(tets)
+    contacts = np.flatnonzero(np.bincount(source, minlength=len(points)) > 1)
+    if surface is not None and triangles is not None:
+        for contact in contacts:
+            at = np.flatnonzero(tets.ravel() == contact)
+            others = tets[at // 4][np.arange(4) != (at % 4)[:, None]].reshape(-1, 3)
+            ways = _WAYS @ (points[others] - points[contact])
+            label[at] = _united(label[at], points[contact], ways, surface, triangles, _REACH * distance)
+        label = np.unique(label, return_inverse=True)[1].reshape(-1)
+        source = np.zeros(label.max() + 1, np.int64)
+        source[label] = tets.ravel()
     doubled = np.bincount(source, minlength=len(points))[source] > 1
     if not doubled.any():
         return points, tets
     order = np.argsort(source, kind="stable")  # points that nothing touches keep their order
     number = np.empty_like(order)
-    number[order] = np.arange(count)
+    number[order] = np.arange(len(order))
     apart = number[label].reshape(tets.shape).astype(tets.dtype)
     return _moved(points[source[order]], apart, doubled[order]), apart
+
+
+def _sides(tets: IntArray) -> tuple[Indices, Indices]:
+    """The side to which each corner of each tetrahedron belongs, shape [4m], and the point of each side."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    corners = np.arange(4 * len(tets)).reshape(-1, 4)
+    ways = []
+    for faces in shared_sides(tets):  # the three corners of each, in the order of their numbers in the mesh
+        at = corners[faces // 4][np.arange(len(faces))[:, None], FACES[faces % 4]]
+        ways.append(np.take_along_axis(at, np.argsort(tets.ravel()[at], axis=1), axis=1).ravel())
+    graph = coo_matrix((np.ones(len(ways[0])), tuple(ways)), shape=(corners.size,) * 2)
+    count, label = connected_components(graph, directed=False)
+    source = np.zeros(count, np.int64)
+    source[label] = tets.ravel()
+    return label.astype(np.int64), source
+
+
+def _united(label: Indices, center: Array, ways: Array, surface: Array, triangles: Indices, reach: float) -> Indices:
+    """The sides at a contact, one for all that the solid connects within a reach, and for what it does not tell.
+
+    Args:
+        label: Side of each tetrahedron at the contact, shape [k].
+        center: The contact [m].
+        ways: From there to places on the face opposite of each tetrahedron [m], shape [k, p, 3].
+        surface, triangles: As of `without_contacts`.
+        reach: [m].
+    """
+    from scipy.ndimage import binary_erosion
+    from scipy.ndimage import label as connected
+
+    spacing = reach / _CELLS
+    low, n = center - reach, 2 * _CELLS + 1
+    inside = wound(surface, triangles, low, np.array([n + 1, n, n]), spacing)[:n] > 0
+    regions = connected(binary_erosion(inside, iterations=_THIN, border_value=1))[0]
+    # places of each tetrahedron at some distances, or on its face where that is nearer
+    far = np.linalg.norm(ways, axis=2)[..., None, None]
+    at = ways[:, :, None] * np.minimum(1.0, _SHARES[:, None] * reach / far)
+    region = regions[tuple(np.moveaxis(np.rint((at + reach) / spacing).astype(np.int64), -1, 0))].reshape(
+        len(label), -1
+    )
+    united = label.copy()
+    sides = np.unique(label)
+    counts = np.array([np.bincount(region[label == side].ravel(), minlength=regions.max() + 1) for side in sides])
+    counts[:, 0] = 0
+    most = np.where(counts.any(axis=1), counts.argmax(axis=1), -1)  # mostly: the mesh is not just where the solid is
+    for k, side in enumerate(sides):
+        for other in range(k):
+            if most[k] == most[other] >= 0:
+                united[united == side] = united[label == sides[other]][0]
+    return united
 
 
 def _moved(points: Array, tets: IntArray, chosen: BoolArray) -> Array:

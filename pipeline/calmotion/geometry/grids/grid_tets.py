@@ -13,16 +13,15 @@ from __future__ import annotations
 import numpy as np
 
 from calmotion.geometry.grids.contacts import without_contacts
+from calmotion.geometry.grids.winding import wound
 from calmotion.geometry.nearby_triangles import NearbyTriangles
 from calmotion.geometry.tetrahedra import Indices, largest_part, tet_volumes, without_unused_points
 from calmotion.shot.character import Array, BoolArray, IntArray
-from calmotion.support.compilation import kernel
 
 GRID = 1.12  # edge of a regular tetrahedron of the volume of a grid's, of the spacing
 _SNAP = 0.25  # of the spacing: corners of the grid so close to the surface are moved onto it
 _REACH = 1.8  # of the spacing: the diagonal of a cell
 _FLAT = 1e-3  # of the volume of a tetrahedron of the grid: no smaller ones are made
-_ASIDE = (0.31830989, 0.36787944)  # of a thousandth of the spacing: rays do not run along edges of CAD surfaces
 # Six tetrahedra around the diagonal of a cell, corners x + 2 y + 4 z; neighbouring cells have the same diagonals
 _KUHN = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
 
@@ -40,7 +39,7 @@ def grid_tets(points: Array, triangles: Indices, spacing: float) -> tuple[Array,
     """
     low = points.min(axis=0) - 1.5 * spacing
     counts = np.ceil((points.max(axis=0) + 1.5 * spacing - low) / spacing).astype(np.int64) + 1
-    inside = _wound(points, triangles, low, counts, spacing) > 0
+    inside = wound(points, triangles, low, counts, spacing) > 0
     if not inside.any():
         raise ValueError("the grid has no corner inside the surface")
     corners = _cells(inside)[:, None] + np.array([[k & 1, k >> 1 & 1, k >> 2] for k in range(8)]) @ np.array(
@@ -55,7 +54,8 @@ def grid_tets(points: Array, triangles: Indices, spacing: float) -> tuple[Array,
     tets = tets[(depth[tets] > 0.0).any(axis=1)]
     at, depth = _snapped(at, depth, near, tets, spacing)
     made, cut = _cut(at, depth, tets)
-    return _in_one_piece(made, cut[np.abs(tet_volumes(made, cut)) > _FLAT * spacing**3 / 6.0])
+    made, cut = _in_one_piece(made, cut[np.abs(tet_volumes(made, cut)) > _FLAT * spacing**3 / 6.0])
+    return without_contacts(made, cut, points, triangles, 0.5 * spacing)
 
 
 def _cells(inside: BoolArray) -> Indices:
@@ -118,39 +118,8 @@ def _cut(at: Array, depth: Array, tets: IntArray) -> tuple[Array, IntArray]:
 
 
 def _in_one_piece(points: Array, tets: IntArray) -> tuple[Array, IntArray]:
-    """The largest part of the tetrahedra, with positive volumes and without contacts in points and edges."""
+    """The largest part of the tetrahedra, with positive volumes."""
     tets = largest_part(points, tets)
     inverted = tet_volumes(points, tets) < 0.0
     tets[inverted] = tets[inverted][:, [1, 0, 2, 3]]
-    return without_contacts(*without_unused_points(points, tets))
-
-
-def _wound(points: Array, triangles: Indices, low: Array, counts: Array, spacing: float) -> Array:
-    """How often a surface winds around each corner of a grid, shape `counts`: signed crossings of rays along x."""
-    changes = np.zeros(tuple(counts), np.int32)
-    start = low + 1e-3 * spacing * np.array([0.0, *_ASIDE])
-    _count(np.ascontiguousarray(points[triangles]), start, spacing, changes)
-    return np.cumsum(changes, axis=0)
-
-
-@kernel
-def _count(corners: Array, low: Array, spacing: float, changes: Array) -> None:
-    """Add -1 or 1 to the first corner of the grid behind each crossing of a ray along x with a triangle."""
-    for t in range(len(corners)):
-        x = corners[t]
-        area = (x[1, 1] - x[0, 1]) * (x[2, 2] - x[0, 2]) - (x[1, 2] - x[0, 2]) * (x[2, 1] - x[0, 1])
-        if area == 0.0:
-            continue
-        y0, y1 = min(x[0, 1], x[1, 1], x[2, 1]) - low[1], max(x[0, 1], x[1, 1], x[2, 1]) - low[1]
-        z0, z1 = min(x[0, 2], x[1, 2], x[2, 2]) - low[2], max(x[0, 2], x[1, 2], x[2, 2]) - low[2]
-        for j in range(max(int(np.ceil(y0 / spacing)), 0), min(int(y1 / spacing) + 1, changes.shape[1])):
-            y = low[1] + spacing * j
-            for k in range(max(int(np.ceil(z0 / spacing)), 0), min(int(z1 / spacing) + 1, changes.shape[2])):
-                z = low[2] + spacing * k
-                u = ((x[1, 1] - y) * (x[2, 2] - z) - (x[1, 2] - z) * (x[2, 1] - y)) / area
-                v = ((x[2, 1] - y) * (x[0, 2] - z) - (x[2, 2] - z) * (x[0, 1] - y)) / area
-                if u < 0.0 or v < 0.0 or u + v > 1.0:
-                    continue
-                crossing = u * x[0, 0] + v * x[1, 0] + (1.0 - u - v) * x[2, 0]
-                i = min(max(int(np.ceil((crossing - low[0]) / spacing)), 0), changes.shape[0] - 1)
-                changes[i, j, k] += -1 if area > 0.0 else 1
+    return without_unused_points(points, tets)
