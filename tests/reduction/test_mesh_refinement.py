@@ -104,6 +104,18 @@ def test_what_the_volume_is_off_by_counts_for_a_bad_error(helpers, beam, frames)
     assert nodes[0] <= 430 < nodes[1] <= 1_500
 
 
+@pytest.mark.parametrize(("falls", "goes_on"), [(0.95, False), (0.8, True)])
+def test_nodes_are_no_longer_spent_where_the_error_hardly_falls(helpers, beam, frames, monkeypatch, falls, goes_on):
+    """As where parts hang on a hinge, which ever finer elements hold less and less."""
+    monkeypatch.setattr(mesh_refinement, "extrapolation", lambda estimates, _: (0.0, falls ** len(estimates)))
+    own = replace(beam, path=f"/Arm/falls{falls}")  # no other test takes it from the cache
+    effort = Effort(0.0, 0, 0.0, 430, bad=0.01, bad_nodes=1_500)
+    with recomputed():
+        fine = refined_for_frequencies(mesh_of(helpers, (6, 1, 1)), own, frames[1].frame, effort)
+    nodes = frequency_estimate(fine, beam, frames[1].frame).nodes
+    assert (900 if goes_on else 430) < nodes < (1_500 if goes_on else 900)
+
+
 def test_a_link_keeps_few_nodes_where_one_factor_is_that_of_finer_meshes(helpers, beam, frames):
     coarse, carrier = mesh_of(helpers, (6, 1, 1)), frames[1].frame
     effort = Effort(0.0, 0, 0.0, 5_000)  # as fine as it may be
