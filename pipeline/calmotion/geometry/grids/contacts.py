@@ -17,10 +17,9 @@ _APART = 0.05  # of the way to the middle of its elements, which a copy is moved
 _THINNEST = 0.5  # least part of its volume that an element keeps
 _REACH, _CELLS = 3.0, 16  # around a contact: of the distance of the mesh to the surface, and cells to each side
 _THIN = 2  # cells from both sides: a connection is none that is thinner than three quarters of the distance
-_WAYS = np.vstack(
-    [np.eye(3), 0.5 * (1.0 - np.eye(3)), np.full((1, 3), 1.0 / 3.0)]
-)  # from a corner to the face opposite
-_SHARES = np.array([0.3, 0.6, 0.9])  # of the reach
+# From a corner to places on the face opposite, by its corners, and shares of the reach on these ways
+_WAYS = np.vstack([np.eye(3), 0.5 * (1.0 - np.eye(3)), np.full((1, 3), 1.0 / 3.0)])
+_SHARES = np.array([0.3, 0.6, 0.9])
 
 
 def without_contacts(
@@ -82,7 +81,7 @@ def _sides(tets: IntArray) -> tuple[Indices, Indices]:
 
 
 def _united(label: Indices, center: Array, ways: Array, surface: Array, triangles: Indices, reach: float) -> Indices:
-    """The sides at a contact, one for all that the solid connects within a reach, and for what it does not tell.
+    """The sides at a contact, one for all that the solid connects within a reach.
 
     Args:
         label: Side of each tetrahedron at the contact, shape [k].
@@ -101,9 +100,8 @@ def _united(label: Indices, center: Array, ways: Array, surface: Array, triangle
     # places of each tetrahedron at some distances, or on its face where that is nearer
     far = np.linalg.norm(ways, axis=2)[..., None, None]
     at = ways[:, :, None] * np.minimum(1.0, _SHARES[:, None] * reach / far)
-    region = regions[tuple(np.moveaxis(np.rint((at + reach) / spacing).astype(np.int64), -1, 0))].reshape(
-        len(label), -1
-    )
+    cells = np.rint((at + reach) / spacing).astype(np.int64).reshape(len(label), -1, 3)
+    region = regions[tuple(np.moveaxis(cells, -1, 0))]
     united = label.copy()
     sides = np.unique(label)
     counts = np.array([np.bincount(region[label == side].ravel(), minlength=regions.max() + 1) for side in sides])
