@@ -10,6 +10,7 @@ import trimesh
 from calmotion.reduction.discretization_error import frequency_errors
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.shot import Frame
+from calmotion.shot.materials.printed import core_of
 from mesher_links import FLEXIBLE, box, link, surface
 
 MATERIAL = FLEXIBLE.material
@@ -72,6 +73,31 @@ def test_a_channel(frequencies):
     beam = timoshenko(areas.sum(), second, 2 * wall * flange / 1.2, length)
     print(beam)
     assert np.abs(found / beam - 1.0).min() < 0.01
+
+
+def test_a_printed_bar(package, helpers):
+    """Of a skin of 0.9 mm and 20% infill, against elements that end where the skin does."""
+    length, width = 0.3, 0.02
+    metal = replace(MATERIAL, core=core_of(0.2, 0.9e-3))
+    bar = trimesh.creation.box(bounds=[(0.0, -width / 2, -width / 2), (length, width / 2, width / 2)])
+    body = replace(link(surface(bar)), flexible=replace(FLEXIBLE, material=metal))
+    made = package("body_mesh").mesh_body(0, body, package("body_mesh").MeshOptions(), (ROOT,))
+
+    def first(points, tets):
+        model = assemble(points, tets, metal)
+        return frequency_errors(model, metal, 4, np.flatnonzero(np.abs(model.mesh.nodes[:, 0]) < 1e-5))[0]
+
+    points, tets = helpers.box((42, 6, 6), (1.0, 1.0, 1.0))
+    skin, follows = metal.core.skin, []
+    for x, (low, high, count) in zip(
+        np.asarray(points).T, [(0.0, length, 42), *[(-width / 2, width / 2, 6)] * 2], strict=True
+    ):
+        planes = np.array([low, *np.linspace(low + skin, high - skin, count - 1), high])
+        follows.append(np.interp(x, np.linspace(0.0, 1.0, count + 1), planes))
+    reference = first(np.stack(follows, axis=1), tets)
+    found = np.sqrt(made.quality.stiffness_factor) * first(made.points, made.tets)
+    print(found, reference, made.quality.frequency_error)
+    assert found == pytest.approx(reference, rel=0.01)
 
 
 def test_a_closed_box_of_plates(frequencies):
