@@ -30,7 +30,7 @@ _REFINED = 12_000
 # of the surface and 0.2 ms for each node)
 _POOR, _POOR_REFINED = 0.0125, (40_000, 60_000)
 _IN_TIME, _OF_TRIANGLE = 100_000, 16.5
-# Error of the frequencies, that of the volume included, for which a mesh may take minutes, and its nodes at most: six
+# Error of the frequencies, that of the volume included, for which a mesh may take minutes, and its nodes at most: nine
 # of 160 links need it, most of all arms of many thin webs, whose frequencies are 8 to 30% too high with 30,000 nodes
 _BAD, _BAD_REFINED = 0.019, 250_000
 _KEPT = 22_000  # nodes of the mesh that takes the stiffness of these, where one factor is enough
