@@ -247,21 +247,17 @@ def _whole(mesh: FEMesh, path: str, solid: Solid, distance: float) -> FEMesh:
 
     Those are contacts in points and edges, and small parts that they held.
     """
-
-    def apart(points: np.ndarray, tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return without_contacts(points, tets, solid.points, solid.triangles, distance)
-
     kept = largest_part(mesh.points, mesh.tets)
-    if len(kept) == len(mesh.tets):
-        points, tets = apart(mesh.points, mesh.tets)
-        return replace(mesh, points=points, tets=tets)
-    volume = float(tet_volumes(mesh.points, kept).sum())
-    lost = 1.0 - volume / mesh.quality.volume
-    if lost > _LOOSE:
-        refuse_loose_parts(mesh.tets, path)
-    points, tets = apart(*without_unused_points(mesh.points, kept))
-    notes = (*mesh.quality.repairs, f"removed loose parts of the mesh, {100.0 * lost:.2g}% of the volume")
-    return replace(mesh, points=points, tets=tets, quality=replace(mesh.quality, volume=volume, repairs=notes))
+    if len(kept) < len(mesh.tets):
+        volume = float(tet_volumes(mesh.points, kept).sum())
+        lost = 1.0 - volume / mesh.quality.volume
+        if lost > _LOOSE:
+            refuse_loose_parts(mesh.tets, path)
+        points, tets = without_unused_points(mesh.points, kept)
+        notes = (*mesh.quality.repairs, f"removed loose parts of the mesh, {100.0 * lost:.2g}% of the volume")
+        mesh = replace(mesh, points=points, tets=tets, quality=replace(mesh.quality, volume=volume, repairs=notes))
+    points, tets = without_contacts(mesh.points, mesh.tets, solid.points, solid.triangles, distance)
+    return replace(mesh, points=points, tets=tets)
 
 
 def refuse_too_many(shape: Shape, size: float, time: ProcessorTime, path: str) -> None:

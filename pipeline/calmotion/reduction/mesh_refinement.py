@@ -76,8 +76,12 @@ class Effort:
 
     def allows(self, error: float, nodes: int, finer: int) -> bool:
         """Whether a mesh with an error may be followed by one with so many nodes."""
-        spent = error > self.bad or nodes > self.poor_nodes > 0  # what was begun because of a bad error goes on
+        spent = error > self.bad or self.is_spent_on(nodes)  # what was begun because of a bad error goes on
         return self._few(nodes) or finer <= (self.bad_nodes if spent else self.poor_nodes)
+
+    def is_spent_on(self, nodes: int) -> bool:
+        """Whether a mesh has more nodes than a poor error alone is worth."""
+        return nodes > self.poor_nodes > 0
 
     def _few(self, nodes: int) -> bool:
         return nodes <= 0.6 * self.max_nodes  # the next bisection may exceed the limit by its factor
@@ -203,7 +207,7 @@ def _bisected(
         error = max(extrapolation(estimates, one_factor)[1], by_interfaces[2] if by_interfaces else 0.0)
         if effort.ends(error, estimates[-1].nodes):
             break
-        if estimates[-1].nodes > effort.poor_nodes > 0 and error > _PAYS * last:
+        if effort.is_spent_on(estimates[-1].nodes) and error > _PAYS * last:
             break  # as where parts hang on a hinge, which ever finer elements hold less and less
         last = error
         for marked in (MARKED, _FEWER):

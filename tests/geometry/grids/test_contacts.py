@@ -74,7 +74,7 @@ def closed(*boxes):
 
 # cubes beside each other on a diagonal, and the solid that they were made for
 CUBES = ((0, 0, 0), (1, 1, 0))
-APART = [[(0, 0, 0), (0.98, 0.98, 1)]], [[(1.02, 1.02, 0), (2, 2, 1)]]
+APART = [(0, 0, 0), (0.98, 0.98, 1)], [(1.02, 1.02, 0), (2, 2, 1)]
 
 
 @pytest.mark.parametrize(
@@ -88,11 +88,7 @@ APART = [[(0, 0, 0), (0.98, 0.98, 1)]], [[(1.02, 1.02, 0), (2, 2, 1)]]
 )
 def test_a_contact_stays_where_the_solid_connects_its_sides(helpers, bridge, stays):
     points, tets = joined(helpers, *CUBES)
-    both = np.vstack([p for box in APART for p in (closed(*box)[0],)])
-    triangles = np.vstack([closed(*APART[0])[1], closed(*APART[1])[1] + len(closed(*APART[0])[0])])
-    if bridge:
-        both, triangles = closed(*APART[0], *APART[1], *bridge)
-    apart, parted = without_contacts(points, tets, both, triangles, 0.1)
+    apart, parted = without_contacts(points, tets, *closed(*APART, *bridge), 0.1)
     assert (apart is points) == stays and t.connected_parts(parted) == (1 if stays else 2)
 
 

@@ -12,6 +12,12 @@ def made(mesh, spacing):
     return grid_tets(np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32), spacing)
 
 
+def edges(tets):
+    """Edges of the boundary, and how many triangles each has."""
+    sides = np.sort(boundary_triangles(tets)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    return np.unique(sides, axis=0, return_counts=True)
+
+
 def tube():
     return trimesh.creation.annulus(r_min=0.02, r_max=0.03, height=0.1, sections=64)
 
@@ -33,8 +39,7 @@ def test_they_fill_the_surface_and_converge_to_it(mesh, spacing):
         assert volume.min() > 0.0 and min_dihedral_deg(points, tets) > 4.0 and connected_parts(tets) == 1
         errors.append(abs(volume.sum() / mesh.volume - 1.0))
         # a closed surface of triangles with two neighbours at each edge
-        sides = np.sort(boundary_triangles(tets)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        assert (np.unique(sides, axis=0, return_counts=True)[1] % 2 == 0).all()
+        assert (edges(tets)[1] % 2 == 0).all()
     assert errors[0] < 0.05 and errors[1] < 0.5 * errors[0] + 1e-4
 
 
@@ -56,9 +61,8 @@ def test_arms_of_a_fork_do_not_touch_along_edges(monkeypatch):
 
     def contacts_beyond_the_base():
         points, tets = made(fork, 0.006)
-        sides = np.sort(boundary_triangles(tets)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        edges, count = np.unique(sides, axis=0, return_counts=True)
-        return int((points[edges[count != 2]].mean(axis=1)[:, 0] > -0.035).sum())
+        ends, count = edges(tets)
+        return int((points[ends[count != 2]].mean(axis=1)[:, 0] > -0.035).sum())
 
     assert contacts_beyond_the_base() == 0
     monkeypatch.setattr(grid_tets_module, "without_contacts", lambda points, tets, *surface: (points, tets))

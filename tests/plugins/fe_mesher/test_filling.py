@@ -109,3 +109,14 @@ def test_parts_that_the_mesh_joins_along_an_edge_are_apart(host, package, monkey
     arms = [box(), box(at=(0.0, 0.022, 0.0)), box((0.02, 0.042, 0.02), at=(-0.1, 0.011, 0.0))]
     (mesh,) = run(host, link(surface(trimesh.boolean.union(arms)), element_size=0.02))
     assert joined == [1] and without_contacts(mesh.points, mesh.tets)[0] is mesh.points
+
+
+def test_separate_solids_are_joined_by_struts_where_all_else_fails(package):
+    parts = surface(box(), "/a"), surface(box(at=(0.0, 0.05, 0.0)), "/b")
+    with pytest.raises(ShotError, match="do not touch"):
+        package("repair").closed_solid(parts, "/Arm/link")
+    body = link(*parts)
+    made = package("sources.choice").solid_of(body, body.surfaces)
+    assert trimesh.Trimesh(made.points, made.triangles).body_count == 1
+    assert 1.6e-4 < made.volume < 1.7e-4
+    assert any("struts across gaps of up to 30 mm" in text for text in made.repairs)

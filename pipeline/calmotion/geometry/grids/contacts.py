@@ -43,16 +43,13 @@ def without_contacts(
         Points [m], shape [k, 3], and tetrahedra, shape [m, 4]; the same where there is no contact.
     """
     label, source = _sides(tets)
-    contacts = np.flatnonzero(np.bincount(source, minlength=len(points)) > 1)
     if surface is not None and triangles is not None:
-        for contact in contacts:
+        for contact in np.flatnonzero(np.bincount(source) > 1):
             at = np.flatnonzero(tets.ravel() == contact)
             others = tets[at // 4][np.arange(4) != (at % 4)[:, None]].reshape(-1, 3)
             ways = _WAYS @ (points[others] - points[contact])
             label[at] = _united(label[at], points[contact], ways, surface, triangles, _REACH * distance)
-        label = np.unique(label, return_inverse=True)[1].reshape(-1)
-        source = np.zeros(label.max() + 1, np.int64)
-        source[label] = tets.ravel()
+        label, source = _with_points(label, tets)
     doubled = np.bincount(source, minlength=len(points))[source] > 1
     if not doubled.any():
         return points, tets
@@ -74,10 +71,13 @@ def _sides(tets: IntArray) -> tuple[Indices, Indices]:
         at = corners[faces // 4][np.arange(len(faces))[:, None], FACES[faces % 4]]
         ways.append(np.take_along_axis(at, np.argsort(tets.ravel()[at], axis=1), axis=1).ravel())
     graph = coo_matrix((np.ones(len(ways[0])), tuple(ways)), shape=(corners.size,) * 2)
-    count, label = connected_components(graph, directed=False)
-    source = np.zeros(count, np.int64)
-    source[label] = tets.ravel()
-    return label.astype(np.int64), source
+    return _with_points(connected_components(graph, directed=False)[1], tets)
+
+
+def _with_points(label: Indices, tets: IntArray) -> tuple[Indices, Indices]:
+    """Sides, numbered from 0 on, and the point of each."""
+    _, first, numbered = np.unique(label, return_index=True, return_inverse=True)
+    return numbered.reshape(-1), tets.ravel()[first].astype(np.int64)
 
 
 def _united(label: Indices, center: Array, ways: Array, surface: Array, triangles: Indices, reach: float) -> Indices:
@@ -102,16 +102,13 @@ def _united(label: Indices, center: Array, ways: Array, surface: Array, triangle
     at = ways[:, :, None] * np.minimum(1.0, _SHARES[:, None] * reach / far)
     cells = np.rint((at + reach) / spacing).astype(np.int64).reshape(len(label), -1, 3)
     region = regions[tuple(np.moveaxis(cells, -1, 0))]
-    united = label.copy()
-    sides = np.unique(label)
-    counts = np.array([np.bincount(region[label == side].ravel(), minlength=regions.max() + 1) for side in sides])
+    sides, side = np.unique(label, return_inverse=True)
+    counts = np.array([np.bincount(region[side == k].ravel(), minlength=regions.max() + 1) for k in range(len(sides))])
     counts[:, 0] = 0
-    most = np.where(counts.any(axis=1), counts.argmax(axis=1), -1)  # mostly: the mesh is not just where the solid is
-    for k, side in enumerate(sides):
-        for other in range(k):
-            if most[k] == most[other] >= 0:
-                united[united == side] = united[label == sides[other]][0]
-    return united
+    # where most of each is, since the mesh is not just where the solid is; what is nowhere stays by itself
+    most = np.where(counts.any(axis=1), counts.argmax(axis=1), -1 - np.arange(len(sides)))
+    _, first, group = np.unique(most, return_index=True, return_inverse=True)
+    return np.asarray(sides[first[group]][side])
 
 
 def _moved(points: Array, tets: IntArray, chosen: BoolArray) -> Array:
