@@ -55,6 +55,16 @@ def test_either_end_can_be_the_root(mesh, body, attachments):
     assert np.abs(one.markers[0].Phi).max() == 0.0 and np.abs(one.markers[1].Phi).max() > 0.0
 
 
+def test_joints_that_share_a_patch_turn_with_it_about_its_center(mesh, body, attachments, helpers):
+    near = AttachmentFrame("/Arm/rod", helpers.frame(0.599, 0.001, 0.001), "interface")
+    alone, both = (reduce_body(mesh, body, frames, [], 1) for frames in (attachments, [*attachments, near]))
+    hand, rod = both.markers[0], both.markers[-1]
+    assert np.array_equal(both.frequencies, alone.frequencies) and np.array_equal(rod.Psi, hand.Psi)
+    expected = hand.Phi + np.cross(hand.Psi, np.array([-0.001, 0.001, 0.001])[:, None], axis=0)
+    assert np.allclose(rod.Phi, expected, rtol=0.0, atol=1e-14 * np.abs(hand.Phi).max() + 1e-18)
+    assert np.array_equal(rod.position, [0.599, 0.001, 0.001])
+
+
 def test_the_invariants_are_those_of_the_solid(mesh, body, attachments, plastic):
     reduced = reduce_body(mesh, body, attachments, [], 1)
     m = plastic.density * np.prod(SIZE)

@@ -293,8 +293,10 @@ def _markers(
     if points:
         Phi[points], Psi[points] = embedding.displacements(basis.modes), embedding.rotations(basis.modes)
     for patch, motion in zip(moving, basis.patch_motion, strict=True):
+        center = attachments[patch.attachments[0]].frame.position
         for i in patch.attachments:
-            Phi[i], Psi[i] = motion[:3], motion[3:]
+            arm = attachments[i].frame.position - center
+            Phi[i], Psi[i] = motion[:3] + np.cross(motion[3:], arm, axisa=0, axisc=0), motion[3:]
     return tuple(
         Marker(position=a.frame.position, rotation=a.frame.rotation, Phi=Phi[i], Psi=Psi[i])
         for i, a in enumerate(attachments)

@@ -52,3 +52,16 @@ def test_a_named_interface_needs_no_message(arm, meshes):
     named = InterfaceSurface("/subset", ELBOW, np.zeros((1, 3, 3)))
     bodies = tuple(replace(body, interfaces=(named,)) if body.flexible else body for body in far.bodies)
     assert list(contact_notes(replace(far, bodies=bodies), meshes)) == []
+
+
+def test_joints_that_hold_one_part_of_the_surface_are_told_with_their_distance(arm, meshes):
+    at = replace(
+        next(joint for joint in arm.joints if joint.path == ELBOW).frame1, position=np.array([0.002, 0.0, 0.0])
+    )
+    (index,) = (k for k, body in enumerate(arm.bodies) if body.path == FORE)
+    second = replace(arm.joints[0], path="/Arm/rod", body0=index, frame0=at, redundant=False)
+    near = replace(arm, joints=(*arm.joints, second))
+    (note,) = contact_notes(near, meshes)
+    assert note.startswith(f"{FORE}: the frames of {ELBOW} and /Arm/rod are 2 mm apart") and "one part" in note
+    far = replace(second, frame0=replace(at, position=np.array([0.5 * LENGTH, 0.0, 0.5 * WIDTH])))
+    assert list(contact_notes(replace(arm, joints=(*arm.joints, far)), meshes)) == []

@@ -80,3 +80,31 @@ def test_a_body_without_joints_is_not_cut(helpers, beam):
     target = [AttachmentFrame("/Arm/tip", helpers.frame(0.3, 0.01, 0.01), "point")]
     found, split, rims = with_rims(np.asarray(points), tets, beam, target)
     assert np.array_equal(found, points) and split is tets and rims == ()
+
+
+def test_patches_that_would_meet_keep_their_parts_when_elements_are_refined(helpers, plastic):
+    """The spheres about two joints overlap; each holds what is nearer to it, on any elements."""
+    size, at = (0.06, 0.06, 0.005), ((-0.01, 0.0, 0.025), (0.01, 0.0, 0.025))
+    body = Body("/Arm/plate", helpers.frame(0, 0, 0), None, flexible=FlexibleSettings(plastic, interface_radius=0.027))
+    frames = [AttachmentFrame(f"/Arm/{k}", helpers.frame(*p), "interface") for k, p in enumerate(at)]
+    points, tets = helpers.box((8, 8, 1), size, origin=(-0.03, -0.03, 0.0))
+    points, tets, rims = with_rims(np.asarray(points), tets, body, frames)
+    assert tet_volumes(points, tets).sum() == pytest.approx(np.prod(size), rel=1e-3) and len(rims) == 2
+    cut = [CutPatch(center, points[triangles]) for center, triangles in rims]
+    held = []
+    for _ in range(3):
+        mesh = quadratic_mesh(points, tets)
+        found = interface_patches(mesh, frames, 0.027, "/Arm/plate", cut)
+        whole = [np.isin(mesh.surface, patch.nodes).all(axis=1) for patch in found]
+        assert not np.intersect1d(found[0].nodes, found[1].nodes).size
+        held.append([surface_area(mesh.nodes, mesh.surface[own][:, :3]) for own in whole])
+        points, tets = bisected(points, tets, np.arange(len(tets), dtype=np.int32))
+    assert held[1] == pytest.approx(held[0], rel=1e-9) and held[2] == pytest.approx(held[0], rel=1e-9)
+    # places in the cells of a fine grid on the upper side: nearer by the ratio, and in the sphere
+    x = np.linspace(-0.03, 0.03, 1201)
+    x, y = np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (x[1:] + x[:-1]))
+    away = [np.sqrt((x - p[0]) ** 2 + y**2 + 0.02**2) for p in at]
+    exact = ((away[0] <= 0.45 / 0.55 * away[1]) & (away[0] <= 0.027)).sum() * (0.06 / 1200) ** 2
+    lower = np.sqrt((x - at[0][0]) ** 2 + y**2 + 0.025**2), np.sqrt((x - at[1][0]) ** 2 + y**2 + 0.025**2)
+    exact += ((lower[0] <= 0.45 / 0.55 * lower[1]) & (lower[0] <= 0.027)).sum() * (0.06 / 1200) ** 2
+    assert held[0][0] == pytest.approx(exact, rel=0.05)

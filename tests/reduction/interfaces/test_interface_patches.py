@@ -85,12 +85,36 @@ def test_two_anchors_beyond_one_end_divide_it(beam, attachment):
 
 
 def test_anchors_closer_to_each_other_than_the_elements_all_get_a_patch(beam, attachment):
-    frames = [attachment(f"/{k}", 0.3, 0.0, 0.0099 + 2e-5 * k) for k in range(4)]
+    frames = [attachment(f"/{k}", 0.3 + 0.004 * k, 0.0, 0.01) for k in range(4)]
     patches = interface_patches(beam, frames, -1.0, "/b")
     assert [patch.attachments for patch in patches] == [(0,), (1,), (2,), (3,)]
     assert all(spans_a_plane(beam.nodes[patch.nodes]) for patch in patches)
     nodes = np.concatenate([patch.nodes for patch in patches])
     assert len(np.unique(nodes)) == len(nodes)
+
+
+def test_joints_without_room_for_a_patch_each_hold_one_together(beam, attachment):
+    near = [attachment("/a", 0.3, 0.0, 0.01), attachment("/b", 0.302, 0.0, 0.01), attachment("/c", 0.5, 0.0, 0.01)]
+    first, second = interface_patches(beam, near, -1.0, "/b")
+    assert first.attachments == (0, 1) and second.attachments == (2,)
+    (alone,) = interface_patches(beam, near[:1], -1.0, "/b")
+    assert np.array_equal(first.nodes, alone.nodes)
+    apart = [near[0], attachment("/b", 0.33, 0.0, 0.01)]
+    assert [patch.attachments for patch in interface_patches(beam, apart, -1.0, "/b")] == [(0,), (1,)]
+
+
+def test_surface_is_left_between_patches_that_would_meet(helpers, attachment):
+    """Two bores' axes so near to each other that the spheres about them overlap; both are off the surface."""
+    box = quadratic_mesh(*helpers.box((24, 24, 2), (0.06, 0.06, 0.005), origin=(-0.03, -0.03, 0.0)))
+    frames = [attachment("/a", -0.01, 0.0, 0.025), attachment("/b", 0.01, 0.0, 0.025)]
+    first, second = interface_patches(box, frames, 0.04, "/b")
+    places = [frame.frame.position for frame in frames]
+    for patch, own, other in ((first, *places), (second, *places[::-1])):
+        at = box.nodes[patch.nodes]
+        nearer = np.linalg.norm(at - own, axis=1) / np.linalg.norm(at - other, axis=1)
+        assert nearer.max() < 0.45 / 0.55 + 1e-9 and len(at) > 20 and len(patch.balls) == 1
+    between = np.abs(box.nodes[box.surface_nodes, 0]) < 0.002
+    assert not np.isin(box.surface_nodes[between], np.union1d(first.nodes, second.nodes)).any()
 
 
 def test_the_patch_of_a_bore_is_a_band_of_its_wall(helpers, attachment):

@@ -22,6 +22,7 @@ _LEAST_FACE = 0.2  # of the half width of the body below: a smaller flat is the 
 # length bends, and of the body's size
 _LEAST_RADIUS, _LEAST_PART = 0.5, 0.05
 _POISSON = 0.35
+ROOM = 0.45  # of the distance to the next attachment frame: largest radius, which leaves some of the surface between
 
 
 _PARTS = triangle_parts(6)
@@ -100,7 +101,7 @@ def automatic_radius(center: Array, triangles: Array, closest: Array, gaps: Arra
     An attachment frame on the surface gets the local half width of the body: the narrowest half width w across (rays
     in planes parallel to the surface) at the first depth d with w <= 2 d, or the whole depth of a plate. An attachment
     frame away from the surface (on the axis of a bore, inside a socket) gets a band of that height around it. The
-    radius is at most 0.45 of the distance to the next attachment frame.
+    radius is at most `ROOM` of the distance to the next attachment frame.
 
     Args:
         center: Origin of the attachment frame [m], shape [3].
@@ -117,20 +118,24 @@ def automatic_radius(center: Array, triangles: Array, closest: Array, gaps: Arra
         widths.append(_width_at(near, np.linalg.norm(near - center - step, axis=1), triangles, size))
     finite = [width for width in widths if np.isfinite(width)]
     width = float(np.median(finite)) if finite else 0.5 * size
-    radius = max(1.25 * gap, float(np.hypot(gap, width)), _least_radius(triangles, size))
-    return min(radius, max(0.45 * room, 1.25 * gap))
+    radius = max(1.25 * gap, float(np.hypot(gap, width)), least_radius(triangles))
+    return min(radius, max(ROOM * room, 1.25 * gap))
 
 
-def _least_radius(triangles: Array, size: float) -> float:
+def least_radius(triangles: Array) -> float:
     """Radius below which a patch, not the body, would decide how far the body bends [m].
 
     A patch that is nearly a point turns on its ground: its compliance goes with the third power of one over its radius.
     At half the radius at which that is the compliance of the body itself, it is eight times as large.
 
+    Args:
+        triangles: Surface [m], shape [k, 3, 3], outward.
+
     Source: Johnson 1985, 3.6, a rigid disc on a half space under a moment: 8 G a^3 / (3 (1 - nu)); a bar: E I / L.
     """
     volume = abs(float(np.linalg.det(triangles).sum())) / 6.0
-    length = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+    extent = np.ptp(triangles.reshape(-1, 3), axis=0)
+    length, size = float(extent.max()), float(np.linalg.norm(extent))
     bar = 2.0 * (1.0 + _POISSON) * volume**2 / (12.0 * length**3)  # over G; a square section of the mean area
     alike = (3.0 / 8.0 * (1.0 - _POISSON) * bar) ** (1.0 / 3.0)
     return float(min(_LEAST_RADIUS * alike, _LEAST_PART * size))

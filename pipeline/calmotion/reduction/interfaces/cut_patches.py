@@ -27,7 +27,8 @@ def with_rims(
 ) -> tuple[Array, IntArray, tuple[tuple[Array, IntArray], ...]]:
     """A mesh cut along the rims of the patches that are spheres about joints.
 
-    A rim is a polygon; its sphere is somewhat larger than that of the patch, so that the areas are the same.
+    A rim is a polygon; its sphere is somewhat larger than that of the patch, so that the areas are the same. Where two
+    patches would meet, each is cut along the ball that it keeps to.
 
     Args:
         points: [m], shape [n, 3].
@@ -54,12 +55,16 @@ def with_rims(
         center, radius = patch.center, patch.radius
         points, tets = _finer_at(points, tets, center, radius)
         radius += _excess(points, tets, center, radius)
-        points, tets = cut(points, tets, center, radius)
-        rims.append((attachments[patch.attachments[0]].frame.position, center, radius))
+        for ball in ((center, radius), *patch.balls):
+            points, tets = cut(points, tets, *ball)
+        rims.append((attachments[patch.attachments[0]].frame.position, center, radius, patch.balls))
     found = []
-    for origin, center, radius in rims:
-        within = _within(points, tets, center, radius)
-        held = within if given else within[~just_reached(points, within, center, radius, beyond=np.inf)]
+    for origin, center, radius, balls in rims:
+        held = _within(points, tets, center, radius)
+        if not given:
+            held = held[~just_reached(points, held, center, radius, beyond=np.inf)]
+        for ball in balls:
+            held = held[inside(points[held], *ball)]
         found.append((origin, held))
     return points, tets, tuple((origin, triangles) for origin, triangles in found if len(triangles))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,8 +11,17 @@ from calmotion.errors import ShotError
 from calmotion.geometry.distances import closest_on_triangles
 from calmotion.geometry.nearby_triangles import NearbyTriangles
 from calmotion.reduction.elements.assembly import QuadraticMesh
-from calmotion.reduction.interfaces.automatic_patch import Skin, automatic_radius, end_face, nodes_of_area
+from calmotion.reduction.interfaces.automatic_patch import ROOM, Skin, automatic_radius, end_face, nodes_of_area
 from calmotion.reduction.interfaces.contact_place import contact_place
+from calmotion.reduction.interfaces.joint_places import (
+    SAME,
+    TIE,
+    Ball,
+    balls_between,
+    nearest_apart,
+    reached_by,
+    within,
+)
 from calmotion.reduction.interfaces.named_patch import named_patch
 from calmotion.reduction.interfaces.seats import seat_radius
 from calmotion.shot.character import Array, Frame, IntArray, InterfaceSurface
@@ -20,8 +29,7 @@ from calmotion.shot.meshes import CutPatch
 
 _GROWTH = 1.25
 _FEWEST = 6  # nodes of a triangle
-_TIE = 1e-3  # of a distance: places that are nearer to each other are one
-_SAME = 1e-7  # of the diagonal: distance of a node from the triangle that it is on
+_ON = 1e-7  # of the diagonal: distance of a node from the triangle that it is on
 _SPREAD = 0.2  # second largest over largest extent below which a patch is a line and cannot carry a moment
 
 
@@ -48,15 +56,17 @@ class InterfacePatch:
 
     Attributes:
         nodes: Surface nodes, ascending.
-        attachments: Indices of the attachment frames that it carries, all at one position.
-        radius: Largest distance of its nodes from them, or the radius that it was made with [m].
+        attachments: Indices of the attachment frames that it carries, all at one place.
+        radius: Largest distance of its nodes from the first, or the radius that it was made with [m].
         center: Of the sphere with this radius that it lies in [m], shape [3]; None where it is no such part.
+        balls: That it lies in as well, see `balls_between`; those that contain the sphere are left out.
     """
 
     nodes: IntArray
     attachments: tuple[int, ...]
     radius: float
     center: Array | None = None
+    balls: tuple[Ball, ...] = ()
 
 
 def interface_patches(
@@ -66,10 +76,9 @@ def interface_patches(
     """The interface patches of a body, in the order of their first attachment frames.
 
     A frame that does not touch the body holds it at its contact place (`contact_place`), one with a given radius that
-    nothing is in at the nearest place. Attachment frames of kind `interface` at one position share a patch, unless they
-    name their surfaces. A node on a
-    named surface belongs to the patch of that surface; a node that two patches could take belongs to the patch of the
-    nearer attachment frame.
+    nothing is in at the nearest place. Attachment frames of kind `interface` at one place (`nearest_apart`) share a
+    patch, unless they name their surfaces. A node on a named surface belongs to the patch of that surface; between two
+    other patches surface is left (`balls_between`).
 
     Args:
         mesh: Of the body.
@@ -87,9 +96,9 @@ def interface_patches(
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
     if radius >= size:
         raise _nothing_left(body, radius, size)
-    groups = _at_one_position(attachments, size)
     skin = meshed or mesh
     measured = skin.nodes[skin.surface[:, :3]]
+    groups = at_one_place(attachments, nearest_apart(measured, radius))
     surface = mesh.surface_nodes
     named = _named_patches(mesh, attachments, groups, body)
     frames = [attachments[group[0]].frame for group in groups]
@@ -104,7 +113,7 @@ def interface_patches(
     distance = np.linalg.norm(mesh.nodes[surface][None] - centers[:, None], axis=-1)
     # where frames away from the body have one contact place, the surface there is divided by their own positions
     origins = np.array([frame.position for frame in frames]).reshape(-1, 3)
-    distance += _TIE * np.linalg.norm(mesh.nodes[surface][None] - origins[:, None], axis=-1)
+    distance += TIE * np.linalg.norm(mesh.nodes[surface][None] - origins[:, None], axis=-1)
     nearest = distance.argmin(axis=0)
     taken = np.isin(surface, np.concatenate([np.zeros(0, np.int32), *named.values()]))
     patches: list[InterfacePatch] = []
@@ -115,35 +124,39 @@ def interface_patches(
             continue
         free = surface[~taken]
         candidates = surface[(nearest == k) & ~taken]
-        known = next((c for c in cut if np.linalg.norm(c.origin - frames[k].position) < 1e-6 * size), None)
-        found = None if known is None else _cut_patch(mesh, candidates, known, group, size)
-        if found is not None:
-            patches.append(found)
-            continue
-        others = np.linalg.norm(np.delete(centers, k, axis=0) - centers[k], axis=1)
-        room = float(others.min(initial=np.inf, where=others > _TIE * size))
-        place = _Place(centers[k], frames[k].axis, skin, measured, room)
-        patch = _patch(mesh, candidates, free, place, attachments[group[0]].path, group, radius, body)
+        known = next((c for c in cut if np.linalg.norm(c.origin - frames[k].position) < SAME * size), None)
+        patch = None if known is None else _cut_patch(mesh, candidates, known, group, size)
+        if patch is None:
+            balls = balls_between(centers, k, size)
+            candidates = candidates[within(mesh.nodes[candidates], balls)]
+            others = np.linalg.norm(np.delete(centers, k, axis=0) - centers[k], axis=1)
+            room = float(others.min(initial=np.inf, where=others > TIE * size))
+            place = _Place(centers[k], frames[k].axis, skin, measured, room)
+            patch = _patch(mesh, candidates, free, place, attachments[group[0]].path, group, radius, body)
+            if patch.center is not None:
+                patch = replace(patch, balls=reached_by(balls, patch.center, patch.radius))
         taken |= np.isin(surface, patch.nodes)
         patches.append(patch)
-    if patches and radius >= 0.0 and np.all(taken):
+    if patches and radius >= 0.0 and np.all(taken | (distance.min(axis=0) <= radius)):
         raise _nothing_left(body, radius, size)
     return patches
 
 
-def _at_one_position(attachments: Sequence[AttachmentFrame], size: float) -> list[list[int]]:
-    """Indices of the attachment frames of kind `interface`: those that share a patch together."""
+def at_one_place(attachments: Sequence[AttachmentFrame], apart: float) -> list[list[int]]:
+    """Indices of the attachment frames of kind `interface`: those that share a patch together.
+
+    Args:
+        attachments: All attachment frames; a surface that the shot names has one frame.
+        apart: Of `nearest_apart` [m].
+    """
     groups: list[list[int]] = []
     for index, attachment in enumerate(attachments):
         if attachment.kind != "interface":
             continue
-        at = attachment.frame.position
         for group in groups:
-            if (
-                attachment.surface is None
-                and attachments[group[0]].surface is None
-                and np.linalg.norm(attachments[group[0]].frame.position - at) < 1e-6 * size
-            ):
+            first = attachments[group[0]]
+            away = np.linalg.norm(first.frame.position - attachment.frame.position)
+            if attachment.surface is None and first.surface is None and away < apart:
                 group.append(index)
                 break
         else:
@@ -156,7 +169,7 @@ def _cut_patch(
 ) -> InterfacePatch | None:
     """The patch of the nodes on the triangles of a cut patch; None where nearer joints have all of them."""
     corners = np.arange(3 * len(cut.triangles)).reshape(-1, 3)
-    near = NearbyTriangles(cut.triangles.reshape(-1, 3), corners, _SAME * size)
+    near = NearbyTriangles(cut.triangles.reshape(-1, 3), corners, _ON * size)
     nodes = candidates[np.isfinite(near.closest(mesh.nodes[candidates])[:, 0])]
     if not spans_a_plane(mesh.nodes[nodes]):
         return None
@@ -231,7 +244,7 @@ class _Place:
         seat = seat_radius(self.center, self.axis, self.triangles)
         if seat is None:
             return False, automatic_radius(self.center, self.triangles, closest, gaps, self.room)
-        return False, min(seat, max(0.45 * self.room, 1.25 * float(gaps.min())))
+        return False, min(seat, max(ROOM * self.room, 1.25 * float(gaps.min())))
 
 
 def _patch(
