@@ -28,7 +28,7 @@ _REFINED = 12_000
 # Error that the extrapolation of the frequencies is estimated to leave, from which more nodes are spent: at least and
 # at most so many, and in between so many that meshing and refinement together take some 20 s (3.3 ms for each triangle
 # of the surface and 0.2 ms for each node)
-_POOR, _POOR_REFINED = 0.0125, (40_000, 60_000)
+_POOR, _POOR_REFINED = 0.015, (40_000, 60_000)
 _IN_TIME, _OF_TRIANGLE = 100_000, 16.5
 # Error of the frequencies, that of the volume included, for which a mesh may take minutes, and its nodes at most: nine
 # of 160 links need it, most of all arms of many thin webs, whose frequencies are 8 to 30% too high with 30,000 nodes

@@ -87,8 +87,8 @@ def test_still_more_nodes_are_spent_on_meshes_whose_frequencies_tell_nothing():
     effort = Effort(0.02, 12_000, 0.08, 20_000, bad=0.2, bad_nodes=50_000)
     assert not effort.allows(0.19, 15_000, 30_000) and effort.allows(0.21, 15_000, 49_000)
     assert not effort.allows(0.21, 15_000, 51_000)
-    assert effort.allows(0.1, 30_000, 45_000)  # until the error is no longer poor
-    assert effort.ends(0.07, 30_000) and not effort.ends(0.09, 30_000)
+    assert effort.allows(0.21, 30_000, 45_000)
+    assert effort.ends(0.19, 30_000) and not effort.ends(0.21, 30_000)  # until the error is no longer bad
     assert not replace(effort, bad=0.05).ends(0.07, 8_000)  # what the volume leaves of it may be less than poor
 
 

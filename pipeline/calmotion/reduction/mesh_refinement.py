@@ -72,7 +72,8 @@ class Effort:
 
     def ends(self, error: float, nodes: int) -> bool:
         """Whether a mesh with an error is enough."""
-        return error <= self.wanted or (not self._few(nodes) and error <= min(self.poor, self.bad))
+        enough = self.bad if self.is_spent_on(nodes) else min(self.poor, self.bad)
+        return error <= self.wanted or (not self._few(nodes) and error <= enough)
 
     def allows(self, error: float, nodes: int, finer: int) -> bool:
         """Whether a mesh with an error may be followed by one with so many nodes."""

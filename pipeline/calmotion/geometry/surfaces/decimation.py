@@ -31,6 +31,16 @@ _SLIVER = 2e-3  # least ratio of the height of a triangle to its longest side, u
 
 
 @dataclass(eq=False)
+class _Edges:
+    """What edges would be collapsed to: keys, ascending, and `_places`."""
+
+    keys: Indices
+    places: Array
+    squares: Array
+    costs: Array
+
+
+@dataclass(eq=False)
 class _Surface:
     """A surface that is being decimated.
 
@@ -39,6 +49,8 @@ class _Surface:
         triangles: Shape [m, 3].
         normal, offset, weight: The quadric of each point, sum of w (n.x)^2 over its planes: their sum of w n n^T, of
             w d n and of w d^2, with d = -n.x of the plane, and of w; shapes [n, 3, 3], [n, 3] and [n, 2].
+        changed: Points that have moved since the last pass, shape [n].
+        known: Edges of the last pass; those without a changed end keep their places.
     """
 
     points: Array
@@ -46,6 +58,8 @@ class _Surface:
     normal: Array
     offset: Array
     weight: Array
+    changed: BoolArray
+    known: _Edges
 
 
 def decimated(points: Array, triangles: Indices, count: int, distance: float) -> tuple[Array, Indices]:
@@ -92,9 +106,11 @@ def _with_quadrics(points: Array, triangles: Indices) -> _Surface:
     area = np.linalg.norm(n, axis=1)
     n /= np.maximum(area, np.finfo(float).tiny)[:, None]
     d = -np.einsum("tx,tx->t", n, x.mean(axis=1))
+    count, none = len(points), np.zeros(0)
     surface = _Surface(
-        points.copy(), triangles, np.zeros((len(points), 3, 3)), np.zeros((len(points), 3)), np.zeros((len(points), 2))
-    )
+        points.copy(), triangles, np.zeros((count, 3, 3)), np.zeros((count, 3)), np.zeros((count, 2)),
+        np.zeros(count, dtype=bool), _Edges(np.zeros(0, np.int64), np.zeros((0, 3)), none, none),
+    )  # fmt: skip
     parts = (area[:, None, None] * n[:, :, None] * n[:, None], area[:, None] * d[:, None] * n)
     for corner in triangles.T:
         np.add.at(surface.normal, corner, parts[0])
@@ -111,12 +127,29 @@ def _candidates(surface: _Surface, distance: float, refused: Indices) -> tuple[I
     # points on an edge of more than two triangles stay
     free = np.ones(n, dtype=bool)
     free[edges[repeated != 2]] = False
-    edges = edges[free[edges].all(axis=1) & ~np.isin(keys, refused)]
-    places, squares, costs = _places(surface, edges)
-    kept = squares <= distance**2
-    kept &= costs <= np.quantile(costs, _CHEAPEST) if len(costs) else True
-    kept[kept] = _closed_after(surface, edges[kept])
-    return edges[kept], places[kept], costs[kept]
+    allowed = free[edges].all(axis=1) & ~np.isin(keys, refused)
+    edges = edges[allowed]
+    made = surface.known = _updated(surface, keys[allowed], edges)
+    surface.changed[:] = False
+    kept = made.squares <= distance**2
+    kept &= made.costs <= np.quantile(made.costs, _CHEAPEST) if len(edges) else True
+    kept[kept] = _closed_after(keys, edges[kept], n)
+    return edges[kept], made.places[kept], made.costs[kept]
+
+
+def _updated(surface: _Surface, keys: Indices, edges: Indices) -> _Edges:
+    """What edges would be collapsed to, with the work of `_places` for those that are new or have changed."""
+    known, at = surface.known, np.searchsorted(surface.known.keys, keys)
+    same = np.zeros(len(keys), dtype=bool)
+    inside = at < len(known.keys)
+    same[inside] = (known.keys[at[inside]] == keys[inside]) & ~surface.changed[edges[inside]].any(axis=1)
+    made = _Edges(keys, np.empty((len(keys), 3)), np.empty(len(keys)), np.empty(len(keys)))
+    fresh = _places(surface, edges[~same])
+    for values, old, new in zip(
+        (made.places, made.squares, made.costs), (known.places, known.squares, known.costs), fresh, strict=True
+    ):
+        values[same], values[~same] = old[at[same]], new
+    return made
 
 
 def _edges(triangles: Indices) -> Indices:
@@ -144,14 +177,19 @@ def _places(surface: _Surface, edges: Indices) -> tuple[Array, Array, Array]:
     return places, sums / np.maximum(weight, np.finfo(float).tiny), sums + _SHORT * weight * length**2
 
 
-def _closed_after(surface: _Surface, edges: Indices) -> BoolArray:
-    """Whether the ends of an edge have two neighbours in common: more would be merged into a fin."""
-    from scipy.sparse import coo_matrix
+def _closed_after(keys: Indices, edges: Indices, count: int) -> BoolArray:
+    """Whether the ends of an edge have two neighbours in common: more would be merged into a fin.
 
-    n, all_edges = len(surface.points), _edges(surface.triangles)
-    both = np.concatenate([all_edges, all_edges[:, ::-1]])
-    near = coo_matrix((np.ones(len(both), np.int32), both.T), shape=(n, n)).tocsr()
-    near.data[:] = 1
+    Args:
+        keys: Of all edges, one each.
+        edges: Shape [k, 2].
+        count: Number of points.
+    """
+    from scipy.sparse import csr_matrix
+
+    both = np.sort(np.concatenate([keys, keys % count * count + keys // count]))
+    begins = np.searchsorted(both, count * np.arange(count + 1))
+    near = csr_matrix((np.ones(len(both), np.int32), both % count, begins), shape=(count, count))
     common = near[edges[:, 0]].multiply(near[edges[:, 1]]).sum(axis=1)
     return np.asarray(np.asarray(common).ravel() == 2)
 
@@ -197,6 +235,7 @@ def _slimness(x: Array, doubled: Array) -> Array:
 def _collapse(surface: _Surface, edges: Indices, places: Array) -> None:
     kept, gone = edges.T
     surface.points[kept] = places
+    surface.changed[kept] = True
     for quadric in (surface.normal, surface.offset, surface.weight):
         quadric[kept] += quadric[gone]
     number = np.arange(len(surface.points), dtype=np.int32)
