@@ -20,6 +20,7 @@ from calmotion.shot.character import Array, Body, IntArray
 _PARTS = triangle_parts(12)
 _EDGE = 1.0  # of the radius: longest edge at a rim, so that it has eight sides or more
 _BISECTIONS = 12
+_TRIALS, _AREA = 5, 5e-3  # spheres of a patch that are tried, and relative error of its area that is enough
 
 
 def with_rims(
@@ -54,8 +55,8 @@ def with_rims(
             continue
         center, radius = patch.center, patch.radius
         points, tets = _finer_at(points, tets, center, radius)
-        radius += _excess(points, tets, center, radius)
-        for ball in ((center, radius), *patch.balls):
+        points, tets, radius = _cut_to_area(points, tets, center, radius)
+        for ball in patch.balls:
             points, tets = cut(points, tets, *ball)
         rims.append((attachments[patch.attachments[0]].frame.position, center, radius, patch.balls))
     found = []
@@ -69,14 +70,24 @@ def with_rims(
     return points, tets, tuple((origin, triangles) for origin, triangles in found if len(triangles))
 
 
-def _excess(points: Array, tets: IntArray, center: Array, radius: float) -> float:
-    """What a sphere has to be larger by, so that the polygon of its rim has the area within a radius [m]."""
+def _cut_to_area(points: Array, tets: IntArray, center: Array, radius: float) -> tuple[Array, IntArray, float]:
+    """The mesh, cut along a sphere so that the polygon of its rim has the area within a radius, and its radius [m].
+
+    Corners that move onto the sphere change the area by steps, so that the best of some trials counts.
+    """
     surface = boundary_triangles(tets)
     area, smaller, larger = (_area_within(points, surface, center, part * radius) for part in (1.0, 0.9, 1.1))
-    trial, split = cut(points, tets, center, radius)
-    missing = area - surface_area(trial, _within(trial, split, center, radius))
-    slope = (larger - smaller) / (0.2 * radius)
-    return float(np.clip(missing / slope, 0.0, 0.1 * radius)) if slope > 0.0 else 0.0
+    slope = max((larger - smaller) / (0.2 * radius), np.finfo(float).tiny)
+    best, least, trial = (points, tets, radius), np.inf, radius
+    for _ in range(_TRIALS):
+        made, split = cut(points, tets, center, trial)
+        missing = area - surface_area(made, _within(made, split, center, trial))
+        if abs(missing) < least:
+            best, least = (made, split, trial), abs(missing)
+        if least <= _AREA * area:
+            break
+        trial = float(np.clip(trial + missing / slope, 0.9 * radius, 1.1 * radius))
+    return best
 
 
 def _within(points: Array, tets: IntArray, center: Array, radius: float) -> IntArray:
