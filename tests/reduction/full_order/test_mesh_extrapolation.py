@@ -53,9 +53,9 @@ def test_interfaces_are_extrapolated_in_each_direction_by_its_own_error():
     assert meshes[0].interfaces @ factors == pytest.approx(limit, rel=1e-9)
     left = limit - meshes[0].interfaces @ softest
     assert np.linalg.eigvalsh(left).min() > 0.0
-    # three tenths of what was extrapolated: 0.6 and 1.92 per cent
+    # three tenths of what was extrapolated, 1.92 per cent; two tenths of its estimate, where that is more
     shares = np.linalg.eigvals(np.linalg.solve(meshes[2].interfaces, left)).real
-    assert sorted(shares) == pytest.approx([0.3 * 0.006, 0.3 * 0.0192], rel=0.05)
+    assert sorted(shares) == pytest.approx([0.2 * 0.01, 0.3 * 0.0192], rel=0.05)
     assert min(shares) < error < max(shares)
 
 

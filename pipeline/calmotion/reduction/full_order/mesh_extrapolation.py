@@ -20,7 +20,9 @@ _LEFT, _LEFT_BY_TWO, _DOUBTED = 0.2, 0.5, 0.7
 # In one direction of an interface, of a bar and of the links of the bartender: of what was extrapolated, and of the
 # difference of the extrapolations from two coarser meshes
 _LEFT_ALONG, _APART = 0.3, 1.5
-_LEAST = 0.1  # of the estimate of the finer mesh: the least error that is claimed of it
+# Of the estimate of the finer mesh: the least error that is claimed of it. On 76 meshes of 18 bodies the error is 0.95
+# of what is claimed for 95%, and 1.49 at most; with half of it 1.33 and 2.11, for claims that are 1% less in sum
+_LEAST = 0.2
 _STIFFEST = 0.05  # excess of the stiffness of an interface in any direction that is extrapolated
 
 
