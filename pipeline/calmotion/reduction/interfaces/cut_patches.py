@@ -20,7 +20,9 @@ from calmotion.shot.character import Array, Body, IntArray
 _PARTS = triangle_parts(12)
 _EDGE = 1.0  # of the radius: longest edge at a rim, so that it has eight sides or more
 _BISECTIONS = 12
-_TRIALS, _AREA = 5, 5e-3  # spheres of a patch that are tried, and relative error of its area that is enough
+# Spheres of a patch that are tried, and relative error of its area that is enough; how often elements along which a
+# sphere passes are bisected, and error from which they are
+_TRIALS, _AREA, _ROUNDS, _FAR = 5, 5e-3, 4, 0.02
 
 
 def with_rims(
@@ -73,12 +75,31 @@ def with_rims(
 def _cut_to_area(points: Array, tets: IntArray, center: Array, radius: float) -> tuple[Array, IntArray, float]:
     """The mesh, cut along a sphere so that the polygon of its rim has the area within a radius, and its radius [m].
 
-    Corners that move onto the sphere change the area by steps, so that the best of some trials counts.
+    Elements along which the sphere passes, as along the side of a cylinder, are inside or outside: where they are too
+    large for the area, they are bisected.
+    """
+    for last in range(_ROUNDS):
+        cut_mesh, missing = _nearest_area(points, tets, center, radius)
+        if missing <= _FAR or last == _ROUNDS - 1:
+            break
+        triangles = boundary_triangles(tets)
+        share = _share_within(points, triangles, center, radius)
+        points, tets = bisected(points, tets, _behind(tets, triangles[(share > 0.0) & (share < 1.0)]))
+    return cut_mesh
+
+
+def _nearest_area(
+    points: Array, tets: IntArray, center: Array, radius: float
+) -> tuple[tuple[Array, IntArray, float], float]:
+    """`_cut_to_area` with these elements, by the best of some spheres, and the relative error of the area.
+
+    Corners that move onto a sphere change the area by steps, so that the best may not be the last.
     """
     surface = boundary_triangles(tets)
     area, smaller, larger = (_area_within(points, surface, center, part * radius) for part in (1.0, 0.9, 1.1))
     slope = max((larger - smaller) / (0.2 * radius), np.finfo(float).tiny)
     best, least, trial = (points, tets, radius), np.inf, radius
+    low = high = None  # the last spheres with too small and with too large an area
     for _ in range(_TRIALS):
         made, split = cut(points, tets, center, trial)
         missing = area - surface_area(made, _within(made, split, center, trial))
@@ -86,8 +107,12 @@ def _cut_to_area(points: Array, tets: IntArray, center: Array, radius: float) ->
             best, least = (made, split, trial), abs(missing)
         if least <= _AREA * area:
             break
-        trial = float(np.clip(trial + missing / slope, 0.9 * radius, 1.1 * radius))
-    return best
+        low, high = ((trial, missing), high) if missing > 0.0 else (low, (trial, missing))
+        if low is None or high is None:
+            trial = float(np.clip(trial + missing / slope, 0.9 * radius, 1.1 * radius))
+        else:
+            trial = low[0] + (high[0] - low[0]) * low[1] / (low[1] - high[1])
+    return best, least / max(area, np.finfo(float).tiny)
 
 
 def _within(points: Array, tets: IntArray, center: Array, radius: float) -> IntArray:
