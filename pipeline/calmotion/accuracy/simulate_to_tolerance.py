@@ -23,7 +23,6 @@ from calmotion.accuracy.step_error import (
     largest_step,
     order_of,
     run_or_none,
-    seen_error,
     simulate_at,
     step_error,
 )
@@ -86,7 +85,7 @@ def simulate_to_tolerance(
         run = replace(frames_of(result, shot.animation.frame_times), integrator=options.scheme)
         if memory is not None:
             memory.projected, memory.step, memory.integrator = projected, step, options.scheme
-        accuracy = _accuracy(max(error, seen_error(run, trials)), left_out, projected.shot, options, run)
+        accuracy = _accuracy(error, left_out, projected.shot, options, run)
         return with_step(result, character, options, replace(accuracy, efforts=_effort_errors(run, trials)))
 
     # a search by the same given step uses BDF2 as well, and what it wrote shall have the same errors

@@ -143,20 +143,6 @@ def step_error(coarse: StepRun, fine: StepRun, order: float | None = None) -> fl
     return distance(coarse.positions, fine.positions) / ratio
 
 
-def seen_error(run: StepRun, trials: Iterable[StepRun]) -> float:
-    """Error of a run at any target by its own distance from finer ones [m]; zero where there is none.
-
-    A step between two that were tried has an error that follows from these. Where the longer one does not resolve a
-    vibration, that is too small; by a step of 10.4 ms a random shot was 2.98 mm off, where 2.07 mm followed from steps
-    of 8.3 and 13.9 ms, and 2.6 mm from the distance between 8.3 and 10.4 ms.
-
-    Args:
-        trials: Runs of the same curves by the same integrator.
-    """
-    finer = [trial for trial in trials if run.step > WORTH * trial.step]
-    return max(((run.step / fine.step) ** _order(run, fine) * step_error(run, fine) for fine in finer), default=0.0)
-
-
 def effort_errors(run: StepRun, other: StepRun) -> Array | None:
     """Error of each motor's effort by the step of a run [N m] or [N], shape [M], from a run by another step.
 
