@@ -78,9 +78,9 @@ def _cut_to_area(points: Array, tets: IntArray, center: Array, radius: float) ->
     Elements along which the sphere passes, as along the side of a cylinder, are inside or outside: where they are too
     large for the area, they are bisected.
     """
-    for last in range(_ROUNDS):
+    for k in range(_ROUNDS):
         cut_mesh, missing = _nearest_area(points, tets, center, radius)
-        if missing <= _FAR or last == _ROUNDS - 1:
+        if missing <= _FAR or k == _ROUNDS - 1:
             break
         triangles = boundary_triangles(tets)
         share = _share_within(points, triangles, center, radius)

@@ -14,10 +14,10 @@ from calmotion.reduction.elements.assembly import QuadraticMesh
 from calmotion.reduction.interfaces.automatic_patch import ROOM, Skin, automatic_radius, end_face, nodes_of_area
 from calmotion.reduction.interfaces.contact_place import contact_place
 from calmotion.reduction.interfaces.joint_places import (
-    SAME,
     TIE,
     Ball,
     balls_between,
+    cut_at,
     nearest_apart,
     reached_by,
     within,
@@ -124,7 +124,7 @@ def interface_patches(
             continue
         free = surface[~taken]
         candidates = surface[(nearest == k) & ~taken]
-        known = next((c for c in cut if np.linalg.norm(c.origin - frames[k].position) < SAME * size), None)
+        known = cut_at(frames[k].position, cut, size)
         patch = None if known is None else _cut_patch(mesh, candidates, known, group, size)
         if patch is None:
             balls = balls_between(centers, k, size)

@@ -8,6 +8,7 @@ import numpy as np
 
 from calmotion.reduction.interfaces.automatic_patch import ROOM, least_radius
 from calmotion.shot.character import Array, BoolArray
+from calmotion.shot.meshes import CutPatch
 
 Ball = tuple[Array, float]  # center [m], shape [3], and radius [m]
 
@@ -28,6 +29,17 @@ def nearest_apart(triangles: Array, radius: float) -> float:
     """
     same = SAME * float(np.linalg.norm(np.ptp(triangles.reshape(-1, 3), axis=0)))
     return same if radius >= 0.0 else max(same, least_radius(triangles) / ROOM)
+
+
+def cut_at(position: Array, cut: Sequence[CutPatch], size: float) -> CutPatch | None:
+    """The patch along whose rim the mesh is cut for an attachment frame; None without one.
+
+    Args:
+        position: Of the frame [m], shape [3].
+        cut: All such patches of the body.
+        size: Of the body [m].
+    """
+    return next((patch for patch in cut if np.linalg.norm(patch.origin - position) < SAME * size), None)
 
 
 def balls_between(places: Array, own: int, size: float) -> list[Ball]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from calmotion.reduction.elements.assembly import QuadraticMesh
 from calmotion.reduction.interfaces.interface_patches import InterfacePatch
+from calmotion.reduction.interfaces.joint_places import cut_at
 from calmotion.shot.character import Array, ElasticMaterial
 from calmotion.shot.meshes import CutPatch
 
@@ -41,7 +42,7 @@ def rim_error(
         at = mesh.nodes[mesh.surface[np.isin(mesh.surface[:, :3], patch.nodes).any(axis=1), :3]]
         edge = np.linalg.norm(at - at[:, [1, 2, 0]], axis=2).mean() if len(at) else patch.radius
         return min(_WHOLE * float(edge) / patch.radius, 1.0), patch.radius
-    known = next((c for c in cut if np.linalg.norm(c.origin - origin) < 1e-6 * size), None)
+    known = cut_at(origin, cut, size)
     if known is None:
         return 0.0, patch.radius
     x = known.triangles
