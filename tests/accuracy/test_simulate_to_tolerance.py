@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from arms import chain
 from calmotion.accuracy import simulate_to_tolerance as to_tolerance
+from calmotion.accuracy import step_choice
 from calmotion.accuracy.pod_subspace import ProjectedShot
-from calmotion.accuracy.simulate_to_tolerance import WHOLE, found_tracks, planned_step, simulate_to_tolerance
+from calmotion.accuracy.simulate_to_tolerance import found_tracks, planned_step, simulate_to_tolerance
+from calmotion.accuracy.step_choice import WHOLE
 from calmotion.accuracy.step_error import CLOSED_GAP, distance, frames_of, simulate_at
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.retargeting import to_tolerance as retarget
@@ -108,7 +110,7 @@ def test_frames_shorter_than_the_first_steps(arm, moves, bodies):
 
 
 def test_the_step_that_is_planned_is_the_one_that_is_taken(arm, animation, bodies, monkeypatch):
-    plain = to_tolerance.simulate_at
+    plain = step_choice.simulate_at
 
     def fails(shot, options, step):
         if options.scheme != "bdf2":
@@ -118,7 +120,7 @@ def test_the_step_that_is_planned_is_the_one_that_is_taken(arm, animation, bodie
     options = RunSettings(tolerance=1e-3)
     for gives_way in (False, True):
         if gives_way:
-            monkeypatch.setattr(to_tolerance, "simulate_at", fails)
+            monkeypatch.setattr(step_choice, "simulate_at", fails)
         row = planned_step(compile_shot(arm, animation, bodies), options)
         taken = simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet)
         assert astuple(row) == astuple(taken.left_out[-1])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from calmotion.accuracy import converged_reduction, mesh_budget, simulate_to_tolerance
+from calmotion.accuracy import converged_reduction, mesh_budget, simulate_to_tolerance, step_choice
 from calmotion.shot import Character, Result
 from calmotion.shot.budget import (
     CHOICES,
@@ -47,7 +47,7 @@ def _budget(result: Result, tolerance: float, least_gain: float) -> tuple[Budget
 
     reduction = accuracy.left_out_m - accuracy.subspace_m - accuracy.choices_m
     besides = simulate_to_tolerance.besides_step(accuracy)
-    for_step = simulate_to_tolerance.step_allowance(tolerance, besides) / tolerance
+    for_step = step_choice.step_allowance(tolerance, besides) / tolerance
     entries = [
         entry(STEP, for_step, accuracy.step_m),
         entry(REDUCTION, converged_reduction.SHARE, max(reduction, 0.0)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from calmotion.accuracy.simulate_to_tolerance import FIRST, LAST, chooses_step
+from calmotion.accuracy.step_choice import FIRST, LAST, chooses_step
 from calmotion.errors import ShotError
 from calmotion.shot import Animation, Character
 from calmotion.shot.run import RunSettings

@@ -16,17 +16,21 @@ from calmotion.accuracy.mesh_budget import mesh_error, patch_error
 from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, project_to_subspace
 from calmotion.accuracy.reduced_bodies import SUBSPACES, TIME_STEP, RunMemory
 from calmotion.accuracy.simulate_again import with_last_choices
+from calmotion.accuracy.step_choice import (
+    FIRST,
+    allowed_step_error,
+    chooses_step,
+    chosen_step,
+)
 from calmotion.accuracy.step_error import (
     StepRun,
     effort_errors,
     frames_of,
-    largest_step,
     order_of,
     run_or_none,
     simulate_at,
     step_error,
 )
-from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.multibody.parallel import at_once
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Accuracy, Animation, Character, Result, Simplification, Track
@@ -37,16 +41,10 @@ from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.bodies import mode_tables
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.inputs.open_chains import refused_gap
-from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
+from calmotion.simulation.inputs.time_grid import MAX_STEP
 from calmotion.simulation.prepare import prepare
 from calmotion.simulation.simulate import Progress, intended_motion, simulate_shot
 
-# Of the tolerance, that the time step may take: the least and the most where the tolerance can be kept, with all else,
-# as estimates of another step differ, and where it cannot: smaller steps would be in vain
-LEAST, MOST, WHOLE, MISSED = 0.1, 0.75, 0.9, 0.35
-_ANEW = 0.3  # step over that by which the other errors were estimated, below which they are again
-FIRST, LAST = 1.0 / 60.0, 1.0 / 30720.0  # steps that are tried [s]
 OF_SHAKE = 0.05  # of the input's own error: how well that need be known before it is taken away
 HELD = 0.1  # of the tolerance (and of how well the shake need be known), that holding bodies to directions may take
 NAMES = {"bdf2": "BDF2", "newmark": "Newmark's method", "generalized-alpha": "generalised-alpha"}
@@ -223,70 +221,9 @@ def _effort_errors(run: StepRun, trials: Sequence[StepRun]) -> Array | None:
     return None if other is None else effort_errors(run, other)
 
 
-def chosen_step(
-    shot: CompiledShot, options: RunSettings, left_out: float, trials: list[StepRun] | None = None
-) -> tuple[float, float]:
-    """The step of a simulation to a tolerance, and its estimated error [s], [m]; arguments as of `simulate_shot`.
-
-    It divides a frame.
-
-    Args:
-        left_out: Error of what the bodies do without [m].
-        trials: Filled with the runs by which it was chosen.
-
-    Raises:
-        ShotError: Not even the last step does.
-    """
-
-    def trial(step: float) -> StepRun:
-        run = simulate_at(shot, options, step)
-        if trials is not None and step <= FIRST:
-            trials[:] = [*trials[-1:], run]  # of each only what two frames hold
-        return run
-
-    def allowed(run: StepRun) -> float:
-        """What the meshes and patches leave; they cost about the same by any step."""
-        if not known or run.step < _ANEW * known[0]:
-            known[:] = run.step, mesh_and_patches(shot, options, run)
-        return allowed_step_error(shot.character, options, left_out + known[1])
-
-    known: list[float] = []  # the step by which they were estimated, and what they cost
-    step, error = largest_step(trial, FIRST, LAST, allowed, refused_gap(shot.character, options))
-    if not np.isfinite(error):
-        trial(step)
-    whole = make_grid(shot.animation.frame_times, step, 0.0).h
-    return whole, (whole / step) ** order_of(shot.character) * error
-
-
-def chooses_step(character: Character, options: RunSettings) -> bool:
-    """Whether the step follows from the tolerance; it does not for cyclic motions, RK4 and Radau."""
-    if options.step is not None or character.retarget.time_step is not None:
-        return False
-    return options.scheme in IMPLICIT and not character.retarget.cyclic
-
-
-def allowed_step_error(character: Character, options: RunSettings, others: float) -> float:
-    """Error that the time step may cause beside all other errors [m].
-
-    It takes what they leave of the tolerance: half the step costs less than a finer mesh or reduction.
-    """
-    return step_allowance(tolerance_of(character, options.tolerance), others)
-
-
-def step_allowance(tolerance: float, others: float) -> float:
-    """The same by the tolerance [m]."""
-    left = WHOLE * tolerance - others
-    return min(MOST * tolerance, left) if left >= LEAST * tolerance else MISSED * tolerance
-
-
 def besides_step(accuracy: Accuracy) -> float:
     """Estimated errors of all but the time step [m], as far as they are known."""
     return accuracy.left_out_m + (accuracy.mesh_m or 0.0) + accuracy.patches_m
-
-
-def mesh_and_patches(shot: CompiledShot, options: RunSettings, run: StepRun) -> float:
-    """Estimated error of the meshes and interface patches at the targets [m], as far as it is known."""
-    return (mesh_error(shot, options, run) or 0.0) + patch_error(shot, options, run)
 
 
 def omitted_error(bodies: Sequence[ReducedBody]) -> float:

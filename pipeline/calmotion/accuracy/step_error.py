@@ -209,7 +209,7 @@ def largest_step(
                 return coarse.step, by_coarse
             if error <= enough and fine_closed:
                 # between the two the gap is not known
-                return _between(fine, error, enough, order) if coarse_closed else (fine.step, error)
+                return between(fine, error, enough, order) if coarse_closed else (fine.step, error)
             if by_coarse <= enough and fine.integrator not in ("", SAFE):
                 raise open_joints(fine.gap, fine.integrator, fine.step)
             if step <= last or no_step_closes(before, coarse, fine, refused_gap):
@@ -263,9 +263,16 @@ def observed_order(before: StepRun | None, coarse: StepRun, fine: StepRun) -> fl
     return float(np.interp(longer, [apart * ratio(order) for order in orders], orders)) if apart > 0.0 else most
 
 
-def _between(fine: StepRun, error: float, enough: float, order: float) -> tuple[float, float]:
-    """A step [s] up to twice as long as that of a run whose error is allowed, and its error."""
-    longer = MARGIN * (enough / error) ** (1.0 / order) if error > 0.0 else 2.0
+def between(fine: StepRun, error: float, enough: float, order: float) -> tuple[float, float]:
+    """A step [s] up to twice as long as that of a run whose error is allowed, and its error [m].
+
+    Args:
+        fine: The run.
+        error: Of it [m].
+        enough: What is allowed [m].
+        order: With which power of the step it goes.
+    """
+    longer = MARGIN * (min(2.0, (enough / error) ** (1.0 / order)) if error > 0.0 else 2.0)
     if longer <= WORTH:
         return fine.step, error
     return longer * fine.step, longer**order * error

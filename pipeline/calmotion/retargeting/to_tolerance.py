@@ -14,13 +14,9 @@ from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun
 from calmotion.accuracy.reduced_bodies import SUBSPACES, TIME_STEP, RunMemory
 from calmotion.accuracy.simulate_to_tolerance import (
     FINDING,
-    FIRST,
     HELD,
-    LAST,
     allowed_by_subspaces,
-    allowed_step_error,
     besides_step,
-    chooses_step,
     found_tracks,
     intended_positions,
     omitted_error,
@@ -30,6 +26,7 @@ from calmotion.accuracy.simulate_to_tolerance import (
     with_modes,
     with_subspaces,
 )
+from calmotion.accuracy.step_choice import FIRST, LAST, allowed_step_error, chooses_step
 from calmotion.accuracy.step_error import (
     StepRun,
     distance,
