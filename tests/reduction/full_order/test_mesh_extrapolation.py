@@ -49,14 +49,40 @@ def test_interfaces_are_extrapolated_in_each_direction_by_its_own_error():
         for error, own in zip((0.04, 0.021, 0.011), along, strict=True)
     ]
     factors, softest, error = interface_factors(meshes[0], meshes)
-    limit = T.T @ exact @ T
+    # the geometric mean of the change, six tenths of the estimate, and of half of it: almost what is there
+    share, last = np.sqrt(0.6 * 0.5), along[2] / (1.0 + 0.6 * along[2])
+    limit = T.T @ (exact * (1.0 + 0.6 * along[2]) * (1.0 - share * last)) @ T
     assert meshes[0].interfaces @ factors == pytest.approx(limit, rel=1e-9)
+    assert meshes[0].interfaces @ factors == pytest.approx(T.T @ exact @ T, rel=5e-3)
     left = limit - meshes[0].interfaces @ softest
     assert np.linalg.eigvalsh(left).min() > 0.0
-    # three tenths of what was extrapolated, 1.92 per cent; two tenths of its estimate, where that is more
+    # three tenths of the estimate, in each direction
     shares = np.linalg.eigvals(np.linalg.solve(meshes[2].interfaces, left)).real
-    assert sorted(shares) == pytest.approx([0.2 * 0.01, 0.3 * 0.0192], rel=0.05)
+    assert sorted(shares) == pytest.approx(0.3 * last, rel=1e-6)
     assert min(shares) < error < max(shares)
+
+
+def test_where_change_and_estimate_differ_more_is_left():
+    stiffness = np.diag([4.0, 9.0])
+    # both estimates fall by half; the change tells one and a half times the estimate, and a tenth of it
+    told = np.array([1.5, 0.1])
+    meshes = [
+        with_interfaces(own, stiffness * (1.0 + told * own), own * stiffness * (1.0 + told * own))
+        for own in (0.004, 0.002, 0.001)
+    ]
+    factors, softest, _ = interface_factors(meshes[2], meshes)
+    excess = 1.0 - np.diag(factors)
+    assert excess == pytest.approx([np.sqrt(1.5 * 0.5) * 1e-3, np.sqrt(0.1 * 0.5) * 1e-3], rel=0.01)
+    assert np.diag(factors - softest) == pytest.approx([0.7e-3, 0.3e-3], rel=0.01)
+
+
+def test_a_finer_mesh_that_is_not_softer_tells_nothing_of_its_interfaces():
+    stiffness = np.diag([4.0, 9.0])
+    stiffer = stiffness * np.array([1.01, 0.99])
+    meshes = [with_interfaces(0.04, stiffness, 0.04 * stiffness), with_interfaces(0.02, stiffer, 0.02 * stiffer)]
+    factors, softest, _ = interface_factors(meshes[1], meshes)
+    assert factors[0, 0] == pytest.approx(1.0, abs=1e-12) and (factors - softest)[0, 0] == pytest.approx(0.02)
+    assert factors[1, 1] < 0.995
 
 
 def test_one_mesh_tells_its_own_error_and_a_body_without_interfaces_nothing():
