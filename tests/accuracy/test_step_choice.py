@@ -41,6 +41,11 @@ def test_a_step_that_is_confirmed_is_kept_and_costs_two_runs():
     assert error == pytest.approx(error_of(1 / 480), rel=0.1)
 
 
+def test_the_larger_of_two_errors_counts():
+    told = 1.5 * error_of(1 / 480)
+    assert confirmed_step(vibrating, 1 / 480, told, 1e-5, lambda run: 1.0) == (1 / 480, told)
+
+
 def test_a_shorter_step_is_no_shorter_than_it_must_be():
     step, _ = confirmed_step(vibrating, 1 / 240, 0.0, 1e-5, lambda run: 0.5 * error_of(1 / 240))
     assert 1 / 480 < step < 0.8 / 240

@@ -70,27 +70,29 @@ def chosen_step(
 def confirmed_step(
     run: Callable[[float], StepRun], step: float, error: float, last: float, allowed: Callable[[StepRun], float]
 ) -> tuple[float, float]:
-    """A step and its error by a run with half of it; a shorter one where that is more than is allowed.
+    """A step and its error by a run with half of it too; a shorter one where that is more than is allowed.
 
-    Longer steps tell too little where they hardly resolve a vibration: two that damp it away differ little.
+    Longer steps tell too little where they hardly resolve a vibration: two that damp it away differ little. Where half
+    of the step does not resolve it either, longer ones may tell more: the larger error counts.
 
     Args:
         run: Simulates by a step [s]; may raise IntegrationError.
-        step, error: The step [s] and its error by longer ones [m], which count where half of the step fails.
+        step, error: The step [s] and its error by longer ones [m].
         last: Shortest step [s].
         allowed: Error that may be [m], from the finest run.
 
     Returns:
         The step [s] and its error [m].
     """
-    longest = step
+    longest, told = step, error
     own, half = run_or_none(run, step), run_or_none(run, 0.5 * step)
     while own is not None and half is not None and half.step < own.step:
         enough = allowed(half)
         step, error = own.step, (own.step / half.step) ** half.order * step_error(own, half)
         if error <= _MORE * enough or half.step <= last:
-            # not all of the next longer one, which was too long
-            return between(own, error, enough, half.order) if own.step < longest else (step, error)
+            if own.step < longest:  # not all of the next longer one, which was too long
+                return between(own, error, enough, half.order)
+            return step, max(error, told)
         own, half = half, run_or_none(run, 0.5 * half.step)
     return step, error
 
