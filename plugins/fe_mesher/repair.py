@@ -18,6 +18,9 @@ from .uniting import NotManifold, united, without_detail
 # largest share of the surface that is inside out, and where holes of any size are capped; number of sample points
 _INVERTED, _CROSSED, _PLACES = 0.02, 0.2, 200
 _LOOSE = 1e-2  # of the volume: loose pieces such as screws
+# Of the size: places on a grid are the same for links that are placed with another rounding (1e-16 of it), and differ
+# from what the file says by less than its single precision does
+_GRID = 2.0**-28
 # Number of triangles from which a surface is decimated; distances, of the size, the largest half of the narrowest
 # envelope of a mesh; largest change of the volume
 _MANY, _TOLERANCES, _LOST = 200_000, (3e-5, 1e-4), 1e-3
@@ -67,7 +70,9 @@ def closed_solid(surfaces: Sequence[SurfaceMesh], body: str, any_hole: bool = Fa
     )
     if not scale > 0.0:
         raise ShotError("its surfaces enclose no volume", path=body, found="all points coincide", remedy=REMEDY)
-    kept = [replace(surface, points=(surface.points - center) / scale) for surface in kept]
+    # links of one shape have one mesh, in whatever order a file has their parts and with whatever rounding it has them
+    kept = [replace(surface, points=np.round((surface.points - center) / scale / _GRID) * _GRID) for surface in kept]
+    kept.sort(key=lambda surface: (-len(surface.triangles), *np.round(surface.points.mean(axis=0), 6)))
     parts = _parts(kept, repairs, any_hole)
     if not parts:
         raise ShotError("its surfaces enclose no volume", path=body, found="no solid part", remedy=REMEDY)
