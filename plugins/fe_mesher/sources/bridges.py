@@ -35,7 +35,8 @@ def bridged(solids: Sequence[Part], largest: float = NARROW) -> tuple[Part | Non
     """
     import manifold3d
 
-    prisms, widest = [], 0.0
+    prisms: list[np.ndarray] = []
+    widest = 0.0
     for k, solid in enumerate(solids):
         x = solid.points[solid.triangles]
         begun = len(prisms)
