@@ -23,7 +23,9 @@ _SINK = 1e-4  # of the size, by which fillings reach into both sides
 # tunnels, to 4,400 with its slits and to 3,000 without both
 _DETAIL, _BESIDE = 1e-4, 0.5 * NARROW
 _LOST = 5e-3  # largest change of the volume by that: solids that overlap are counted twice before
-_LEAST = NARROW**2  # area of a part of a side that is filled, of the squared size
+_LEASTS = (NARROW**2, 1e-4)  # areas of a part of a side that is filled, of the squared size
+# Most triangles with fillings, of those before, and besides: a surface with more is followed less closely by its mesh
+_MORE, _BESIDES = 2.0, 20_000
 
 
 def without_slits(whole: Part, scale: float, repairs: list[str]) -> Part:
@@ -46,12 +48,17 @@ def without_slits(whole: Part, scale: float, repairs: list[str]) -> Part:
     simpler = solid.simplify(_DETAIL)
     solid = simpler if abs(simpler.volume() - whole.volume) < _LOST * whole.volume else solid
     fine = part_of(solid.refine_to_length(_SIDE))
-    fillings = slit_fillings(fine.points, fine.triangles, NARROW, _SINK, _BESIDE, _LEAST)
-    made = [(body, filling.width) for filling in fillings if (body := _body(filling)) is not None]
-    slits = 0
-    if made:
+    slits, most = 0, _MORE * len(whole.triangles) + _BESIDES
+    for least in _LEASTS:
+        fillings = slit_fillings(fine.points, fine.triangles, NARROW, _SINK, _BESIDE, least)
+        made = [(body, filling.width) for filling in fillings if (body := _body(filling)) is not None]
+        if not made:
+            break
         filling = manifold3d.Manifold.batch_boolean([body for body, _ in made], manifold3d.OpType.Add)
-        slits, whole = len(filling.decompose()), part_of(solid + filling)
+        filled = part_of(solid + filling)
+        if len(filled.triangles) <= most:
+            slits, whole = len(filling.decompose()), filled
+            break
     pieces = connected_pieces(whole.points, whole.triangles)
     kept = [piece for piece in pieces if not _is_thin_cavity(piece)]
     cavities = len(pieces) - len(kept)
