@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -116,6 +117,13 @@ def connected_pieces(points: np.ndarray, triangles: np.ndarray) -> list[Part]:
         used, corners = np.unique(triangles[label == k], return_inverse=True)
         pieces.append(Part(points[used], corners.reshape(-1, 3)))
     return pieces
+
+
+def concatenated(parts: Sequence[Part]) -> Part:
+    """Surfaces as one."""
+    starts = np.cumsum([0] + [len(part.points) for part in parts[:-1]])
+    triangles = np.vstack([part.triangles + start for part, start in zip(parts, starts, strict=True)])
+    return Part(np.vstack([part.points for part in parts]), triangles)
 
 
 def _is_flat(part: Part) -> bool:

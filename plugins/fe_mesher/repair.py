@@ -10,13 +10,17 @@ from calmotion.errors import ShotError
 from calmotion.geometry.closed_surfaces import enclosed_volume, winding_number, winding_numbers
 from calmotion.shot import SurfaceMesh
 
-from .closing import REMEDY, Part, closed_parts, connected_pieces
+from .closing import REMEDY, Part, closed_parts, concatenated, connected_pieces
 from .sources.bridges import WIDE, bridged, strutted
+from .sources.slits import without_slits
 from .uniting import NotManifold, united, without_detail
 
 # largest share of the surface that is inside out, and where holes of any size are capped; number of sample points
 _INVERTED, _CROSSED, _PLACES = 0.02, 0.2, 200
 _LOOSE = 1e-2  # of the volume: loose pieces such as screws
+# Of the size: places on a grid are the same for links that are placed with another rounding (1e-16 of it), and differ
+# from what the file says by less than its single precision does
+_GRID = 2.0**-28
 # Number of triangles from which a surface is decimated; distances, of the size, the largest half of the narrowest
 # envelope of a mesh; largest change of the volume
 _MANY, _TOLERANCES, _LOST = 200_000, (3e-5, 1e-4), 1e-3
@@ -66,7 +70,9 @@ def closed_solid(surfaces: Sequence[SurfaceMesh], body: str, any_hole: bool = Fa
     )
     if not scale > 0.0:
         raise ShotError("its surfaces enclose no volume", path=body, found="all points coincide", remedy=REMEDY)
-    kept = [replace(surface, points=(surface.points - center) / scale) for surface in kept]
+    # links of one shape have one mesh, in whatever order a file has their parts and with whatever rounding it has them
+    kept = [replace(surface, points=np.round((surface.points - center) / scale / _GRID) * _GRID) for surface in kept]
+    kept.sort(key=lambda surface: (-len(surface.triangles), *np.round(surface.points.mean(axis=0), 6)))
     parts = _parts(kept, repairs, any_hole)
     if not parts:
         raise ShotError("its surfaces enclose no volume", path=body, found="no solid part", remedy=REMEDY)
@@ -76,6 +82,8 @@ def closed_solid(surfaces: Sequence[SurfaceMesh], body: str, any_hole: bool = Fa
         raise ShotError(
             "its surfaces cannot be united into one solid", path=body, found=str(error), remedy=REMEDY
         ) from error
+    if any_hole:
+        whole = without_slits(whole, scale, repairs)
     whole = _in_one_piece(whole, scale, repairs, body, any_hole)
     if not whole.volume > 0.0:
         raise ShotError("its surfaces enclose no volume", path=body, found=f"{whole.volume:.3g} m^3", remedy=REMEDY)
@@ -213,7 +221,7 @@ def _outward(parts: list[Part], path: str, repairs: list[str]) -> list[Part]:
     for part in [part for part in parts if part.volume < 0.0]:
         around = [i for i, s in enumerate(solids) if s.volume > -part.volume and _contains(s, part.points[0])]
         if around:
-            solids[around[0]] = _concatenated([solids[around[0]], part])
+            solids[around[0]] = concatenated([solids[around[0]], part])
         else:
             repairs.append(f"{path}: reoriented a part that was inside out")
             solids.append(_inverted(part))
@@ -228,12 +236,6 @@ def _outward(parts: list[Part], path: str, repairs: list[str]) -> list[Part]:
 
 def _inverted(part: Part) -> Part:
     return Part(part.points, part.triangles[:, ::-1])
-
-
-def _concatenated(parts: Sequence[Part]) -> Part:
-    starts = np.cumsum([0] + [len(part.points) for part in parts[:-1]])
-    triangles = np.vstack([part.triangles + start for part, start in zip(parts, starts, strict=True)])
-    return Part(np.vstack([part.points for part in parts]), triangles)
 
 
 def _contains(solid: Part, point: np.ndarray) -> bool:
@@ -267,14 +269,14 @@ def _in_one_piece(whole: Part, scale: float, repairs: list[str], body: str, any_
         lost = sum(piece.volume for piece in loose)
         repairs.append(f"removed {len(loose)} loose pieces, {100.0 * lost / whole.volume:.2g}% of the volume")
     if len(large) == 1:
-        return _concatenated([*large, *cavities])
+        return concatenated([*large, *cavities])
     joined, gap = bridged(large)
     if joined is None and any_gap:
         joined, gap = bridged(large, WIDE)
     if joined is None and any_gap:
         joined, gap = strutted(large)
         repairs.append(f"joined {len(large)} separate solids by struts across gaps of up to {1e3 * scale * gap:.2g} mm")
-        return _concatenated([joined, *cavities])
+        return concatenated([joined, *cavities])
     if joined is None:
         sizes = ", ".join(f"{1e6 * scale**3 * piece.volume:.3g}" for piece in large)
         raise ShotError(
@@ -282,4 +284,4 @@ def _in_one_piece(whole: Part, scale: float, repairs: list[str], body: str, any_
             remedy="Make them overlap, or divide them into several bodies",
         )  # fmt: skip
     repairs.append(f"bridged gaps of up to {1e3 * scale * gap:.2g} mm between {len(large)} separate solids")
-    return _concatenated([joined, *cavities])
+    return concatenated([joined, *cavities])

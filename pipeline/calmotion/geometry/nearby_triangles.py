@@ -1,6 +1,8 @@
-"""Closest points of a surface near many points, by a grid of cells that name the triangles close to them."""
+"""What of a surface is near many points, by a grid of cells that name the triangles close to them."""
 
 from __future__ import annotations
+
+from functools import cached_property
 
 import numpy as np
 
@@ -9,6 +11,7 @@ from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 _CELLS = 64  # along the longest side of the surface
+_EDGE = 1e-9  # of an edge, by which a triangle is larger for rays: none must pass between two of them
 _NO_AREA = 1e-13  # square of the sine of an angle below which a triangle is a line
 
 
@@ -39,13 +42,43 @@ class NearbyTriangles:
     def closest(self, points: Array) -> Array:
         """Closest points of the surface [m], shape [k, 3]; NaN where it is farther than the reach."""
         found = np.full(points.shape, np.nan)
+        near = np.ascontiguousarray(points)
+        cells = self._cells(points)
+        _closest(near, cells, self._start, self._listed, self._corners, self._reach, np.zeros(3), found)
+        return found
+
+    def faced(self, points: Array, directions: Array, skip: float) -> tuple[Array, Array]:
+        """The first side towards each point that a ray meets from there.
+
+        Args:
+            points: [m], shape [k, 3].
+            directions: Unit vectors, shape [k, 3].
+            skip: How far behind the point a side may be, whose distance is zero then [m].
+
+        Returns:
+            Distances [m], shape [k], infinite beyond the reach; and the product of the direction and the normal of what
+            is met, shape [k], from -1 where it is met straight on.
+        """
+        x, normal = self._corners, self._normals
+        distance, product = np.full(len(points), np.inf), np.zeros(len(points))
+        origins, ways = np.ascontiguousarray(points), np.ascontiguousarray(directions)
+        bounds = (self._reach, skip)
+        _faced(origins, ways, self._cells(points), self._start, self._listed, x, normal, bounds, distance, product)
+        return distance, product
+
+    @cached_property
+    def _normals(self) -> Array:
+        x = self._corners
+        normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny))
+
+    def _cells(self, points: Array) -> Indices:
+        """The cell of each point, -1 where it is outside of all; shape [k]."""
         cell = np.floor((points - self._low) / self._size).astype(np.int64)
         inside = np.all((cell >= 0) & (cell < self._count), axis=1)
         number = (cell[:, 0] * self._count[1] + cell[:, 1]) * self._count[2] + cell[:, 2]
         number[~inside] = -1
-        near = np.ascontiguousarray(points)
-        _closest(near, number, self._start, self._listed, self._corners, self._reach, np.zeros(3), found)
-        return found
+        return np.asarray(number)
 
 
 @kernel
@@ -89,6 +122,42 @@ def _closest(
                 nearest = distance
                 for i in range(3):
                     found[k, i] = p[i]
+
+
+@kernel
+def _faced(
+    points: Array, directions: Array, cell: Indices, start: Indices, listed: Indices, corners: Array, normals: Array,
+    bounds: tuple[float, float], distance: Array, product: Array,
+) -> None:  # fmt: skip
+    reach, skip = bounds
+    for k in range(len(points)):
+        if cell[k] < 0:
+            continue
+        p, d, nearest = points[k], directions[k], reach
+        for at in range(start[cell[k]], start[cell[k] + 1]):
+            a, n = corners[listed[at], 0], normals[listed[at]]
+            facing = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
+            if facing >= 0.0:
+                continue
+            along = (n[0] * (a[0] - p[0]) + n[1] * (a[1] - p[1]) + n[2] * (a[2] - p[2])) / facing
+            if along < -skip or along >= nearest:
+                continue
+            if _contains(corners[listed[at]], n, p[0] + along * d[0], p[1] + along * d[1], p[2] + along * d[2]):
+                nearest = max(along, 0.0)
+                distance[k], product[k] = nearest, facing
+
+
+@kernel
+def _contains(corners: Array, n: Array, x: float, y: float, z: float) -> bool:
+    """Whether a place in the plane of a triangle of unit normal n is in it, or on its edge within rounding."""
+    for i in range(3):
+        a, b = corners[i], corners[(i + 1) % 3]
+        e0, e1, e2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        r0, r1, r2 = x - a[0], y - a[1], z - a[2]
+        side = n[0] * (e1 * r2 - e2 * r1) + n[1] * (e2 * r0 - e0 * r2) + n[2] * (e0 * r1 - e1 * r0)
+        if side < -_EDGE * (e0 * e0 + e1 * e1 + e2 * e2):
+            return False
+    return True
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,9 @@ NARROW, WIDE = 2e-3, 2e-2  # gaps across which triangles that face each other ar
 _SINK = 0.05  # overlap of a bridge with both sides, of the gap
 _SAMPLES = 4_000  # places on a solid between which a strut is sought
 _RADIUS, _SLENDER = 0.02, 0.3  # least radius of a strut, of the size and of the gap
+# Extent of the bridges of a solid, of its own, below which it would swing on them; how far from its first strut another
+# one is, of its extent, and the widest gap there, of the size
+_SPREAD, _APART, _REACH = 0.3, 0.5, 0.1
 
 
 def bridged(solids: Sequence[Part], largest: float = NARROW) -> tuple[Part | None, float]:
@@ -31,9 +35,11 @@ def bridged(solids: Sequence[Part], largest: float = NARROW) -> tuple[Part | Non
     """
     import manifold3d
 
-    prisms, widest = [], 0.0
+    prisms: list[np.ndarray] = []
+    widest = 0.0
     for k, solid in enumerate(solids):
         x = solid.points[solid.triangles]
+        begun = len(prisms)
         for other in [other for i, other in enumerate(solids) if i != k]:
             if largest > NARROW and solid.volume > other.volume:
                 continue
@@ -43,6 +49,9 @@ def bridged(solids: Sequence[Part], largest: float = NARROW) -> tuple[Part | Non
                 normal /= np.linalg.norm(normal)
                 sink = _SINK * gap + 1e-7
                 prisms.append(np.vstack([x[i] - sink * normal, x[i] + (gap + sink) * normal]))
+        if largest > NARROW and begun < len(prisms):
+            if _extent(np.vstack(prisms[begun:])) < _SPREAD * _extent(solid.points):
+                return None, 0.0
     if not prisms:
         return None, 0.0
     made = [manifold3d.Manifold.hull_points(np.ascontiguousarray(prism)) for prism in prisms]
@@ -52,7 +61,10 @@ def bridged(solids: Sequence[Part], largest: float = NARROW) -> tuple[Part | Non
 
 
 def strutted(solids: Sequence[Part]) -> tuple[Part, float]:
-    """The union of solids across gaps of any width, by a strut between the nearest places of each and of the largest.
+    """The union of solids across gaps of any width, by struts between the nearest places of each and of the largest.
+
+    A solid that is held at one end by what was invented would swing on it, as a rod in the legs of Barkour in their
+    second and third mode: it gets another strut at its other end.
 
     Args:
         solids: Disjoint, outward, in units of the size of the body, the largest first.
@@ -70,22 +82,41 @@ def strutted(solids: Sequence[Part]) -> tuple[Part, float]:
         tree = cKDTree(np.vstack([places[k] for k in whole]))
         distances, found = zip(*(tree.query(places[k]) for k in left), strict=True)
         nearest = int(np.argmin([d.min() for d in distances]))
-        k, i = left[nearest], int(distances[nearest].argmin())
-        gap = float(distances[nearest][i])
-        widest, radius = max(widest, gap), max(_RADIUS, _SLENDER * gap)
-        near = [
-            *((places[k], normals[k], places[k][i]),),
-            *((places[j], normals[j], tree.data[found[nearest][i]]) for j in whole),
-        ]
-        corners = []
-        for points, outward, center in near:
-            inside = np.linalg.norm(points - center, axis=1) <= radius
-            corners += [points[inside], points[inside] - (_SINK * gap + 1e-4) * outward[inside]]
-        struts.append(manifold3d.Manifold.hull_points(np.ascontiguousarray(np.vstack(corners))))
+        k, gaps, facing = left[nearest], distances[nearest], tree.data[found[nearest]]
+        i = int(gaps.argmin())
+        widest = max(widest, float(gaps[i]))
+        ends = [i]
+        far = np.linalg.norm(places[k] - places[k][i], axis=1) > _APART * _extent(places[k])
+        if far.any() and gaps[far].min() < _REACH:
+            ends.append(int(np.flatnonzero(far)[gaps[far].argmin()]))
+        for end in ends:
+            gap = float(gaps[end])
+            near = [(places[k], normals[k], places[k][end]), *((places[j], normals[j], facing[end]) for j in whole)]
+            struts.append(_strut(near, gap))
         whole.append(k)
         left.remove(k)
     united = manifold3d.Manifold.batch_boolean([*(manifold_of(s) for s in solids), *struts], manifold3d.OpType.Add)
     return part_of(united), widest
+
+
+def _strut(near: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], gap: float) -> Any:
+    """The hull of places within a radius of a center on either side of a gap, and below them.
+
+    Args:
+        near: Places and outward normals on a solid, shape [n, 3], and the center, for both sides.
+        gap: Between the centers.
+    """
+    import manifold3d
+
+    radius, corners = max(_RADIUS, _SLENDER * gap), []
+    for points, outward, center in near:
+        inside = np.linalg.norm(points - center, axis=1) <= radius
+        corners += [points[inside], points[inside] - (_SINK * gap + 1e-4) * outward[inside]]
+    return manifold3d.Manifold.hull_points(np.ascontiguousarray(np.vstack(corners)))
+
+
+def _extent(points: np.ndarray) -> float:
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def _solids(part: Part) -> list[Part]:
