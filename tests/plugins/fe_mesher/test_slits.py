@@ -55,6 +55,17 @@ def test_a_thin_slit_is_filled_and_the_rest_of_the_surface_stays(package):
     assert made.bounds == pytest.approx(bar.bounds, abs=beside * 1.01)
 
 
+def test_slits_stay_where_fillings_would_make_too_many_triangles(package, monkeypatch):
+    bar, slits = slit_bar(THIN), package("sources.slits")
+    whole, repairs = filled(package, bar)
+    assert repairs != []
+    for spare in (0, -1):
+        monkeypatch.setattr(slits, "_BESIDES", len(whole.faces) - int(slits._MORE * len(bar.faces)) + spare)
+        made, repairs = filled(package, bar)
+        kept = spare < 0
+        assert np.array_equal(made.faces, bar.faces if kept else whole.faces) and (repairs == []) == kept
+
+
 @pytest.mark.parametrize("width", [WIDE, 2.2e-3 * SIZE])
 def test_a_wider_slit_is_kept(package, width):
     bar = slit_bar(width)
