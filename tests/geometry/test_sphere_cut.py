@@ -40,3 +40,21 @@ def test_a_sphere_that_meets_no_edge_changes_nothing(helpers):
     points, tets = helpers.box((3, 1, 1), SIZE)
     found, split = cut(np.asarray(points), tets, np.array([1.0, 0.0, 0.0]), 0.1)
     assert np.array_equal(found, points) and np.array_equal(split, tets)
+
+
+def test_points_that_are_fixed_stay_where_they_are(helpers):
+    points, tets = helpers.box((12, 5, 5), SIZE)
+    points, center, radius = np.asarray(points), np.array([0.0, 0.021, 0.019]), 0.015
+    free, _ = cut(points, tets, center, radius)
+    moved = np.flatnonzero((free[: len(points)] != points).any(axis=1))
+    assert len(moved) > 3
+    fixed = np.zeros(len(points), dtype=bool)
+    fixed[moved[::2]] = True
+    found, split = cut(points, tets, center, radius, fixed)
+    assert np.array_equal(found[: len(points)][fixed], points[fixed]) and not np.array_equal(
+        found[: len(points)], points
+    )
+    assert tet_volumes(found, split).min() > 0.0 and tet_volumes(found, split).sum() == pytest.approx(np.prod(SIZE))
+    triangles = boundary_triangles(split)
+    area = surface_area(found, triangles[inside(found[triangles], center, radius)])
+    assert area == pytest.approx(np.pi * radius**2, rel=0.12)

@@ -20,7 +20,9 @@ _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 _ROUNDS = 50
 
 
-def cut(points: Array, tets: IntArray, center: Array, radius: float) -> tuple[Array, IntArray]:
+def cut(
+    points: Array, tets: IntArray, center: Array, radius: float, fixed: BoolArray | None = None
+) -> tuple[Array, IntArray]:
     """Tetrahedra of which each triangle of the surface is inside a sphere, or outside.
 
     Corners near the sphere move onto it along edges of the surface, where this leaves the surface as it is; other edges
@@ -31,11 +33,12 @@ def cut(points: Array, tets: IntArray, center: Array, radius: float) -> tuple[Ar
         tets: Shape [m, 4], positive volumes.
         center: [m], shape [3].
         radius: [m].
+        fixed: Which points do not move, such as those on a line along which the mesh was cut before, shape [n].
 
     Returns:
         Points, of which the first n are the given ones, moved where needed, and tetrahedra with positive volumes.
     """
-    points = _moved_onto(points, tets, center, radius)
+    points = _moved_onto(points, tets, center, radius, np.zeros(len(points), dtype=bool) if fixed is None else fixed)
     for _ in range(_ROUNDS):
         ends, part = _crossing(points, tets, center, radius)
         far = (part > _LEAST) & (part < 1.0 - _LEAST)
@@ -74,7 +77,7 @@ def _crossing(points: Array, tets: IntArray, center: Array, radius: float) -> tu
     return edges, np.asarray((-b + np.sqrt(b * b - a * c)) / a)
 
 
-def _moved_onto(points: Array, tets: IntArray, center: Array, radius: float) -> Array:
+def _moved_onto(points: Array, tets: IntArray, center: Array, radius: float, fixed: BoolArray) -> Array:
     """The points, those near the sphere moved onto it along an edge where the surface stays as it is."""
     edges, part = _crossing(points, tets, center, radius)
     if not len(edges):
@@ -93,7 +96,7 @@ def _moved_onto(points: Array, tets: IntArray, center: Array, radius: float) -> 
     volumes, moved = tet_volumes(points, tets), points.copy()
     for k in np.argsort(near, kind="stable"):
         end = ends[k]
-        if near[k] > _NEAR or lift[k] > _LIFT or not np.array_equal(moved[end], points[end]):
+        if fixed[end] or near[k] > _NEAR or lift[k] > _LIFT or not np.array_equal(moved[end], points[end]):
             continue
         own = (tets == end).any(axis=1)
         moved[end] += step[k]

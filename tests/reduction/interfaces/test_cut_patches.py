@@ -6,7 +6,7 @@ from calmotion.geometry.tetrahedra import surface_area, tet_volumes
 from calmotion.reduction.discretization_error import clamped_modes
 from calmotion.reduction.elements.assembly import assemble, quadratic_mesh
 from calmotion.reduction.elements.bisection import bisected
-from calmotion.reduction.interfaces.cut_patches import with_rims
+from calmotion.reduction.interfaces.cut_patches import _cut_to_area, _within, with_rims
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.shot import Body, FlexibleSettings
 from calmotion.shot.meshes import CutPatch
@@ -119,3 +119,19 @@ def test_a_sphere_that_passes_along_a_wall_has_its_area_too(helpers, plastic):
         points, tets, ((_, triangles),) = with_rims(np.asarray(points), tets, body, frames)
         # four caps of the sphere on the sides: its center is 15 mm from each
         assert surface_area(points, triangles) == pytest.approx(4.0 * np.pi * (0.0155**2 - 0.015**2), rel=0.03)
+
+
+@pytest.mark.parametrize("apart", [0.012, 0.016, 0.02])
+def test_a_patch_keeps_its_area_where_the_sphere_of_another_one_crosses_it(helpers, apart):
+    """A shoulder of the G1 lost 9% of its patch to the cut for its other joint, and its mirror image nothing."""
+    points, tets = helpers.box((11, 11, 3), (0.06, 0.06, 0.012), origin=(-0.03, -0.03, -0.012))
+    first, second = (np.zeros(3), 0.011), (np.array([apart, 0.003, 0.012]), 0.02)
+    points, tets, radius = _cut_to_area(np.asarray(points), tets, *first)
+    area = surface_area(points, _within(points, tets, first[0], radius))
+    assert area == pytest.approx(np.pi * first[1] ** 2, rel=0.02)
+    held = []
+    for done in ([], [(first[0], radius)]):
+        made, split, _ = _cut_to_area(points, tets, *second, done)
+        assert tet_volumes(made, split).sum() == pytest.approx(0.06 * 0.06 * 0.012, rel=1e-3)
+        held.append(surface_area(made, _within(made, split, first[0], radius)))
+    assert abs(held[1] / area - 1.0) < 1e-9 < abs(held[0] / area - 1.0)

@@ -14,8 +14,9 @@ from calmotion.reduction.elements.assembly import quadratic_mesh
 from calmotion.reduction.elements.bisection import bisected
 from calmotion.reduction.interfaces.automatic_patch import Skin
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
+from calmotion.reduction.interfaces.joint_places import Ball
 from calmotion.reduction.interfaces.just_reached import just_reached
-from calmotion.shot.character import Array, Body, IntArray
+from calmotion.shot.character import Array, Body, BoolArray, IntArray
 
 _PARTS = triangle_parts(12)
 _EDGE = 1.0  # of the radius: longest edge at a rim, so that it has eight sides or more
@@ -51,15 +52,17 @@ def with_rims(
         whole = interface_patches(quadratic_mesh(points, tets), attachments, radius, body.path, meshed=meshed)
     except ShotError:
         return points, tets, ()  # the reduction reports it
-    rims, given = [], radius >= 0.0
+    rims: list[tuple[Array, Array, float, Sequence[Ball]]] = []
+    given = radius >= 0.0
     for patch in whole:
         if patch.center is None:
             continue
         center, radius = patch.center, patch.radius
         points, tets = _finer_at(points, tets, center, radius)
-        points, tets, radius = _cut_to_area(points, tets, center, radius)
+        done = [(center, radius) for _, center, radius, _ in rims]
+        points, tets, radius = _cut_to_area(points, tets, center, radius, done)
         for ball in patch.balls:
-            points, tets = cut(points, tets, *ball)
+            points, tets = cut(points, tets, *ball, _held(points, tets, [*done, (center, radius)]))
         rims.append((attachments[patch.attachments[0]].frame.position, center, radius, patch.balls))
     found = []
     for origin, center, radius, balls in rims:
@@ -72,14 +75,27 @@ def with_rims(
     return points, tets, tuple((origin, triangles) for origin, triangles in found if len(triangles))
 
 
-def _cut_to_area(points: Array, tets: IntArray, center: Array, radius: float) -> tuple[Array, IntArray, float]:
+def _held(points: Array, tets: IntArray, done: Sequence[tuple[Array, float]]) -> BoolArray:
+    """Which points are those of patches along whose spheres the mesh was cut: what is cut later must not move them."""
+    held = np.zeros(len(points), dtype=bool)
+    for center, radius in done:
+        held[_within(points, tets, center, radius)] = True
+    return held
+
+
+def _cut_to_area(
+    points: Array, tets: IntArray, center: Array, radius: float, done: Sequence[tuple[Array, float]] = ()
+) -> tuple[Array, IntArray, float]:
     """The mesh, cut along a sphere so that the polygon of its rim has the area within a radius, and its radius [m].
 
     Elements along which the sphere passes, as along the side of a cylinder, are inside or outside: where they are too
     large for the area, they are bisected.
+
+    Args:
+        done: Spheres of patches along which it was cut before.
     """
     for k in range(_ROUNDS):
-        cut_mesh, missing = _nearest_area(points, tets, center, radius)
+        cut_mesh, missing = _nearest_area(points, tets, center, radius, done)
         if missing <= _FAR or k == _ROUNDS - 1:
             break
         triangles = boundary_triangles(tets)
@@ -89,19 +105,19 @@ def _cut_to_area(points: Array, tets: IntArray, center: Array, radius: float) ->
 
 
 def _nearest_area(
-    points: Array, tets: IntArray, center: Array, radius: float
+    points: Array, tets: IntArray, center: Array, radius: float, done: Sequence[tuple[Array, float]]
 ) -> tuple[tuple[Array, IntArray, float], float]:
     """`_cut_to_area` with these elements, by the best of some spheres, and the relative error of the area.
 
     Corners that move onto a sphere change the area by steps, so that the best may not be the last.
     """
-    surface = boundary_triangles(tets)
+    surface, held = boundary_triangles(tets), _held(points, tets, done)
     area, smaller, larger = (_area_within(points, surface, center, part * radius) for part in (1.0, 0.9, 1.1))
     slope = max((larger - smaller) / (0.2 * radius), np.finfo(float).tiny)
     best, least, trial = (points, tets, radius), np.inf, radius
     low = high = None  # the last spheres with too small and with too large an area
     for _ in range(_TRIALS):
-        made, split = cut(points, tets, center, trial)
+        made, split = cut(points, tets, center, trial, held)
         missing = area - surface_area(made, _within(made, split, center, trial))
         if abs(missing) < least:
             best, least = (made, split, trial), abs(missing)
