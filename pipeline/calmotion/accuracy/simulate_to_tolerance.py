@@ -16,12 +16,7 @@ from calmotion.accuracy.mesh_budget import mesh_error, patch_error
 from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, project_to_subspace
 from calmotion.accuracy.reduced_bodies import SUBSPACES, TIME_STEP, RunMemory
 from calmotion.accuracy.simulate_again import with_last_choices
-from calmotion.accuracy.step_choice import (
-    FIRST,
-    allowed_step_error,
-    chooses_step,
-    chosen_step,
-)
+from calmotion.accuracy.step_choice import FIRST, allowed_step_error, chooses_step, chosen_step
 from calmotion.accuracy.step_error import (
     StepRun,
     effort_errors,

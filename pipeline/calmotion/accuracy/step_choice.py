@@ -47,7 +47,10 @@ def chosen_step(
     """
 
     def trial(step: float) -> StepRun:
-        run = simulate_at(shot, options, step)
+        whole = make_grid(shot.animation.frame_times, step, 0.0).h
+        if whole not in runs:
+            runs[whole] = simulate_at(shot, options, step)
+        run = runs[whole]
         if trials is not None and step <= FIRST:
             trials[:] = [*trials[-1:], run]  # of each only what two frames hold
         return run
@@ -58,6 +61,7 @@ def chosen_step(
             known[:] = run.step, mesh_and_patches(shot, options, run)
         return allowed_step_error(shot.character, options, left_out + known[1])
 
+    runs: dict[float, StepRun] = {}  # by their steps: one that is chosen, or half of it, was often tried before
     known: list[float] = []  # the step by which they were estimated, and what they cost
     step, error = largest_step(trial, FIRST, LAST, allowed, refused_gap(shot.character, options))
     whole = make_grid(shot.animation.frame_times, step, 0.0).h

@@ -62,7 +62,7 @@ def with_rims(
         done = [(center, radius) for _, center, radius, _ in rims]
         points, tets, radius = _cut_to_area(points, tets, center, radius, done)
         for ball in patch.balls:
-            points, tets = cut(points, tets, *ball, _held(points, tets, [*done, (center, radius)]))
+            points, tets = cut(points, tets, *ball, _held(points, boundary_triangles(tets), [*done, (center, radius)]))
         rims.append((attachments[patch.attachments[0]].frame.position, center, radius, patch.balls))
     found = []
     for origin, center, radius, balls in rims:
@@ -75,11 +75,11 @@ def with_rims(
     return points, tets, tuple((origin, triangles) for origin, triangles in found if len(triangles))
 
 
-def _held(points: Array, tets: IntArray, done: Sequence[tuple[Array, float]]) -> BoolArray:
+def _held(points: Array, surface: IntArray, done: Sequence[tuple[Array, float]]) -> BoolArray:
     """Which points are those of patches along whose spheres the mesh was cut: what is cut later must not move them."""
     held = np.zeros(len(points), dtype=bool)
     for center, radius in done:
-        held[_within(points, tets, center, radius)] = True
+        held[surface[inside(points[surface], center, radius)]] = True
     return held
 
 
@@ -111,7 +111,8 @@ def _nearest_area(
 
     Corners that move onto a sphere change the area by steps, so that the best may not be the last.
     """
-    surface, held = boundary_triangles(tets), _held(points, tets, done)
+    surface = boundary_triangles(tets)
+    held = _held(points, surface, done)
     area, smaller, larger = (_area_within(points, surface, center, part * radius) for part in (1.0, 0.9, 1.1))
     slope = max((larger - smaller) / (0.2 * radius), np.finfo(float).tiny)
     best, least, trial = (points, tets, radius), np.inf, radius
