@@ -68,9 +68,7 @@ class NearbyTriangles:
 
     @cached_property
     def _normals(self) -> Array:
-        x = self._corners
-        normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny))
+        return unit_normals(self._corners)[0]
 
     def _cells(self, points: Array) -> Indices:
         """The cell of each point, -1 where it is outside of all; shape [k]."""
@@ -79,6 +77,13 @@ class NearbyTriangles:
         number = (cell[:, 0] * self._count[1] + cell[:, 1]) * self._count[2] + cell[:, 2]
         number[~inside] = -1
         return np.asarray(number)
+
+
+def unit_normals(x: Array) -> tuple[Array, Array]:
+    """Unit normals of triangles, shape [m, 3], and their areas, shape [m], from their corners, shape [m, 3, 3]."""
+    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    doubled = np.linalg.norm(normal, axis=1)
+    return normal / np.maximum(doubled, np.finfo(float).tiny)[:, None], 0.5 * doubled
 
 
 @kernel

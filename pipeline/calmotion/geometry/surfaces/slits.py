@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.geometry.nearby_triangles import NearbyTriangles
+from calmotion.geometry.nearby_triangles import NearbyTriangles, unit_normals
 from calmotion.geometry.tetrahedra import Indices
 from calmotion.shot.character import Array
 
@@ -48,7 +48,7 @@ def slit_fillings(
         least: Area of a part below which it is left open [m^2].
     """
     x = points[triangles]
-    normal, area = _normals(x)
+    normal, area = unit_normals(x)
     nearby = NearbyTriangles(points, triangles, 2.0 * widest)
     gap, product = nearby.faced(x.mean(axis=1), normal, sink)
     chosen = np.flatnonzero((gap <= widest) & (product < _OPPOSITE) & (area > 0.0))
@@ -62,20 +62,13 @@ def slit_fillings(
         height = _heights(nearby, points[corners], up, faces, gap[part], sink)
         upper = points[corners] + (height + sink)[:, None] * up
         # where a slit is narrower than it is curved, as in a hole, triangles would turn over
-        upright = np.einsum("tx,tx->t", _normals(upper[faces])[0], normal[part]) > _UPRIGHT
+        upright = np.einsum("tx,tx->t", unit_normals(upper[faces])[0], normal[part]) > _UPRIGHT
         if upright.any():
             lower, faces = points[corners] - sink * up, faces[upright]
             aside = beside * _outward(lower, up, faces)
             body = _closed(lower + aside, upper + aside, faces)
             fillings.append(Filling(*body, float(gap[part][upright].max())))
     return fillings
-
-
-def _normals(x: Array) -> tuple[Array, Array]:
-    """Unit normals of triangles, shape [m, 3], and their areas, shape [m], from their corners, shape [m, 3, 3]."""
-    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    doubled = np.linalg.norm(normal, axis=1)
-    return normal / np.maximum(doubled, np.finfo(float).tiny)[:, None], 0.5 * doubled
 
 
 def _smooth_parts(triangles: Indices, normal: Array, chosen: Indices) -> list[Indices]:
