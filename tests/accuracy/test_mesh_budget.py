@@ -31,7 +31,7 @@ class Refining:
     def __init__(self, bodies):
         self.given, self.wanted, self.elements, self.released = bodies, None, None, False
 
-    def with_finer_meshes(self, tolerance, wanted, max_nodes, progress, elements):
+    def with_finer_meshes(self, tolerance, wanted, max_nodes, progress, elements, poor_nodes):
         self.wanted, self.elements = dict(wanted), dict(elements)
         return self
 

@@ -231,7 +231,9 @@ def test_a_mesh_beyond_the_limit_keeps_what_its_frequencies_told(
     assert finer.quality.interface_factors is not None and finer.quality.stiffness_factor != 0.97
 
 
-def test_a_mesh_near_the_limit_is_followed_by_finer_ones(helpers, beam, frames, loads, monkeypatch):
+@pytest.fixture
+def estimated_nodes(monkeypatch):
+    """Nodes of the meshes that are estimated for loads."""
     nodes, estimated = [], mesh_refinement.load_estimate
 
     def noted(*arguments):
@@ -241,10 +243,25 @@ def test_a_mesh_near_the_limit_is_followed_by_finer_ones(helpers, beam, frames, 
 
     monkeypatch.setattr(mesh_refinement, "load_estimate", noted)
     with recomputed():
-        refined_for_loads(
-            mesh_of(helpers, (12, 2, 2)), replace(beam, path="/Arm/near"), frames, 1, loads, 1e-4, 1e-6, 700
-        )
+        yield nodes
+
+
+def test_a_mesh_near_the_limit_is_followed_by_finer_ones(helpers, beam, frames, loads, estimated_nodes):
+    near, nodes = replace(beam, path="/Arm/near"), estimated_nodes
+    refined_for_loads(mesh_of(helpers, (12, 2, 2)), near, frames, 1, loads, 1e-4, 1e-6, 700)
     assert nodes[0] > 0.6 * 700 and len(nodes) > 2 and nodes[-2] <= 0.6 * 3.3 * nodes[0] < nodes[-1]
+
+
+@pytest.mark.parametrize("wanted, further", [(1e-6, True), (1e-2, False)])
+def test_a_mesh_that_is_off_by_far_more_than_wanted_is_followed_by_more(
+    helpers, beam, frames, loads, estimated_nodes, wanted, further
+):
+    mesh, nodes = mesh_of(helpers, (6, 1, 1)), estimated_nodes
+    refined_for_loads(mesh, beam, frames, 1, loads, 1e-4, wanted, 1_000)
+    few = list(nodes)
+    del nodes[:]
+    refined_for_loads(mesh, beam, frames, 1, loads, 1e-4, wanted, 1_000, poor_nodes=8_000)
+    assert nodes[: len(few)] == few and nodes[-1] <= 8_000 and (len(nodes) > len(few)) == further
 
 
 def test_a_link_that_hardly_bends_keeps_its_stiffness(helpers, beam, frames, loads):

@@ -19,7 +19,9 @@ from calmotion.simulation.body_reduction import BodyReduction
 from calmotion.simulation.compiled_shot import CompiledShot
 
 SHARE = 0.25  # of the tolerance, that the meshes may take
-NODES = 20_000  # of a mesh that only linear modes are computed on: some seconds
+# Nodes of a mesh that only linear modes are computed on: some seconds; and of one without which the tolerance is not
+# kept, some two minutes on two slow cores
+NODES, MOST_NODES = 20_000, 100_000
 _MARGIN = 0.8  # of the wanted error: estimates of two meshes differ
 _LOCKED = 2.0  # error of what quadratic strain changes, over that of the compliance of the elements
 _PARTS = (1.0, 0.25, 0.05)  # of an error that are tried until a shot can be simulated with it
@@ -59,7 +61,8 @@ def meshes_to_tolerance(
     if locked > 0.5 * allowed:
         elements = {b: 0.5 * _MARGIN * allowed / locked * shot.bodies[b].element_error for b in known}
         wanted = {b: shot.bodies[b].mesh_error or 0.0 for b in known} | wanted
-    finer = reduction.with_finer_meshes(options.tolerance, wanted, NODES, progress, elements=elements)
+    finer = reduction.with_finer_meshes(options.tolerance, wanted, NODES, progress, elements=elements,
+                                         poor_nodes=MOST_NODES)  # fmt: skip
     reduction.release()
     return shot.with_bodies(finer.bodies(options.tolerance, progress=progress)), finer
 

@@ -42,6 +42,7 @@ _KEPT = 0.005  # of their own error, what elements leave with the statics of fin
 _APART, _APART_OF_ERROR = 0.01, 0.3
 # Nodes of the finest mesh after a first one that is itself near the limit: of its own, for two bisections, and at most
 _FOLLOWED, _MOST = 3.3, 50_000
+_POOR = 4.0  # of the wanted error: what meshes for loads must leave at least for more nodes
 _PAYS = 0.85  # of the error before: less must be left by a mesh that is made because of a bad one
 _FEW = 6_000  # nodes of elements on which a nonlinear body is reduced within a minute
 
@@ -200,7 +201,7 @@ def _bisected(
     by_volume = _of_volume(mesh)
     effort = replace(
         effort, wanted=max(effort.wanted - by_volume, 0.5 * by_volume, 0.3 * effort.wanted),
-        bad=max(effort.bad - by_volume, 0.5 * by_volume),
+        bad=max(effort.bad - by_volume, 0.5 * by_volume), poor=max(effort.poor, by_volume),
     )  # fmt: skip
     last = np.inf
     for _ in range(_ROUNDS):
@@ -243,7 +244,7 @@ def _of_volume(mesh: FEMesh) -> float:
 def refined_for_loads(
     mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], root: int, loads: LoadEnvelope,
     tolerance: float, wanted: float, max_nodes: int, by_factor: bool = True, full: FullBody | None = None,
-    elements: float = np.inf,
+    elements: float = np.inf, poor_nodes: int = 0,
 ) -> FEMesh:  # fmt: skip  # parameters: all that decide about a cached mesh
     """The mesh, refined where the deflections of the body under the loads of the shot have their error.
 
@@ -257,6 +258,8 @@ def refined_for_loads(
         by_factor: `with_finer_stiffness` instead of finer elements.
         full: `full_body` of the mesh with its own stiffness, where it is known.
         elements: As of `with_finer_stiffness`.
+        poor_nodes: By factor, largest number of nodes of a mesh that follows one which is off by several times what is
+            wanted; 0: as of others.
 
     Raises:
         ShotError: As `reduce_body`.
@@ -274,11 +277,14 @@ def refined_for_loads(
         return found
 
     given = replace(body, surfaces=())  # skins do not matter
-    key = ("for loads", mesh, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor, elements)
+    key = ("for loads", mesh, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor, elements,
+           poor_nodes)  # fmt: skip
     if not by_factor:
         return cached_reduction(key, lambda: refined(first, estimate, Effort(wanted, max_nodes)))
     nodes = int(min(_FOLLOWED * quadratic_nodes(mesh.points, mesh.tets), _MOST))
     effort = Effort(wanted, max(max_nodes, nodes))
+    if poor_nodes:
+        effort = replace(effort, poor=_POOR * wanted, poor_nodes=max(poor_nodes, effort.max_nodes))
     return cached_reduction(key, lambda: with_finer_stiffness(first, estimate, effort, elements, mesh))
 
 

@@ -70,7 +70,7 @@ class BodyReduction:
     def with_finer_meshes(
         self, tolerance: float | None, wanted: Mapping[int, float], max_nodes: int,
         progress: Callable[[float, str], None] = lambda fraction, message: None, *, by_factor: bool = True,
-        elements: Mapping[int, float] | None = None,
+        elements: Mapping[int, float] | None = None, poor_nodes: int = 0,
     ) -> BodyReduction:  # fmt: skip
         """The reduction on finer meshes; loads stay those of the shot.
 
@@ -82,6 +82,7 @@ class BodyReduction:
             by_factor: Keep the elements and take the stiffness of finer ones; otherwise take the finer elements, also
                 where elements are the user's choice.
             elements: With `by_factor`, the relative error that the elements of a body may have by themselves.
+            poor_nodes: As of `refined_for_loads`.
 
         Raises:
             ShotError: A body that cannot be reduced.
@@ -99,7 +100,7 @@ class BodyReduction:
             known = None if models is None or own.mesh.quality.stiffness_factor != 1.0 else models.known(own)
             mesh = refined_for_loads(
                 own.mesh, own.body, own.attachments, own.root, loads[index], allowed, wanted[index], max_nodes,
-                by_factor, known, (elements or {}).get(index, np.inf),
+                by_factor, known, (elements or {}).get(index, np.inf), poor_nodes,
             )  # fmt: skip
             finer[index] = replace(own, mesh=mesh)
 

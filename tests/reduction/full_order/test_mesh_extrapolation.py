@@ -56,10 +56,13 @@ def test_interfaces_are_extrapolated_in_each_direction_by_its_own_error():
     assert meshes[0].interfaces @ factors == pytest.approx(T.T @ exact @ T, rel=5e-3)
     left = limit - meshes[0].interfaces @ softest
     assert np.linalg.eigvalsh(left).min() > 0.0
-    # three tenths of the estimate, in each direction
+    # a fifth of what is extrapolated, in each direction; where one coarser mesh tells it, three tenths of the estimate
     shares = np.linalg.eigvals(np.linalg.solve(meshes[2].interfaces, left)).real
-    assert sorted(shares) == pytest.approx(0.3 * last, rel=1e-6)
+    assert sorted(shares) == pytest.approx(0.2 * share * last, rel=1e-6)
     assert min(shares) < error < max(shares)
+    factors, softest, _ = interface_factors(meshes[2], meshes[1:])
+    left = meshes[2].interfaces @ (factors - softest)
+    assert sorted(np.linalg.eigvals(np.linalg.solve(meshes[2].interfaces, left)).real) == pytest.approx(0.3 * last)
 
 
 def test_where_change_and_estimate_differ_more_is_left():
@@ -73,7 +76,20 @@ def test_where_change_and_estimate_differ_more_is_left():
     factors, softest, _ = interface_factors(meshes[2], meshes)
     excess = 1.0 - np.diag(factors)
     assert excess == pytest.approx([np.sqrt(1.5 * 0.5) * 1e-3, np.sqrt(0.1 * 0.5) * 1e-3], rel=0.01)
-    assert np.diag(factors - softest) == pytest.approx([0.7e-3, 0.3e-3], rel=0.01)
+    assert np.diag(factors - softest) == pytest.approx([0.7e-3, 0.28e-3], rel=0.01)
+
+
+def test_what_the_change_before_told_otherwise_is_left_too():
+    stiffness, least = np.diag([4.0, 9.0]), 0.1e-3
+    for before, left in ((1.5, 0.7e-3), (0.5, least)):
+        # the change of the finer two is half of the estimates, as usual
+        excess = (1e-3 + 2e-3 * before, 1e-3, 0.5e-3)
+        meshes = [
+            with_interfaces(own, stiffness * (1.0 + too_stiff), own * stiffness * (1.0 + too_stiff))
+            for own, too_stiff in zip((0.004, 0.002, 0.001), excess, strict=True)
+        ]
+        factors, softest, _ = interface_factors(meshes[2], meshes)
+        assert np.diag(factors - softest) == pytest.approx([left, left], rel=0.02)
 
 
 def test_a_finer_mesh_that_is_not_softer_tells_nothing_of_its_interfaces():
