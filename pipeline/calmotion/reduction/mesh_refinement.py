@@ -201,7 +201,7 @@ def _bisected(
     by_volume = _of_volume(mesh)
     effort = replace(
         effort, wanted=max(effort.wanted - by_volume, 0.5 * by_volume, 0.3 * effort.wanted),
-        bad=max(effort.bad - by_volume, 0.5 * by_volume), poor=max(effort.poor, by_volume),
+        bad=max(effort.bad - by_volume, 0.5 * by_volume),
     )  # fmt: skip
     last = np.inf
     for _ in range(_ROUNDS):
@@ -284,7 +284,9 @@ def refined_for_loads(
     nodes = int(min(_FOLLOWED * quadratic_nodes(mesh.points, mesh.tets), _MOST))
     effort = Effort(wanted, max(max_nodes, nodes))
     if poor_nodes:
-        effort = replace(effort, poor=_POOR * wanted, poor_nodes=max(poor_nodes, effort.max_nodes))
+        by_volume = _of_volume(mesh)
+        poor = max(_POOR * wanted - by_volume, 0.5 * by_volume)
+        effort = replace(effort, poor=poor, poor_nodes=max(poor_nodes, effort.max_nodes))
     return cached_reduction(key, lambda: with_finer_stiffness(first, estimate, effort, elements, mesh))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
-from calmotion.accuracy.mesh_budget import mesh_error
+from calmotion.accuracy.mesh_budget import MOST_NODES, mesh_error
 from calmotion.accuracy.pod_subspace import project_to_subspace
 from calmotion.accuracy.simulate_to_tolerance import found_tracks
 from calmotion.accuracy.step_error import StepRun, distance, frames_of, simulate_at
@@ -30,7 +30,7 @@ from calmotion.simulation.simulate import Progress
 
 STEP, TOLERANCE, MESH = 0.25, 0.1, 0.25  # of those of the result, and of the error of its meshes
 NODES = 5000  # of the finer meshes, on which nonlinear bodies are reduced
-LINEAR_NODES = 30_000  # of those whose linear modes their stiffness is taken from
+LINEAR_NODES = 30_000  # of those whose linear modes their stiffness is taken from, where the result's are no finer
 PROJECTION = 0.01  # share of the tolerance for the error of the POD subspaces of the finer run
 FINER, MOST = 0.1, 4  # a reduction that is no finer than the result's is tried again with this share of its tolerance
 
@@ -85,7 +85,9 @@ def _finer(shot: CompiledShot, reduction: BodyReduction, options: RunSettings, p
     if wanted:
         reduction = reduction.with_finer_meshes(options.tolerance, wanted, NODES, progress, by_factor=False)
         # the stiffness is that of meshes finer still, or the run would know it less well than the result
-        reduction = reduction.with_finer_meshes(options.tolerance, wanted, LINEAR_NODES, progress)
+        reduction = reduction.with_finer_meshes(
+            options.tolerance, wanted, LINEAR_NODES, progress, poor_nodes=MOST_NODES
+        )
     for _ in range(1 + MOST):
         bodies = reduction.bodies(allowed, progress=progress)
         if _coordinates(bodies) > _coordinates(shot.bodies):

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 
@@ -96,13 +97,26 @@ def _frequencies(squares: Array, excess: float) -> Array:
     return np.asarray(np.sqrt(squares[:3] * (1.0 - excess)) / (2.0 * np.pi))
 
 
-def honesty(rows: Sequence[LevelRow]) -> str:
+class Extrapolated(Protocol):
+    """A row of a mesh, as `LevelRow`."""
+
+    @property
+    def taken(self) -> float: ...
+
+    @property
+    def claimed(self) -> float: ...
+
+    @property
+    def off(self) -> float: ...
+
+
+def honesty(rows: Sequence[Extrapolated], what: str = "largest error of three frequencies") -> str:
     """A line about the errors over what is claimed, where something was extrapolated."""
     ratios = [row.off / row.claimed for row in rows if row.taken > 0.0 and not np.isnan(row.off)]
     if not ratios:
         return "no mesh has been extrapolated"
     parts = ", ".join(f"{np.quantile(ratios, q):.2f} for {100.0 * q:.0f}%" for q in _QUANTILES)
-    return f"largest error of three frequencies over what is claimed, of {len(ratios)} meshes: at most {parts}"
+    return f"{what} over what is claimed, of {len(ratios)} meshes: at most {parts}"
 
 
 HEADS = ("link", "nodes", "f1, f2, f3 Hz", "estimate %", "taken %", "claimed %", "off %")

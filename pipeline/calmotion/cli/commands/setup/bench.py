@@ -21,6 +21,7 @@ WHAT = {
     "takes": ("accuracy.takes", "a robot that is not the model, recorded and refined, take by take"),
     "meshing": ("links.meshing", "links of robots: their solids, meshes, frequencies and errors"),
     "mesh-extrapolation": ("links.extrapolation", "links on ever finer meshes: what extrapolations claim and leave"),
+    "interface-extrapolation": ("links.interfaces", "the same for interfaces of shots' bodies"),
     "integrators": ("integrators.integrators", "orders and numerical damping of the integrators"),
     "stability": ("integrators.stability", "stiff and extreme scenes"),
     "extremes": ("integrators.extremes", "hard scenes, growth of the cost, energy and momentum in long runs"),
