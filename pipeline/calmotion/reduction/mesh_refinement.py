@@ -285,7 +285,7 @@ def refined_for_loads(
     effort = Effort(wanted, max(max_nodes, nodes))
     if poor_nodes:
         by_volume = _of_volume(mesh)
-        poor = max(_POOR * wanted - by_volume, 0.5 * by_volume)
+        poor = max(_POOR * wanted - by_volume, by_volume)
         effort = replace(effort, poor=poor, poor_nodes=max(poor_nodes, effort.max_nodes))
     return cached_reduction(key, lambda: with_finer_stiffness(first, estimate, effort, elements, mesh))
 
