@@ -30,9 +30,10 @@ class Refining:
 
     def __init__(self, bodies):
         self.given, self.wanted, self.elements, self.released = bodies, None, None, False
+        self.nodes = (0, 0)
 
     def with_finer_meshes(self, tolerance, wanted, max_nodes, progress, elements, poor_nodes):
-        self.wanted, self.elements = dict(wanted), dict(elements)
+        self.wanted, self.elements, self.nodes = dict(wanted), dict(elements), (max_nodes, poor_nodes)
         return self
 
     def bodies(self, tolerance, progress=None):
@@ -73,6 +74,10 @@ def test_only_the_mesh_that_costs_most_is_refined(arm, animation, bodies):
     allowed = mesh_budget.SHARE * OPTIONS.tolerance
     assert reduction.released and set(reduction.wanted) == {0}
     assert 0.5 * allowed < 0.1 * reduction.wanted[0] < allowed
+    assert reduction.nodes == (
+        mesh_budget.NODES,
+        mesh_budget.MOST_NODES,
+    )
 
 
 def test_errors_at_the_targets_count_in_place_of_deflections_where_they_are_known(arm, animation, bodies):
