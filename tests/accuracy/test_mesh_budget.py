@@ -74,10 +74,7 @@ def test_only_the_mesh_that_costs_most_is_refined(arm, animation, bodies):
     allowed = mesh_budget.SHARE * OPTIONS.tolerance
     assert reduction.released and set(reduction.wanted) == {0}
     assert 0.5 * allowed < 0.1 * reduction.wanted[0] < allowed
-    assert reduction.nodes == (
-        mesh_budget.NODES,
-        mesh_budget.MOST_NODES,
-    )
+    assert reduction.nodes == (mesh_budget.NODES, mesh_budget.MOST_NODES)
 
 
 def test_errors_at_the_targets_count_in_place_of_deflections_where_they_are_known(arm, animation, bodies):

@@ -61,8 +61,9 @@ def meshes_to_tolerance(
     if locked > 0.5 * allowed:
         elements = {b: 0.5 * _MARGIN * allowed / locked * shot.bodies[b].element_error for b in known}
         wanted = {b: shot.bodies[b].mesh_error or 0.0 for b in known} | wanted
-    finer = reduction.with_finer_meshes(options.tolerance, wanted, NODES, progress, elements=elements,
-                                         poor_nodes=MOST_NODES)  # fmt: skip
+    finer = reduction.with_finer_meshes(
+        options.tolerance, wanted, NODES, progress, elements=elements, poor_nodes=MOST_NODES
+    )
     reduction.release()
     return shot.with_bodies(finer.bodies(options.tolerance, progress=progress)), finer
 

@@ -264,18 +264,8 @@ def refined_for_loads(
     Raises:
         ShotError: As `reduce_body`.
     """
-    first = replace(mesh, quality=replace(mesh.quality, stiffness_factor=1.0, interface_factors=None))
-    coarser: list[CoarserModes] = []
-
-    def estimate(mesh: FEMesh) -> Estimate:
-        known = full if full is not None and mesh is first else full_body(mesh, body, attachments, root)
-        fixed = known.support.fixed(known.model)
-        for modes in coarser:
-            fixed.begin_with(modes)
-        found = load_estimate(linear_modes(mesh, body, attachments, root, loads, tolerance, known), body)
-        coarser[:] = [fixed.for_finer()]
-        return found
-
+    first = with_own_stiffness(mesh)
+    estimate = load_estimator(body, attachments, root, loads, tolerance, None if full is None else (first, full))
     given = replace(body, surfaces=())  # skins do not matter
     key = ("for loads", mesh, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor, elements,
            poor_nodes)  # fmt: skip
@@ -288,6 +278,35 @@ def refined_for_loads(
         poor = max(_POOR * wanted - by_volume, by_volume)
         effort = replace(effort, poor=poor, poor_nodes=max(poor_nodes, effort.max_nodes))
     return cached_reduction(key, lambda: with_finer_stiffness(first, estimate, effort, elements, mesh))
+
+
+def with_own_stiffness(mesh: FEMesh) -> FEMesh:
+    """The mesh without what finer ones told about its stiffness."""
+    return replace(mesh, quality=replace(mesh.quality, stiffness_factor=1.0, interface_factors=None))
+
+
+def load_estimator(
+    body: Body, attachments: Sequence[AttachmentFrame], root: int, loads: LoadEnvelope, tolerance: float,
+    known: tuple[FEMesh, FullBody] | None = None,
+) -> Callable[[FEMesh], Estimate]:  # fmt: skip
+    """Estimates the errors of ever finer meshes under loads; each begins with the modes of the one before.
+
+    Args:
+        body, attachments, root, loads, tolerance: As of `refined_for_loads`.
+        known: A mesh and its `full_body`.
+    """
+    coarser: list[CoarserModes] = []
+
+    def estimate(mesh: FEMesh) -> Estimate:
+        full = known[1] if known is not None and mesh is known[0] else full_body(mesh, body, attachments, root)
+        fixed = full.support.fixed(full.model)
+        for modes in coarser:
+            fixed.begin_with(modes)
+        found = load_estimate(linear_modes(mesh, body, attachments, root, loads, tolerance, full), body)
+        coarser[:] = [fixed.for_finer()]
+        return found
+
+    return estimate
 
 
 def refined_for_frequencies(

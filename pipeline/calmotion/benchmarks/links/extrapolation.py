@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from calmotion.benchmarks.scenes.mesher import mesher
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array
 
+FREQUENCIES = "largest error of three frequencies"  # what is off
 _QUANTILES = (0.5, 0.8, 0.95, 1.0)
 
 
@@ -101,6 +102,9 @@ class Extrapolated(Protocol):
     """A row of a mesh, as `LevelRow`."""
 
     @property
+    def estimate(self) -> float: ...
+
+    @property
     def taken(self) -> float: ...
 
     @property
@@ -110,13 +114,32 @@ class Extrapolated(Protocol):
     def off(self) -> float: ...
 
 
-def honesty(rows: Sequence[Extrapolated], what: str = "largest error of three frequencies") -> str:
+def honesty(rows: Sequence[Extrapolated], what: str = FREQUENCIES) -> str:
     """A line about the errors over what is claimed, where something was extrapolated."""
     ratios = [row.off / row.claimed for row in rows if row.taken > 0.0 and not np.isnan(row.off)]
     if not ratios:
         return "no mesh has been extrapolated"
     parts = ", ".join(f"{np.quantile(ratios, q):.2f} for {100.0 * q:.0f}%" for q in _QUANTILES)
     return f"{what} over what is claimed, of {len(ratios)} meshes: at most {parts}"
+
+
+def percents(row: Extrapolated, digits: int) -> list[str]:
+    """The errors of a row for a person [%]."""
+    values = (row.estimate, row.taken, row.claimed, row.off)
+    return ["-" if np.isnan(value) else f"{value:.{digits}f}" for value in values]
+
+
+def tell(rows: Sequence[Any], heads: Sequence[str], cells: Sequence[Sequence[str]], what: str, as_json: bool) -> None:
+    """Print rows, as of `Extrapolated` and dataclasses, and how honest they are; or one JSON object.
+
+    Args:
+        heads, cells: Of the table for a person.
+        what: As of `honesty`.
+    """
+    if as_json:
+        print(json.dumps({"rows": [asdict(row) | {"off": None if np.isnan(row.off) else row.off} for row in rows]}))
+    else:
+        print(f"{markdown(heads, cells)}\n{honesty(rows, what)}")
 
 
 HEADS = ("link", "nodes", "f1, f2, f3 Hz", "estimate %", "taken %", "claimed %", "off %")
@@ -127,7 +150,7 @@ def cells(rows: Sequence[LevelRow]) -> list[list[str]]:
     return [
         [
             row.link, str(row.nodes), f"{row.f1:.4g}, {row.f2:.4g}, {row.f3:.4g}",
-            *("-" if np.isnan(value) else f"{value:.2f}" for value in (row.estimate, row.taken, row.claimed, row.off)),
+            *percents(row, 2),
         ]
         for row in rows
     ]  # fmt: skip
@@ -147,10 +170,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             say(f"{link.name}: {error}")
         if options.csv:
             write_rows(options.csv, LevelRow, rows)  # the next may take long
-    if options.json:
-        print(json.dumps({"rows": [asdict(row) | {"off": None if np.isnan(row.off) else row.off} for row in rows]}))
-    else:
-        print(f"{markdown(HEADS, cells(rows))}\n{honesty(rows)}")
+    tell(rows, HEADS, cells(rows), FREQUENCIES, options.json)
     return 0 if rows else 1
 
 

@@ -9,10 +9,9 @@ the finest mesh; what that claims shows how well it is known, and the mesh befor
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,18 +19,17 @@ from calmotion.benchmarks.accuracy.estimates import drawn
 from calmotion.benchmarks.common.messages import say
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.shots import load_unreduced
-from calmotion.benchmarks.common.tables import markdown, write_rows
-from calmotion.benchmarks.links.extrapolation import honesty
+from calmotion.benchmarks.common.tables import write_rows
+from calmotion.benchmarks.links.extrapolation import percents, tell
 from calmotion.errors import ShotError
 from calmotion.multibody.model.model import body_anchors
 from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.full_order.full_models import Member
-from calmotion.reduction.full_order.mesh_estimates import load_estimate
-from calmotion.reduction.full_order.mesh_extrapolation import Estimate, interface_factors
+from calmotion.reduction.full_order.mesh_extrapolation import Estimate, along, interface_factors, target_shares
 from calmotion.reduction.load_envelope import LoadEnvelope
-from calmotion.reduction.mesh_refinement import bisected_where
-from calmotion.reduction.reduce import full_body, linear_modes
+from calmotion.reduction.mesh_refinement import bisected_where, load_estimator, with_own_stiffness
 from calmotion.shot import Animation, Character, FEMeshes
+from calmotion.shot.character import Array
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import full_model_of
 from calmotion.simulation.body_reduction import reduction_for
@@ -88,13 +86,12 @@ def levels(own: Member, loads: LoadEnvelope, nodes: int) -> list[Estimate]:
         loads: On it.
         nodes: The finest mesh is the first with so many or more.
     """
-    mesh, estimates = own.mesh, list[Estimate]()
-    while not estimates or estimates[-1].nodes < nodes:
-        if estimates:
-            mesh = bisected_where(mesh, estimates[-1].indicators)
-        full = full_body(mesh, own.body, own.attachments, own.root)
-        modes = linear_modes(mesh, own.body, own.attachments, own.root, loads, _TOLERANCE, full)
-        estimates.append(load_estimate(modes, own.body))
+    mesh = with_own_stiffness(own.mesh)
+    estimate = load_estimator(own.body, own.attachments, own.root, loads, _TOLERANCE)
+    estimates = [estimate(mesh)]
+    while estimates[-1].nodes < nodes:
+        mesh = bisected_where(mesh, estimates[-1].indicators)
+        estimates.append(estimate(mesh))
     return estimates
 
 
@@ -108,11 +105,10 @@ def rows_of(shot: str, body: str, estimates: Sequence[Estimate]) -> list[Interfa
         return []
     limit = first.interfaces @ found[-1][0]
     _, G = eigh(finest.forms, 0.5 * (limit + limit.T))
-    shares = np.abs(G).T @ finest.wrenches * (finest.levers @ np.abs(G))
-    shares /= shares.sum()
+    shares = target_shares(G, finest)
 
-    def seen(form: np.ndarray) -> float:
-        return 100.0 * float(np.abs(np.einsum("ik,ij,jk->k", G, form, G)) @ shares)
+    def seen(form: Array) -> float:
+        return 100.0 * float(np.abs(along(G, form)) @ shares)
 
     rows = []
     for one, factors in zip(estimates, found, strict=True):
@@ -141,16 +137,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     write_rows(options.csv, InterfaceRow, rows)  # the next may take long
         except ShotError as error:
             say(f"{shot}: {error}")
-    if options.json:
-        print(json.dumps({"rows": [asdict(row) | {"off": None if np.isnan(row.off) else row.off} for row in rows]}))
-    else:
-        heads = ("shot", "body", "nodes", "estimate %", "taken %", "claimed %", "off %")
-        cells = [
-            [row.shot, row.body, str(row.nodes)]
-            + ["-" if np.isnan(x) else f"{x:.3f}" for x in (row.estimate, row.taken, row.claimed, row.off)]
-            for row in rows
-        ]
-        print(f"{markdown(heads, cells)}\n{honesty(rows, 'error of the compliance')}")
+    heads = ("shot", "body", "nodes", "estimate %", "taken %", "claimed %", "off %")
+    cells = [[row.shot, row.body, str(row.nodes), *percents(row, 3)] for row in rows]
+    tell(rows, heads, cells, "error of the compliance", options.json)
     return 0 if rows else 1
 
 

@@ -107,7 +107,7 @@ def interface_factors(own: Estimate, estimates: Sequence[Estimate]) -> tuple[Arr
     if not len(K):
         return None
     _, G = eigh(coarser[0].interfaces - K if coarser else fine.forms, K)  # each motion has an energy of one half
-    estimated = _along(G, fine.forms)
+    estimated = along(G, fine.forms)
     excess, left = np.zeros(len(K)), estimated
     if coarser:
         *more, last = coarser
@@ -116,27 +116,31 @@ def interface_factors(own: Estimate, estimates: Sequence[Estimate]) -> tuple[Arr
         left = np.maximum((_LEFT if more else _LEFT_BY_TWO) * excess, (_LEAST if more else _LEAST_BY_TWO) * estimated)
         left = np.maximum(left, _DOUBTED * np.abs(by_change - by_estimate))
         if more:  # the same of the mesh before
-            then = _excess(G, more[-1], last) / np.maximum(_along(G, last.forms), np.finfo(float).tiny)
+            then = _excess(G, more[-1], last) / np.maximum(along(G, last.forms), np.finfo(float).tiny)
             left = np.maximum(left, _DOUBTED * np.abs(then - _USUAL_ALONG) * estimated)
         left = np.where(by_change > 0.0, left, estimated)
-    # how far each of them moves the targets under the largest loads
-    shares = np.abs(G).T @ fine.wrenches * (fine.levers @ np.abs(G))
-    error = float(left @ shares) / max(float(shares.sum()), np.finfo(float).tiny)
+    error = float(left @ target_shares(G, fine))
     wrenches = K @ G
     K = K - (wrenches * excess) @ wrenches.T
     softest = K - (wrenches * left) @ wrenches.T
     return np.asarray(np.linalg.solve(own.interfaces, K)), np.asarray(np.linalg.solve(own.interfaces, softest)), error
 
 
-def _along(G: Array, form: Array) -> Array:
+def target_shares(G: Array, estimate: Estimate) -> Array:
+    """How far each motion G of energy one half moves the targets under the largest loads, in sum one or zero."""
+    moved = np.abs(G).T @ estimate.wrenches * (estimate.levers @ np.abs(G))
+    return np.asarray(moved / max(float(moved.sum()), np.finfo(float).tiny))
+
+
+def along(G: Array, form: Array) -> Array:
     """The value of a form for each of the columns."""
     return np.asarray(np.einsum("ik,ij,jk->k", G, form, G))
 
 
 def _excess(G: Array, coarse: Estimate, fine: Estimate) -> Array:
     """By how much the finer of two meshes is too stiff for each of the motions G, relative."""
-    gain = _along(G, coarse.forms) / np.maximum(_along(G, fine.forms), np.finfo(float).tiny) - 1.0
-    change = _along(G, coarse.interfaces - fine.interfaces)
+    gain = along(G, coarse.forms) / np.maximum(along(G, fine.forms), np.finfo(float).tiny) - 1.0
+    change = along(G, coarse.interfaces - fine.interfaces)
     return np.clip(change / np.maximum(gain, _GAIN - 1.0), 0.0, max(fine.error, _STIFFEST))
 
 
