@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.linear_algebra.blas_threads import one_blas_thread
-from calmotion.linear_algebra.sparse_solver import SparseSolver
+from calmotion.linear_algebra.sparse_solver import Solver
 from calmotion.shot.character import Array
 
 _WIDTH = 8  # vectors of a block
@@ -25,7 +25,7 @@ _MOST_STEPS = 200
 
 
 def lowest_by_lanczos(
-    K: Any, M: Any, count: int, shift: float, solver: SparseSolver, below: float | None, most: int
+    K: Any, M: Any, count: int, shift: float, solver: Solver, below: float | None, most: int
 ) -> tuple[Array, Array]:
     """Lowest eigenpairs of K x = value M x.
 
@@ -48,7 +48,7 @@ def lowest_by_lanczos(
 
 
 def _lanczos(
-    K: Any, M: Any, count: int, shift: float, solver: SparseSolver, below: float | None, most: int
+    K: Any, M: Any, count: int, shift: float, solver: Solver, below: float | None, most: int
 ) -> tuple[Array, Array]:
     n = K.shape[0]
     width = min(_WIDTH, max(2, count // 2), n)

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from calmotion.geometry.tetrahedra import min_dihedral_deg
-from calmotion.reduction.basis.nested_interface_modes import CoarserModes
+from calmotion.reduction.basis.nested_interface_modes import CoarserBody
 from calmotion.reduction.cache import cached_reduction
 from calmotion.reduction.elements.assembly import quadratic_nodes
 from calmotion.reduction.elements.bisection import bisected
@@ -289,19 +289,17 @@ def load_estimator(
     body: Body, attachments: Sequence[AttachmentFrame], root: int, loads: LoadEnvelope, tolerance: float,
     known: tuple[FEMesh, FullBody] | None = None,
 ) -> Callable[[FEMesh], Estimate]:  # fmt: skip
-    """Estimates the errors of ever finer meshes under loads; each begins with the modes of the one before.
+    """Estimates the errors of ever finer meshes under loads; each begins with what the one before has.
 
     Args:
         body, attachments, root, loads, tolerance: As of `refined_for_loads`.
         known: A mesh and its `full_body`.
     """
-    coarser: list[CoarserModes] = []
+    coarser: list[CoarserBody] = []
 
     def estimate(mesh: FEMesh) -> Estimate:
         full = known[1] if known is not None and mesh is known[0] else full_body(mesh, body, attachments, root)
-        fixed = full.support.fixed(full.model)
-        for modes in coarser:
-            fixed.begin_with(modes)
+        fixed = full.support.fixed(full.model, *coarser)
         found = load_estimate(linear_modes(mesh, body, attachments, root, loads, tolerance, full), body)
         coarser[:] = [fixed.for_finer()]
         return found

@@ -22,6 +22,7 @@ from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.reduction.basis.craig_bampton import Basis, mode_signs
 from calmotion.reduction.basis.fixed_interface import FixedInterface
 from calmotion.reduction.basis.natural_modes import vector_mass
+from calmotion.reduction.basis.nested_interface_modes import CoarserBody
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, second_order_force
 from calmotion.reduction.interfaces.patch_rotation import (
@@ -53,8 +54,12 @@ class Support:
         self._fixed[model] = fixed
         return self
 
-    def fixed(self, model: FEModel) -> FixedInterface:
+    def fixed(self, model: FEModel, coarser: CoarserBody | None = None) -> FixedInterface:
         """The body with all interfaces fixed, factorised once.
+
+        Args:
+            model: Of the body.
+            coarser: As of `FixedInterface.of`.
 
         Raises:
             NotPositiveDefinite: The root patch does not constrain all rigid motions of the body.
@@ -63,7 +68,7 @@ class Support:
             if model in self._fixed:
                 return self._fixed[model]
             with one_blas_thread():
-                self._fixed[model] = FixedInterface.of(model, self.root, self.patches, self.centers)
+                self._fixed[model] = FixedInterface.of(model, self.root, self.patches, self.centers, coarser=coarser)
         return self._fixed[model]
 
 

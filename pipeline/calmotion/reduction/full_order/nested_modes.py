@@ -6,38 +6,27 @@ replaces factors: with 35,000 nodes it takes 2 s in place of 7.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from calmotion.linear_algebra.multigrid import WIDTH, Blocks, Level, Multigrid
+from calmotion.linear_algebra.multigrid import WIDTH
 from calmotion.linear_algebra.preconditioned_modes import improved_modes
 from calmotion.linear_algebra.sparse_solver import SparseSolver
 from calmotion.reduction.basis.natural_modes import lowest_modes, vector_mass
 from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh
-from calmotion.reduction.elements.nesting import prolongation
+from calmotion.reduction.elements.nested_meshes import NestedMeshes
 from calmotion.shot.character import Array, BoolArray, IntArray
 
 _FEW = 300  # free nodes of meshes that are factorised each by itself
-
-
-@dataclass(frozen=True, eq=False)
-class _Solved:
-    """A mesh, its free nodes, and its modes at these, shape [3 free, WIDTH]."""
-
-    mesh: QuadraticMesh
-    free: BoolArray
-    modes: Array
 
 
 class NestedModes:
     """Lowest modes of ever finer meshes of a clamped body."""
 
     def __init__(self) -> None:
-        self._coarsest: SparseSolver | None = None
-        self._levels: list[Level] = []
-        self._last: _Solved | None = None
+        self._meshes: NestedMeshes | None = None
+        self._last: tuple[BoolArray, Array] | None = None  # free nodes of the last mesh, and its modes, [3 free, WIDTH]
 
     def lowest(self, model: FEModel, count: int, clamped: IntArray, accuracy: float) -> tuple[Array, Array]:
         """Lowest frequencies and modes; quickest where the mesh is that of the last call, bisected.
@@ -64,36 +53,30 @@ class NestedModes:
 
     def _factorised(self, mesh: QuadraticMesh, free: BoolArray, K: Any, m: Any) -> tuple[Array, Array]:
         """The modes by factors of the matrix, which is the coarsest of the meshes that follow."""
-        self._levels, self._last, self._coarsest = [], None, None
+        self._meshes, self._last = None, None
         count = min(WIDTH, K.shape[0])
         if m.shape[0] < _FEW:
             return lowest_modes(K, vector_mass(m), count)
-        self._coarsest = SparseSolver(K)
-        found = lowest_modes(K, vector_mass(m), count, solver=self._coarsest)
-        self._last = _Solved(mesh, free, found[1])
+        coarsest = SparseSolver(K)
+        found = lowest_modes(K, vector_mass(m), count, solver=coarsest)
+        self._meshes, self._last = NestedMeshes(mesh, free, coarsest), (free, found[1])
         return found
 
     def _finer(
         self, mesh: QuadraticMesh, free: BoolArray, K: Any, m: Any, count: int, accuracy: float
     ) -> tuple[Array, Array] | None:
         """The modes by those of the last mesh; None if this one is not in it, bisected, or they do not converge."""
-        last = self._last
-        nested = None if last is None else prolongation(last.mesh, mesh)
-        if nested is None or last is None or self._coarsest is None:
+        finer = None if self._meshes is None else self._meshes.finer(mesh, free, K)
+        if finer is None or self._last is None:
             return None
-        matrix, divided = nested
-        # a clamp may hold other places on the finer mesh
-        changed = mesh.tets[divided | (~free)[mesh.tets].any(axis=1)]
-        touched = np.zeros(len(mesh.nodes), dtype=bool)
-        touched[changed] = True
-        matrix, stiffness = matrix[free][:, last.free], Blocks(K)
-        self._levels.append(Level(stiffness, matrix, np.flatnonzero(touched[free]).astype(np.int32)))
-        start = (matrix @ last.modes.reshape(matrix.shape[1], -1)).reshape(-1, WIDTH)
+        before, modes = self._last
+        matrix = finer.prolongation[free][:, before]
+        start = (matrix @ modes.reshape(matrix.shape[1], -1)).reshape(-1, WIDTH)
 
         def mass(x: Array) -> Array:
             return np.asarray(m @ x.reshape(m.shape[0], -1)).reshape(x.shape)
 
-        found = improved_modes(stiffness, mass, Multigrid(self._coarsest, self._levels).solve, start, count, accuracy)
+        found = improved_modes(finer.stiffness, mass, finer.cycle.solve, start, count, accuracy)
         if found is not None:
-            self._last = _Solved(mesh, free, found[1])
+            self._last = free, found[1]
         return found
