@@ -79,17 +79,18 @@ def test_where_change_and_estimate_differ_more_is_left():
     assert np.diag(factors - softest) == pytest.approx([0.7e-3, 0.28e-3], rel=0.01)
 
 
-def test_what_the_change_before_told_otherwise_is_left_too():
-    stiffness, least = np.diag([4.0, 9.0]), 0.1e-3
-    for before, left in ((1.5, 0.7e-3), (0.5, least)):
+@pytest.mark.parametrize("size, share, least", [(4e-3, 0.7, 0.1), (1e-3, 0.3, 0.05)], ids=["coarse", "fine"])
+def test_what_the_change_before_told_otherwise_is_left_too(size, share, least):
+    stiffness = np.diag([4.0, 9.0])
+    for before, left in ((1.5, share), (0.5, least)):
         # the change of the finer two is half of the estimates, as usual
-        excess = (1e-3 + 2e-3 * before, 1e-3, 0.5e-3)
+        excess = size * np.array([1.0 + 2.0 * before, 1.0, 0.5])
         meshes = [
             with_interfaces(own, stiffness * (1.0 + too_stiff), own * stiffness * (1.0 + too_stiff))
-            for own, too_stiff in zip((0.004, 0.002, 0.001), excess, strict=True)
+            for own, too_stiff in zip((4.0 * size, 2.0 * size, size), excess, strict=True)
         ]
         factors, softest, _ = interface_factors(meshes[2], meshes)
-        assert np.diag(factors - softest) == pytest.approx([left, left], rel=0.02)
+        assert np.diag(factors - softest) == pytest.approx(size * left * np.ones(2), rel=0.06)
 
 
 def test_a_finer_mesh_that_is_not_softer_tells_nothing_of_its_interfaces():
