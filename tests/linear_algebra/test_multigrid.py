@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.linear_algebra.multigrid import WIDTH, Blocks, Level, Multigrid
+from calmotion.linear_algebra.multigrid import WIDTH, Blocks, Level, Multigrid, near_order
 from calmotion.linear_algebra.sparse_solver import SparseSolver
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.elements.bisection import bisected
@@ -39,6 +39,26 @@ def test_products_with_blocks_of_vectors(meshes):
     K = meshes[0][1]
     x = np.random.default_rng(0).standard_normal((K.shape[0], WIDTH))
     assert np.allclose(Blocks(K) @ x, K @ x, rtol=0.0, atol=1e-12 * np.abs(K @ x).max())
+
+
+def test_blocks_in_another_order(meshes):
+    K = meshes[0][1]
+    n = K.shape[0] // 3
+    x = np.random.default_rng(7).standard_normal((n, 3, WIDTH))
+    for order in (near_order(K), np.random.default_rng(8).permutation(n)):
+        assert np.array_equal(np.sort(order), np.arange(n))
+        product = Blocks(K, order) @ x[order].reshape(-1, WIDTH)
+        expected = (K @ x.reshape(-1, WIDTH)).reshape(x.shape)[order]
+        assert np.allclose(product.reshape(x.shape), expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_nodes_that_are_coupled_are_near_each_other_in_the_order(meshes):
+    K = meshes[0][2].tocoo()
+    place = np.argsort(near_order(K.tocsr()))
+    far = np.abs(place[K.row // 3] - place[K.col // 3])
+    assert (
+        far.max() < 0.6 * np.abs(K.row // 3 - K.col // 3).max() and far.mean() < 0.6 * np.abs(K.row - K.col).mean() / 3
+    )
 
 
 def test_the_cycle_is_symmetric_and_positive(meshes):

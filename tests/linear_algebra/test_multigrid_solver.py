@@ -41,7 +41,7 @@ def test_solutions_are_as_accurate_as_asked_however_many_there_are(finer, count)
     exact = np.random.default_rng(4).standard_normal((K.shape[0], count)) * 10.0 ** np.arange(count)
     energy = np.einsum("ij,ij->j", exact, K @ exact)
     for accuracy in (1e-4, 1e-8):
-        off = MultigridSolver(mesh.stiffness, mesh.cycle, accuracy, never).solve(K @ exact) - exact
+        off = MultigridSolver(mesh.order, mesh.stiffness, mesh.cycle, accuracy, never).solve(K @ exact) - exact
         error = np.einsum("ij,ij->j", off, K @ off) / energy
         assert (error < 5.0 * accuracy).all() and (error > 1e-4 * accuracy).any()
 
@@ -57,7 +57,7 @@ def test_a_start_saves_cycles_and_zero_stays_zero(finer):
             cycles.append(len(b))
             return mesh.cycle.solve(b)
 
-    solver = MultigridSolver(mesh.stiffness, Counted(), 1e-8, never)
+    solver = MultigridSolver(mesh.order, mesh.stiffness, Counted(), 1e-8, never)
     counts = []
     for start in (None, exact * (1.0 + 1e-3), exact):
         cycles.clear()
@@ -75,6 +75,6 @@ def test_factors_take_over_where_the_cycle_does_not_converge(finer):
         def solve(self, b):
             return np.full_like(b, np.nan)
 
-    solver = MultigridSolver(mesh.stiffness, Wrong(), 1e-8, lambda: SparseSolver(K))
+    solver = MultigridSolver(mesh.order, mesh.stiffness, Wrong(), 1e-8, lambda: SparseSolver(K))
     assert solver.entries == 0
     assert solver.solve(K @ exact) == pytest.approx(exact, abs=1e-8) and solver.entries > 0

@@ -31,21 +31,50 @@ class Blocks:
 
     Args:
         matrix: Sparse, shape [3n, 3n].
+        order: Its block rows, and columns, in another order, shape [n].
     """
 
-    def __init__(self, matrix: Any):
+    def __init__(self, matrix: Any, order: IntArray | None = None):
         from scipy.sparse import bsr_matrix
 
         blocks: Any = bsr_matrix(matrix, blocksize=(3, 3))
         self.indptr: IntArray = blocks.indptr
         self.indices: IntArray = blocks.indices
         self.values: Array = blocks.data
+        if order is not None:
+            counts = np.diff(self.indptr)[order]
+            ends = np.cumsum(counts)
+            taken = np.arange(ends[-1]) + np.repeat(self.indptr[order] - (ends - counts), counts)
+            place = np.empty_like(self.indices, shape=len(order))
+            place[order] = np.arange(len(order))
+            self.indptr = np.concatenate([[0], ends]).astype(self.indptr.dtype)
+            self.indices, self.values = place[self.indices[taken]], self.values[taken]
 
     def __matmul__(self, x: Array) -> Array:
         """The product with vectors, shape [3n, WIDTH]."""
         out = np.empty_like(x)
         _multiply(self.indptr, self.indices, self.values, x.reshape(-1, 3, WIDTH), out.reshape(-1, 3, WIDTH))
         return out
+
+
+def near_order(matrix: Any) -> IntArray:
+    """An order of the nodes of a stiffness matrix with those that are coupled near to each other, shape [n].
+
+    Bisection appends nodes. In another order products take half of the time with 300,000 of them.
+
+    Args:
+        matrix: Sparse, shape [3n, 3n].
+
+    Source: Cuthill and McKee, Reducing the Bandwidth of Sparse Symmetric Matrices, 1969.
+    """
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    rows: Any = matrix[::3]
+    columns = rows.indices // 3  # each three times
+    n = rows.shape[0]
+    graph = csr_matrix((np.ones(len(columns), dtype=np.int8), columns, rows.indptr), shape=(n, n))
+    return np.asarray(reverse_cuthill_mckee(graph, symmetric_mode=True))
 
 
 class Level:

@@ -15,7 +15,7 @@ import numpy as np
 
 from calmotion.linear_algebra.multigrid import WIDTH, Blocks, Multigrid
 from calmotion.linear_algebra.sparse_solver import Solver
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, IntArray
 
 _STEPS = 60  # a dozen are usual
 
@@ -24,13 +24,17 @@ class MultigridSolver:
     """Approximate solutions of the systems of a stiffness matrix.
 
     Args:
+        order: Nodes in the order of the matrix, shape [n].
         matrix: Symmetric and positive definite.
         cycle: Roughly its inverse.
         accuracy: Energy x @ matrix @ x of the error of a solution, relative to its own.
         factorised: Makes a solver that takes over where the cycle does not converge.
     """
 
-    def __init__(self, matrix: Blocks, cycle: Multigrid, accuracy: float, factorised: Callable[[], Solver]):
+    def __init__(
+        self, order: IntArray, matrix: Blocks, cycle: Multigrid, accuracy: float, factorised: Callable[[], Solver]
+    ):  # fmt: skip
+        self._rows = (3 * order[:, None] + np.arange(3)).ravel()
         self._matrix, self._cycle, self._accuracy, self._factorised = matrix, cycle, accuracy, factorised
         self._direct: Solver | None = None
 
@@ -46,12 +50,14 @@ class MultigridSolver:
             if self._direct is not None:
                 break
             some = slice(first, first + WIDTH)
-            begin = None if start is None else _wide(start[:, some])
-            found = self._solved(_wide(b[:, some]), begin, None if left is None else _wide(left[None, some])[0])
+            begin = None if start is None else _wide(start[self._rows, some])
+            found = self._solved(
+                _wide(b[self._rows, some]), begin, None if left is None else _wide(left[None, some])[0]
+            )
             if found is None:
                 self._direct = self._factorised()
             else:
-                x[:, some] = found[:, : x[:, some].shape[1]]
+                x[self._rows, some] = found[:, : x[:, some].shape[1]]
         return x if self._direct is None else self._direct.solve(b)
 
     def _solved(self, b: Array, start: Array | None, left: Array | None) -> Array | None:

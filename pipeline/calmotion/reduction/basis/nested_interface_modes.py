@@ -65,7 +65,11 @@ class CoarserBody:
             return SparseSolver(K, mesh.nodes[free])
 
         many = len(mesh.nodes) > _FACTORISED
-        solver: Solver = MultigridSolver(finer.stiffness, finer.cycle, _ACCURACY, factorised) if many else factorised()
+        solver: Solver
+        if many:
+            solver = MultigridSolver(finer.order, finer.stiffness, finer.cycle, _ACCURACY, factorised)
+        else:
+            solver = factorised()
         return Begun(solver, self, finer.prolongation[free])
 
 

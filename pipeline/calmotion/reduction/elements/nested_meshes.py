@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.linear_algebra.multigrid import Blocks, Level, Multigrid
+from calmotion.linear_algebra.multigrid import Blocks, Level, Multigrid, near_order
 from calmotion.linear_algebra.sparse_solver import SparseSolver
 from calmotion.reduction.elements.assembly import QuadraticMesh
 from calmotion.reduction.elements.nesting import prolongation
-from calmotion.shot.character import BoolArray
+from calmotion.shot.character import BoolArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,11 +19,13 @@ class FinerMesh:
     """The finest of nested meshes.
 
     Attributes:
-        stiffness: Of its n free nodes.
+        order: Its n free nodes in the order of the stiffness, shape [n].
+        stiffness: Of these.
         prolongation: Values at all its nodes from those at all nodes of the mesh before, sparse.
         cycle: Roughly the inverse of the stiffness.
     """
 
+    order: IntArray
     stiffness: Blocks
     prolongation: Any
     cycle: Multigrid
@@ -41,7 +43,7 @@ class NestedMeshes:
     def __init__(self, mesh: QuadraticMesh, free: BoolArray, coarsest: SparseSolver):
         self._coarsest = coarsest
         self._levels: list[Level] = []
-        self._mesh, self._free = mesh, free
+        self._mesh, self._nodes = mesh, np.flatnonzero(free)
 
     def finer(self, mesh: QuadraticMesh, free: BoolArray, stiffness: Any) -> FinerMesh | None:
         """The next mesh; None if it is not the last one, bisected.
@@ -58,8 +60,9 @@ class NestedMeshes:
         changed = mesh.tets[divided | (~free)[mesh.tets].any(axis=1)]
         touched = np.zeros(len(mesh.nodes), dtype=bool)
         touched[changed] = True
-        blocks = Blocks(stiffness)
-        smoothed = np.flatnonzero(touched[free]).astype(np.int32)
-        self._levels.append(Level(blocks, matrix[free][:, self._free], smoothed))
-        self._mesh, self._free = mesh, free
-        return FinerMesh(blocks, matrix, Multigrid(self._coarsest, list(self._levels)))
+        order = near_order(stiffness)
+        blocks, nodes = Blocks(stiffness, order), np.flatnonzero(free)[order]
+        smoothed = np.flatnonzero(touched[nodes]).astype(np.int32)
+        self._levels.append(Level(blocks, matrix[nodes][:, self._nodes], smoothed))
+        self._mesh, self._nodes = mesh, nodes
+        return FinerMesh(order, blocks, matrix, Multigrid(self._coarsest, list(self._levels)))

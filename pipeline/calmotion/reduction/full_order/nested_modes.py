@@ -70,13 +70,17 @@ class NestedModes:
         if finer is None or self._last is None:
             return None
         before, modes = self._last
-        matrix = finer.prolongation[free][:, before]
+        rows = (3 * finer.order[:, None] + np.arange(3)).ravel()
+        matrix, m = finer.prolongation[np.flatnonzero(free)[finer.order]][:, before], m[finer.order][:, finer.order]
         start = (matrix @ modes.reshape(matrix.shape[1], -1)).reshape(-1, WIDTH)
 
         def mass(x: Array) -> Array:
             return np.asarray(m @ x.reshape(m.shape[0], -1)).reshape(x.shape)
 
         found = improved_modes(finer.stiffness, mass, finer.cycle.solve, start, count, accuracy)
-        if found is not None:
-            self._last = free, found[1]
-        return found
+        if found is None:
+            return None
+        modes = np.empty_like(found[1])
+        modes[rows] = found[1]
+        self._last = free, modes
+        return found[0], modes
