@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from calmotion.geometry.matching.congruence import Isometry, isometries
+from calmotion.geometry.matching.congruence import Isometry, isometries, near_isometries
 from calmotion.shot import Body, FEMesh, FlexibleSettings, Frame
 from calmotion.shot.meshes import CutPatch
 
@@ -21,14 +21,14 @@ class Link:
 
     Attributes:
         body: Its body.
-        solid: Its solid.
+        solid: Its solid; None where it is not made yet.
         size: Of its elements [m]; not positive: automatic.
         carried: Whether the first frame is that of the joint to its parent.
         frames: Of its joints, body frame, that of the joint to its parent first.
     """
 
     body: Body
-    solid: Solid
+    solid: Solid | None
     size: float
     carried: bool
     frames: tuple[Frame, ...]
@@ -37,19 +37,42 @@ class Link:
 def twin_of(link: Link | None, others: Sequence[Link | None]) -> tuple[int, Isometry] | None:
     """The first of other links that has the same shape, and the isometry that takes it to the link; None without one.
 
-    Their joints must be at the same places, their settings the same; their densities and masses may differ. Where the
-    tetrahedra of a link are given, it is None, and like no other.
+    Their joints must be at the same places, their settings the same; their densities and masses may differ. The solids
+    of two links with the same surfaces may differ: a wrap depends on the order of parts. Surfaces with other triangles
+    are the same if they are as near to each other as a mesh is to its surface. Where the tetrahedra of a link are
+    given, it is None, and like no other.
     """
     for index, other in enumerate(others):
         if link is None or other is None:
             continue
         if _settings(link) != _settings(other) or len(link.frames) != len(other.frames):
             continue
-        solid, shown = other.solid, link.solid
-        for isometry in isometries(solid.points, solid.triangles, shown.points, shown.triangles):
-            if _joints_match(isometry, other, link):
-                return index, isometry
+        for shape, found in ((_solid, isometries), (_surface, isometries), (_surface, near_isometries)):
+            given, shown = shape(other), shape(link)
+            if given is None or shown is None:
+                continue
+            for isometry in found(*given, *shown):
+                if _joints_match(isometry, other, link, float(np.linalg.norm(np.ptp(shown[0], axis=0)))):
+                    return index, isometry
     return None
+
+
+def _solid(link: Link) -> tuple[np.ndarray, np.ndarray] | None:
+    """Points and triangles of the solid."""
+    return None if link.solid is None else (link.solid.points, link.solid.triangles)
+
+
+def _surface(link: Link) -> tuple[np.ndarray, np.ndarray] | None:
+    """Those of the visual surfaces, where the solid is made of them; None where it is not, or may not be."""
+    visible = [part for part in link.body.surfaces if part.visible and len(part.triangles)]
+    settings = link.body.flexible
+    assert settings is not None
+    other = settings.mesh_file or settings.geometry == "beam" or (link.solid and "visual" not in link.solid.source)
+    if not visible or other:
+        return None
+    first = np.cumsum([0, *(len(part.points) for part in visible[:-1])])
+    triangles = [part.triangles + begin for part, begin in zip(visible, first, strict=True)]
+    return np.vstack([part.points for part in visible]), np.vstack(triangles)
 
 
 def _settings(link: Link) -> tuple[object, ...]:
@@ -62,14 +85,13 @@ def _settings(link: Link) -> tuple[object, ...]:
     core = None if material.core is None else (material.core.skin, material.core.infill, material.core.stiffness)
     return (
         material.poissons_ratio, core, settings.interface_radius, settings.geometry, settings.wall_thickness,
-        settings.section, link.size, link.solid.source, link.carried, named,
+        settings.section, link.size, link.solid and link.solid.source, link.carried, named,
     )  # fmt: skip
 
 
-def _joints_match(isometry: Isometry, link: Link, other: Link) -> bool:
+def _joints_match(isometry: Isometry, link: Link, other: Link, size: float) -> bool:
     """Whether an isometry takes the joints of a link to those of another one: the first to the first, others in any
-    order."""
-    size = float(np.linalg.norm(np.ptp(other.solid.points, axis=0)))
+    order; places that are off by less than a share of the size are the same."""
     left = list(range(len(other.frames)))
     for number, frame in enumerate(link.frames):
         place, axis = isometry(frame.position), isometry.turn @ frame.axis
@@ -100,5 +122,7 @@ def moved(mesh: FEMesh, isometry: Isometry, index: int, path: str) -> FEMesh:
         for patch in mesh.patches
     )
     note = f"meshed as {path}, {'mirrored' if isometry.mirrors else 'which has the same shape'}"
+    if isometry.distance > 0.0:
+        note += f" (within {1e3 * isometry.distance:.2g} mm)"
     quality = replace(mesh.quality, repairs=(note,))
     return FEMesh(index, isometry(mesh.points), np.ascontiguousarray(tets), quality, mesh.given, patches)

@@ -84,3 +84,21 @@ def test_a_survey_goes_on_with_the_links_that_its_table_has_not(shot, tmp_path, 
     with pytest.raises(SystemExit):
         meshing.main([str(shot), "--resume", "-o", str(made)])
     assert "--resume needs --output FILE.csv" in capsys.readouterr().err
+
+
+def test_copies_and_mirror_images_are_surveyed_once(shot):
+    (fore,) = read_links(f"{shot}:fore")
+    mirror = np.array([1.0, -1.0, 1.0])
+
+    def moved(link, **changes):
+        parts = [replace(s, points=s.points * mirror, triangles=s.triangles[:, ::-1]) for s in link.body.surfaces]
+        return replace(link, body=replace(link.body, surfaces=tuple(parts)), **changes)
+
+    longer = replace(
+        fore, body=replace(fore.body, surfaces=tuple(replace(s, points=1.1 * s.points) for s in fore.body.surfaces))
+    )
+    heavier = moved(fore, mass=replace(fore.mass, mass=2.0 * fore.mass.mass)) if fore.mass else longer
+    links = [fore, longer, moved(fore), fore, heavier, moved(longer)]
+    first = robots.first_of_its_kind(links)
+    assert first[:4] == [0, 1, 0, 0] and first[5] == 1
+    assert first[4] == (4 if fore.mass else 1)

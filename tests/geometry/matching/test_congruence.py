@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from calmotion.geometry.matching.congruence import isometries
+from calmotion.geometry.matching.congruence import isometries, near_isometries
 from mesher_links import bracket
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
@@ -49,3 +49,50 @@ def test_a_box_has_eight_and_the_first_is_no_turn():
     assert [kept.mirrors for kept in found] == [False] * 4 + [True] * 4
     cube = np.array(trimesh.creation.box((0.1, 0.1, 0.1)).vertices)
     assert len(isometries(cube, triangles, cube + 1.0, triangles)) == 1
+
+
+def divided(points, triangles):
+    """The same surface with each triangle divided at its middle."""
+    middles = points[triangles].mean(axis=1)
+    at = len(points) + np.arange(len(triangles))
+    parts = [np.column_stack([triangles[:, i], triangles[:, j], at]) for i, j in ((0, 1), (1, 2), (2, 0))]
+    return np.vstack([points, middles]), np.vstack(parts)
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), turned(), turned() @ MIRROR])
+def test_surfaces_with_other_triangles_are_alike_if_they_are_near_each_other(turn):
+    points, triangles = surface_of(bracket())
+    size = np.linalg.norm(np.ptp(points, axis=0))
+    other, others = divided(points, triangles)
+    other = other @ turn.T + [0.3, -0.2, 0.1]
+    if np.linalg.det(turn) < 0.0:
+        others = others[:, ::-1]
+    assert isometries(points, triangles, other, others) == []
+    (found,) = near_isometries(points, triangles, other, others)
+    assert found.turn == pytest.approx(turn, abs=1e-6) and found.distance < 1e-6 * size
+    moved = other.copy()
+    moved[np.argmax(other[:, 0])] += 1e-3 * size / np.sqrt(3.0)
+    (found,) = near_isometries(points, triangles, moved, others)
+    assert 1e-4 * size < found.distance <= 1.01e-3 * size
+
+
+def test_surfaces_that_are_farther_apart_anywhere_or_mostly_are_not_alike():
+    points, triangles = surface_of(bracket())
+    size = np.linalg.norm(np.ptp(points, axis=0))
+    other, others = divided(points, triangles)
+    far = other.copy()
+    far[np.argmax(other[:, 0]), 0] += 4e-3 * size  # a corner
+    assert near_isometries(points, triangles, far, others) == []
+    wider = other * [1.0, 1.0, 1.004]  # all of it, by less
+    assert near_isometries(points, triangles, wider, others) == []
+    assert near_isometries(points, triangles, 1.0002 * other, others) != []
+
+
+def test_an_open_surface_has_its_isometry_wherever_it_is():
+    points, triangles = surface_of(bracket())
+    turn = turned(5)
+    (found,) = isometries(points, triangles[5:], points @ turn.T + [1.0, 2.0, -1.0], triangles[5:])
+    assert found.turn == pytest.approx(turn, abs=1e-6)
+    # a mirror image whose triangles were left as they are
+    (found,) = isometries(points, triangles[5:], points @ MIRROR, triangles[5:])
+    assert found.mirrors

@@ -70,6 +70,40 @@ def test_links_are_twins_only_with_their_joints_at_the_same_places(package):
     assert twins.twin_of(replace(right, size=0.01), [left]) is None
 
 
+def test_links_of_the_same_surfaces_are_twins_whatever_their_solids(package):
+    twins, solids = package("sources.twins"), package("repair")
+    left, right = link(bracket_surface()), link(bracket_surface(True))
+    solid, image = (solids.closed_solid(body.surfaces, "/Arm/link") for body in (left, right))
+    assert twins.twin_of(twins.Link(right, None, -1.0, True, (ROOT,)), [twins.Link(left, None, -1.0, True, (ROOT,))])
+    other = replace(image, points=image.points + [0.0, 0.0, 0.01 * np.sign(image.points[:, 2].mean())])
+    rough = replace(other, points=np.vstack([other.points, other.points[:1]]))  # of other points than its mirror image
+    one = twins.Link(left, replace(solid, source="wrapped visual surface"), -1.0, True, (ROOT,))
+    two = twins.Link(right, replace(rough, source="wrapped visual surface"), -1.0, True, (ROOT,))
+    assert twins.twin_of(two, [one])[1].mirrors
+    of_hulls = [replace(each, solid=replace(each.solid, source="collision shape")) for each in (one, two)]
+    assert twins.twin_of(of_hulls[1], of_hulls[:1]) is None
+
+
+def test_links_with_other_triangles_are_twins_and_say_how_near(host, package):
+    twins = package("sources.twins")
+    body = link(bracket_surface())
+    (part,) = body.surfaces
+    at = len(part.points) + np.arange(len(part.triangles))
+    middles = part.points[part.triangles].mean(axis=1)
+    pairs = [np.column_stack([part.triangles[:, i], part.triangles[:, j], at]) for i, j in ((0, 1), (1, 2), (2, 0))]
+    points = np.vstack([part.points, middles])
+    points[0] += 2e-5
+    divided = replace(part, points=points, triangles=np.vstack(pairs))
+    other = replace(body, path="/Arm/other", surfaces=(divided,))
+    links = [twins.Link(each, None, -1.0, True, (ROOT,)) for each in (body, other)]
+    index, isometry = twins.twin_of(links[1], links[:1])
+    assert index == 0 and 1e-6 < isometry.distance <= np.sqrt(3.0) * 2e-5
+    (mesh,) = run(host, link(bracket_surface(), element_size=0.02))
+    assert (
+        f"(within {1e3 * isometry.distance:.2g} mm)" in twins.moved(mesh, isometry, 1, "/Arm/link").quality.repairs[0]
+    )
+
+
 def test_patches_are_moved_with_the_mesh(host, package):
     (mesh,) = run(host, link(bracket_surface(), element_size=0.02))
     corners = mesh.points[mesh.tets[0, [0, 2, 1]]]

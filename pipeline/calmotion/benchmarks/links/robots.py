@@ -6,7 +6,9 @@ import shlex
 import time
 from argparse import Namespace
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from calmotion.benchmarks.common.tables import read_rows, write_table
 from calmotion.benchmarks.links.survey import LinkRow, faulty_row, same_row, survey_link
 from calmotion.benchmarks.links.tables import page, survey_table
 from calmotion.benchmarks.scenes.links import Link, frames_of
+from calmotion.benchmarks.scenes.mesher import mesher
 from calmotion.reduction.cache import cache_key
 from calmotion.support.processes.workers import Fault, results_of
 
@@ -39,7 +42,7 @@ def survey_robots(found: Sequence[tuple[Link, str]], options: Namespace, say: Ca
     ]
     if any(pictures):
         (folder / "meshing").mkdir(parents=True, exist_ok=True)
-    first = _first_of_its_kind([link for link, _ in found])
+    first = first_of_its_kind([link for link, _ in found])
     kept = {(row.robot, row.link): row for row in _resumed(options)}
     rows = {k: kept[robot, link.name] for k, (link, robot) in enumerate(found) if (robot, link.name) in kept}
     own = [k for k in sorted(set(first)) if any(same == k and n not in rows for n, same in enumerate(first))]
@@ -74,16 +77,28 @@ def _resumed(options: Namespace) -> list[LinkRow]:
     return read_rows(options.output, LinkRow) if options.resume else []
 
 
-def _first_of_its_kind(links: Sequence[Link]) -> list[int]:
-    """For each link the index of the first one with the same geometry, joints and mass: links are meshed once."""
+def first_of_its_kind(links: Sequence[Link]) -> list[int]:
+    """For each link the index of the first one that has its mesh, as the mesher finds them, and its mass."""
+    twins = import_module(mesher().__name__.rsplit(".", 1)[0] + ".sources.twins")
     kinds: dict[str, int] = {}
-    first = []
+    shapes: list[Any] = []
+    firsts: list[int] = []
     for index, link in enumerate(links):
-        shapes = [(np.round(s.points / _SAME) + 0.0, s.triangles, s.visible) for s in link.body.surfaces]
-        frames = [(np.round(f.position / _SAME) + 0.0, np.round(f.axis, 6) + 0.0) for f in frames_of(link)]
-        masses = None if link.mass is None else float(f"{link.mass.mass:.5g}")
-        first.append(kinds.setdefault(cache_key((shapes, frames, masses, link.body.tets)), index))
-    return first
+        joints = frames_of(link)
+        shapes.append(twins.Link(link.body, None, -1.0, link.carrier is not None, joints))
+        surfaces = [(np.round(s.points / _SAME) + 0.0, s.triangles, s.visible) for s in link.body.surfaces]
+        frames = [(np.round(f.position / _SAME) + 0.0, np.round(f.axis, 6) + 0.0) for f in joints]
+        first = kinds.setdefault(cache_key((surfaces, frames, _mass(link), link.body.tets)), index)
+        if first == index and link.body.tets is None:
+            earlier = [k for k in sorted(set(firsts)) if _mass(links[k]) == _mass(link) and links[k].body.tets is None]
+            twin = twins.twin_of(shapes[index], [shapes[k] for k in earlier])
+            first = index if twin is None else earlier[twin[0]]
+        firsts.append(first if first == index else firsts[first])
+    return firsts
+
+
+def _mass(link: Link) -> float | None:
+    return None if link.mass is None else float(f"{link.mass.mass:.5g}")
 
 
 def _command(options: Namespace) -> str:
