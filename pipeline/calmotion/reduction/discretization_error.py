@@ -52,7 +52,8 @@ def clamped_modes(model: FEModel, count: int, clamped: Indices | None = None) ->
     else:
         rigid, shift = 6, shift_of_free(model, M)
     dofs = np.flatnonzero(np.repeat(free, 3))
-    values, vectors = lowest_modes(model.stiffness[dofs][:, dofs], M[dofs][:, dofs], rigid + count, shift=shift)
+    K, M = model.stiffness[dofs][:, dofs], M[dofs][:, dofs]
+    values, vectors = lowest_modes(K, M, rigid + count, shift=shift, points=model.mesh.nodes[free])
     modes = np.zeros((3 * n, vectors.shape[1]))
     modes[dofs] = vectors
     return np.sqrt(np.maximum(values[rigid:], 0.0)) / (2.0 * np.pi), modes.reshape(n, 3, -1)[:, :, rigid:]

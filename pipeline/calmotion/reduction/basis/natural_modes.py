@@ -28,7 +28,7 @@ def vector_mass(mass: Any) -> Any:
 
 def lowest_modes(
     K: Any, M: Any, count: int, *, shift: float = 0.0, solver: Solver | None = None, below: float | None = None,
-    most: int | None = None,
+    most: int | None = None, points: Array | None = None,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Lowest eigenpairs of K x = omega^2 M x.
 
@@ -39,6 +39,7 @@ def lowest_modes(
         solver: Of K + shift M, where it is known.
         below: All pairs up to this omega^2 [1/s^2] are computed, and one above.
         most: Largest number of pairs.
+        points: As of `SparseSolver`, where one is made.
 
     Returns:
         omega^2 [1/s^2], ascending, shape [count] (or more), and M-orthonormal modes, shape [n, count] (or more).
@@ -58,7 +59,7 @@ def lowest_modes(
         if below is not None:
             count = min(max(count, int(np.count_nonzero(values <= below)) + 1), most)
         return values[:count], vectors[:, :count]
-    solver = solver or SparseSolver(K + shift * M if shift else K)
+    solver = solver or SparseSolver(K + shift * M if shift else K, points)
     return lowest_by_lanczos(K, M, max(count, 1), shift, solver, below, most)
 
 
@@ -103,5 +104,5 @@ def frequencies(model: FEModel, count: int, clamped: Indices | None = None) -> A
         free[clamped] = False
     dofs = np.flatnonzero(np.repeat(free, 3))
     K, M = model.stiffness[dofs][:, dofs], M[dofs][:, dofs]
-    values, _ = lowest_modes(K, M, count, shift=shift)
+    values, _ = lowest_modes(K, M, count, shift=shift, points=model.mesh.nodes[free])
     return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)

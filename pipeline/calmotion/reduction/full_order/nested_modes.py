@@ -57,7 +57,7 @@ class NestedModes:
         count = min(WIDTH, K.shape[0])
         if m.shape[0] < _FEW:
             return lowest_modes(K, vector_mass(m), count)
-        coarsest = SparseSolver(K)
+        coarsest = SparseSolver(K, mesh.nodes[free])
         found = lowest_modes(K, vector_mass(m), count, solver=coarsest)
         self._meshes, self._last = NestedMeshes(mesh, free, coarsest), (free, found[1])
         return found
