@@ -17,6 +17,7 @@ from calmotion.shot import FEMesh
 from calmotion.support.processes.workers import Fault
 
 LIMIT = 20.0  # processor time of a link that is wanted [s]
+COPY = "the same as"  # begins the note of a link that is meshed with another one
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def faulty_row(link: Link, robot: str, fault: Fault) -> LinkRow:
 
 def same_row(row: LinkRow, link: Link, robot: str) -> LinkRow:
     """The row of a link that is the same as that of another row."""
-    note = f"the same as {row.link}" if row.robot == robot else f"the same as {row.link} of {row.robot}"
+    note = f"{COPY} {row.link}" if row.robot == robot else f"{COPY} {row.link} of {row.robot}"
     return replace(row, robot=robot, link=link.name, note="; ".join(filter(None, (note, row.note))))
 
 
