@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import json
+from functools import partial
 
 import pytest
 from calmotion.benchmarks.accuracy import reference_bench, tolerances
@@ -15,6 +16,12 @@ from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 def shot():
     character, meshes = beam_arm(payload=0.1, damping=0.02)
     return Unreduced("arm", "arm.usda", character, shot_of(quintic(0.8, 0.35, 0.1), 0.75), meshes, 0.05)
+
+
+@pytest.fixture
+def few_nodes(monkeypatch):
+    """References take their stiffness from meshes of few nodes."""
+    monkeypatch.setattr(reference_bench, "with_more_nodes", partial(reference_bench.with_more_nodes, stiffness=2_000))
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +97,7 @@ def test_an_interrupted_table_goes_on_with_the_rows_that_it_lacks(shot, rows, mo
         assert sorted(float(row["tolerance_m"]) for row in csv.DictReader(file)) == [1e-3, 1e-2]
 
 
-def test_a_reference_with_finer_meshes_knows_how_far_its_reduction_may_be_off(shot):
+def test_a_reference_with_finer_meshes_knows_how_far_its_reduction_may_be_off(shot, few_nodes):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reference_bench, "REFERENCE_STEP", 1 / 960)
         bench = reference_bench.Bench(shot, nodes=2.0)
@@ -98,3 +105,14 @@ def test_a_reference_with_finer_meshes_knows_how_far_its_reduction_may_be_off(sh
     assert len(bench.shot.meshes.meshes[0].tets) > len(shot.meshes.meshes[0].tets)
     assert fine.bar_m < rough.bar_m
     assert reference_bench.distance(rough.positions, fine.positions) < rough.bar_m
+
+
+def test_references_of_other_curves_have_the_same_finer_meshes(shot, few_nodes):
+    bench = reference_bench.Bench(shot, nodes=2.0)
+    other = bench.of(shot_of(quintic(0.6, 0.35, 0.1), 0.75))
+    assert other.shot.meshes is bench.shot.meshes and other.shot.animation is not shot.animation
+    again = other.of(shot.animation)
+    assert again.shot.meshes is bench.shot.meshes and again.shot.animation is shot.animation
+    positions = [each.run(each.bodies(1e-3), 1 / 240).positions for each in (bench, again, other)]
+    assert reference_bench.distance(positions[0], positions[1]) == 0.0
+    assert reference_bench.distance(positions[0], positions[2]) > 1e-3

@@ -19,9 +19,17 @@ def reduction():
 
 
 def test_the_reference_has_so_many_times_the_nodes(reduction):
-    finer = with_more_nodes(reduction, 4.0)
+    finer = with_more_nodes(reduction, 4.0, stiffness=4_000)
     assert nodes(finer)[0] > 4.0 * nodes(reduction)[0] and finer.loads is reduction.loads
     assert finer.meshes.meshes[0].quality.frequency_error is not None
+
+
+def test_its_stiffness_is_that_of_still_finer_meshes(reduction):
+    own, finer = (with_more_nodes(reduction, 4.0, stiffness=most) for most in (1, 4_000))
+    assert nodes(own) == nodes(finer)
+    told = [each.meshes.meshes[0].quality for each in (own, finer)]
+    assert told[1].frequency_error < 0.5 * told[0].frequency_error
+    assert told[1].stiffness_factor < 1.0
 
 
 def test_once_the_nodes_is_the_same(reduction):

@@ -19,6 +19,7 @@ from calmotion.benchmarks.common.shots import Unreduced
 from calmotion.benchmarks.common.timing import median_time
 from calmotion.errors import ShotError
 from calmotion.reduction.reduced_body import ReducedBody
+from calmotion.shot import Animation
 from calmotion.shot.character import Array, with_settings
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.body_reduction import BodyReduction, reduction_for
@@ -69,16 +70,25 @@ class Bench:
     Args:
         repeats: Runs of which the median time counts.
         nodes: Nodes of its meshes over those of the shot's.
+        finer: Meshes with so many nodes, where they are known.
     """
 
-    def __init__(self, shot: Unreduced, repeats: int = REPEATS, nodes: float = 1.0):
-        self.repeats = repeats
+    def __init__(self, shot: Unreduced, repeats: int = REPEATS, nodes: float = 1.0, finer: BodyReduction | None = None):
+        self.repeats, self._nodes, self._given = repeats, nodes, shot
         self._coarse = reduction_for(shot.character, shot.animation, shot.meshes, RunSettings())
-        # to a fine tolerance, since a link that hardly bends has no modes by which its mesh would be refined
-        self._reduction = with_more_nodes(self._coarse, nodes, BASE)
+        if finer is not None:
+            self._reduction = BodyReduction(shot.character, finer.meshes, self._coarse.loads)
+        else:
+            # to a fine tolerance, since a link that hardly bends has no modes by which its mesh would be refined
+            self._reduction = with_more_nodes(self._coarse, nodes, BASE)
         self.shot = replace(shot, meshes=self._reduction.meshes or shot.meshes)
         self._finer = self._reduction is not self._coarse
         self._known: ReferenceRun | None = None
+
+    def of(self, animation: Animation) -> Bench:
+        """That of other curves of the shot, on the same meshes, which take most of the time."""
+        shot = replace(self._given, animation=animation)
+        return Bench(shot, self.repeats, self._nodes, self._reduction if self._finer else None)
 
     def bodies(self, tolerance: float, **settings: Any) -> list[ReducedBody]:
         """The shot's bodies, reduced to a tolerance [m] with some of their `FlexibleSettings` changed."""

@@ -84,6 +84,7 @@ class Tolerances:
 
     def __init__(self, shot: Unreduced, finest: float = FINEST, nodes: float = TIMES):
         self.shot, self.finest, self.nodes = shot, finest, nodes
+        self._bench: Bench | None = None
         self._reference: Reference | None = None
 
     def warm(self, tolerance: float, command: str) -> None:
@@ -99,12 +100,12 @@ class Tolerances:
             result, coordinates, more = self._run(RunSettings(tolerance=tolerance), command)
         wall = time.perf_counter() - begin
         assert result.accuracy is not None
+        self._bench = self._bench or Bench(shot, nodes=self.nodes)
         if result.after is None:
-            self._reference = self._reference or Bench(shot, nodes=self.nodes).reference(self.finest)
-            reference = self._reference
+            reference = self._reference = self._reference or self._bench.reference(self.finest)
         else:
             found = replace(animation, current=found_tracks(result, animation))
-            reference = Bench(replace(shot, animation=found), nodes=self.nodes).reference(self.finest)
+            reference = self._bench.of(found).reference(self.finest)
         estimated = result.accuracy.estimated_m + (result.accuracy.mesh_m or 0.0)
         runs = (result.before, result.after or result.before)
         return Kept(
