@@ -90,13 +90,20 @@ def _outside(body: Body) -> tuple[Array, Indices] | None:
     surfaces = _without_copies(body.surfaces)
     if not surfaces:
         return None
+    joined = joined_surfaces(surfaces)
+    return None if joined is None else _welded(*joined)
+
+
+def joined_surfaces(surfaces: Sequence[SurfaceMesh]) -> tuple[Array, Indices] | None:
+    """Points and triangles of surfaces with triangles, at least one; None where a triangle has a point that is not
+    there."""
     counts = [len(surface.points) for surface in surfaces]
     offsets = np.cumsum([0, *counts[:-1]])
     for surface, count in zip(surfaces, counts, strict=True):
         if surface.triangles.min() < 0 or surface.triangles.max() >= count:
             return None
     triangles = np.vstack([surface.triangles + offset for surface, offset in zip(surfaces, offsets, strict=True)])
-    return _welded(np.vstack([surface.points for surface in surfaces]), triangles)
+    return np.vstack([surface.points for surface in surfaces]), triangles
 
 
 def _welded(points: Array, triangles: Indices) -> tuple[Array, Indices] | None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from calmotion.geometry.matching.congruence import Isometry, isometries, near_isometries
+from calmotion.geometry.solid import joined_surfaces
 from calmotion.shot import Body, FEMesh, FlexibleSettings, Frame
 from calmotion.shot.meshes import CutPatch
 
@@ -33,6 +35,22 @@ class Link:
     carried: bool
     frames: tuple[Frame, ...]
 
+    @cached_property
+    def shape(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Points and triangles of the solid."""
+        return None if self.solid is None else (self.solid.points, self.solid.triangles)
+
+    @cached_property
+    def surface(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Those of the visual surfaces, where the solid is made of them; None where it is not, or may not be."""
+        visible = [part for part in self.body.surfaces if part.visible and len(part.triangles)]
+        settings = self.body.flexible
+        assert settings is not None
+        other = settings.mesh_file or settings.geometry == "beam" or (self.solid and "visual" not in self.solid.source)
+        joined = None if other or not visible else joined_surfaces(visible)
+        # the links of a survey are not checked yet
+        return joined if joined is not None and np.isfinite(joined[0]).all() else None
+
 
 def twin_of(link: Link | None, others: Sequence[Link | None]) -> tuple[int, Isometry] | None:
     """The first of other links that has the same shape, and the isometry that takes it to the link; None without one.
@@ -47,32 +65,14 @@ def twin_of(link: Link | None, others: Sequence[Link | None]) -> tuple[int, Isom
             continue
         if _settings(link) != _settings(other) or len(link.frames) != len(other.frames):
             continue
-        for shape, found in ((_solid, isometries), (_surface, isometries), (_surface, near_isometries)):
-            given, shown = shape(other), shape(link)
+        shapes, surfaces = (other.shape, link.shape), (other.surface, link.surface)
+        for (given, shown), found in ((shapes, isometries), (surfaces, isometries), (surfaces, near_isometries)):
             if given is None or shown is None:
                 continue
             for isometry in found(*given, *shown):
                 if _joints_match(isometry, other, link, float(np.linalg.norm(np.ptp(shown[0], axis=0)))):
                     return index, isometry
     return None
-
-
-def _solid(link: Link) -> tuple[np.ndarray, np.ndarray] | None:
-    """Points and triangles of the solid."""
-    return None if link.solid is None else (link.solid.points, link.solid.triangles)
-
-
-def _surface(link: Link) -> tuple[np.ndarray, np.ndarray] | None:
-    """Those of the visual surfaces, where the solid is made of them; None where it is not, or may not be."""
-    visible = [part for part in link.body.surfaces if part.visible and len(part.triangles)]
-    settings = link.body.flexible
-    assert settings is not None
-    other = settings.mesh_file or settings.geometry == "beam" or (link.solid and "visual" not in link.solid.source)
-    if not visible or other:
-        return None
-    first = np.cumsum([0, *(len(part.points) for part in visible[:-1])])
-    triangles = [part.triangles + begin for part, begin in zip(visible, first, strict=True)]
-    return np.vstack([part.points for part in visible]), np.vstack(triangles)
 
 
 def _settings(link: Link) -> tuple[object, ...]:

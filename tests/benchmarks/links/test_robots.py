@@ -113,3 +113,19 @@ def test_the_summary_counts_copies_with_the_time_of_their_first_and_without(shot
     told = tables.summary([late, quick, survey.same_row(late, fore, "arm"), survey.same_row(quick, fore, "other")])
     assert "2 took no more than 20 s of processor time (50%)" in told
     assert "2 are copies or mirror images" in told and "3 took no more (75%)" in told
+
+
+def test_broken_surfaces_are_like_no_other(shot):
+    (fore,) = read_links(f"{shot}:fore")
+    (part, *_) = fore.body.surfaces
+
+    def of(part):
+        return replace(fore, body=replace(fore.body, surfaces=(part,)))
+
+    lost, nowhere = (
+        replace(part, triangles=part.triangles + len(part.points)),
+        replace(part, points=np.nan * part.points),
+    )
+    assert robots.first_of_its_kind([fore, of(lost), of(nowhere), of(replace(part, triangles=lost.triangles[:1]))]) == [
+        0, 1, 2, 3,
+    ]  # fmt: skip

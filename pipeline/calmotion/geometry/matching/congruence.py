@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -74,7 +74,7 @@ def near_isometries(points: Array, triangles: Indices, other: Array, others: Ind
             _distances(_places(other, others), moved, triangles, most),
         ]
         if all(far.max() <= most and np.quantile(far, _PART) <= _MOSTLY * size for far in apart):
-            found.append(Isometry(isometry.turn, isometry.move, float(max(far.max() for far in apart))))
+            found.append(replace(isometry, distance=float(max(far.max() for far in apart))))
     return found
 
 
