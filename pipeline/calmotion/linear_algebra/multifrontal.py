@@ -99,9 +99,9 @@ class MultifrontalCholesky:
 
     def __init__(self, matrix: Any, graph: Any, dissection: Dissection, block: int):
         order = dissection.order
-        self._order = (block * order[:, None] + np.arange(block)).ravel()
+        self._order = expand(order, block)
         self._start = block * dissection.start
-        self._borders = [_expand(b, block) for b in _borders(graph[order][:, order].tocsr(), dissection)]
+        self._borders = [expand(b, block) for b in _borders(graph[order][:, order].tocsr(), dissection)]
         size = np.diff(self._start)
         outer = np.array([len(border) for border in self._borders], dtype=np.int64)
         # one array for all blocks: the system then uses large pages
@@ -175,5 +175,6 @@ def _borders(graph: Any, dissection: Dissection) -> list[Any]:
     return borders
 
 
-def _expand(nodes: Any, block: int) -> Any:
+def expand(nodes: Any, block: int) -> Any:
+    """The degrees of freedom of nodes, `block` of each."""
     return (block * np.asarray(nodes, dtype=np.int64)[:, None] + np.arange(block)).ravel()

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.linear_algebra.multifrontal import expand
 from calmotion.linear_algebra.multigrid import WIDTH, Blocks, Multigrid
 from calmotion.linear_algebra.sparse_solver import Solver
 from calmotion.shot.character import Array, IntArray
@@ -34,7 +35,7 @@ class MultigridSolver:
     def __init__(
         self, order: IntArray, matrix: Blocks, cycle: Multigrid, accuracy: float, factorised: Callable[[], Solver]
     ):  # fmt: skip
-        self._rows = (3 * order[:, None] + np.arange(3)).ravel()
+        self._rows = expand(order, 3)
         self._matrix, self._cycle, self._accuracy, self._factorised = matrix, cycle, accuracy, factorised
         self._direct: Solver | None = None
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.geometry.matching.congruence import isometries, near_isometries
-from mesher_links import bracket
+from mesher_links import bracket, divided
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
@@ -49,14 +49,6 @@ def test_a_box_has_eight_and_the_first_is_no_turn():
     assert [kept.mirrors for kept in found] == [False] * 4 + [True] * 4
     cube = np.array(trimesh.creation.box((0.1, 0.1, 0.1)).vertices)
     assert len(isometries(cube, triangles, cube + 1.0, triangles)) == 1
-
-
-def divided(points, triangles):
-    """The same surface with each triangle divided at its middle."""
-    middles = points[triangles].mean(axis=1)
-    at = len(points) + np.arange(len(triangles))
-    parts = [np.column_stack([triangles[:, i], triangles[:, j], at]) for i, j in ((0, 1), (1, 2), (2, 0))]
-    return np.vstack([points, middles]), np.vstack(parts)
 
 
 @pytest.mark.parametrize("turn", [np.eye(3), turned(), turned() @ MIRROR])

@@ -79,3 +79,11 @@ def links_of(shared_data, *names):
                 surfaces.append(SurfaceMesh(str(child.GetPath()), points, triangles))
         found[prim.GetName()] = tuple(surfaces)
     return [found[name] for name in names]
+
+
+def divided(points, triangles):
+    """The same surface with each triangle divided at its middle."""
+    middles = points[triangles].mean(axis=1)
+    at = len(points) + np.arange(len(triangles))
+    parts = [np.column_stack([triangles[:, i], triangles[:, j], at]) for i, j in ((0, 1), (1, 2), (2, 0))]
+    return np.vstack([points, middles]), np.vstack(parts)

@@ -10,7 +10,7 @@ from calmotion.geometry.tetrahedra import tet_volumes
 from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
 from calmotion.shot import Frame
 from calmotion.shot.meshes import CutPatch
-from mesher_links import bracket, link, run, surface
+from mesher_links import bracket, divided, link, run, surface
 
 TURN = np.array([1.0, 0.0, 0.0, 0.0])
 ROOT = Frame(np.array([-0.05, 0.0, 0.0]), TURN)
@@ -88,13 +88,9 @@ def test_links_with_other_triangles_are_twins_and_say_how_near(host, package):
     twins = package("sources.twins")
     body = link(bracket_surface())
     (part,) = body.surfaces
-    at = len(part.points) + np.arange(len(part.triangles))
-    middles = part.points[part.triangles].mean(axis=1)
-    pairs = [np.column_stack([part.triangles[:, i], part.triangles[:, j], at]) for i, j in ((0, 1), (1, 2), (2, 0))]
-    points = np.vstack([part.points, middles])
+    points, triangles = divided(part.points, part.triangles)
     points[0] += 2e-5
-    divided = replace(part, points=points, triangles=np.vstack(pairs))
-    other = replace(body, path="/Arm/other", surfaces=(divided,))
+    other = replace(body, path="/Arm/other", surfaces=(replace(part, points=points, triangles=triangles),))
     links = [twins.Link(each, None, -1.0, True, (ROOT,)) for each in (body, other)]
     index, isometry = twins.twin_of(links[1], links[:1])
     assert index == 0 and 1e-6 < isometry.distance <= np.sqrt(3.0) * 2e-5

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.linear_algebra.multifrontal import expand
 from calmotion.linear_algebra.multigrid import WIDTH
 from calmotion.linear_algebra.preconditioned_modes import improved_modes
 from calmotion.linear_algebra.sparse_solver import SparseSolver
@@ -70,7 +71,6 @@ class NestedModes:
         if finer is None or self._last is None:
             return None
         before, modes = self._last
-        rows = (3 * finer.order[:, None] + np.arange(3)).ravel()
         matrix, m = finer.prolongation[np.flatnonzero(free)[finer.order]][:, before], m[finer.order][:, finer.order]
         start = (matrix @ modes.reshape(matrix.shape[1], -1)).reshape(-1, WIDTH)
 
@@ -81,6 +81,6 @@ class NestedModes:
         if found is None:
             return None
         modes = np.empty_like(found[1])
-        modes[rows] = found[1]
+        modes[expand(finer.order, 3)] = found[1]
         self._last = free, modes
         return found[0], modes
