@@ -119,9 +119,9 @@ def parts_note(parts: Sequence[Part], mesh: FEMesh, makeup: Makeup) -> str:
 
 def remark(quality: MeshQuality) -> tuple[str, ...]:
     """Message about a mesh that is less accurate than wanted."""
-    if quality.frequency_error is None or quality.frequency_error <= ENOUGH:
+    if quality.error is None or quality.error <= ENOUGH:
         return ()
     return (
-        f"estimated error of the first frequencies: {100.0 * quality.frequency_error:.2g}%, "
+        f"estimated error of the first frequencies: {100.0 * quality.error:.2g}%, "
         f"more than {100.0 * ENOUGH:.2g}%: author a smaller calm:flexible:elementSize to reduce it",
     )

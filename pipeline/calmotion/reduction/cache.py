@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from calmotion.reduction.reduced_body import Elasticity, InterfaceStiffness, Invariants, Marker, ReducedBody
-from calmotion.shot.meshes import CutPatch, FEMesh, MeshQuality
+from calmotion.shot.meshes import CutPatch, FEMesh, MeshQuality, MissingVolume
 from calmotion.shot.result import Simplification
 from calmotion.support.caching.cache_folder import REDUCTIONS
 from calmotion.support.caching.caches import store_arrays, stored_arrays
@@ -31,7 +31,8 @@ FORMAT = 1  # to increment when the meaning of the content of a file changes
 
 # A file names the types of its values. Only these are constructed, besides arrays, numbers, strings, None and tuples.
 _TYPES = (
-    CutPatch, Elasticity, FEMesh, InterfaceStiffness, Invariants, Marker, MeshQuality, ReducedBody, Simplification,
+    CutPatch, Elasticity, FEMesh, InterfaceStiffness, Invariants, Marker, MeshQuality, MissingVolume, ReducedBody,
+    Simplification,
 )  # fmt: skip
 TYPES: dict[str, type] = {kind.__name__: kind for kind in _TYPES}
 

@@ -21,6 +21,7 @@ from calmotion.reduction.elements.bisection import bisected
 from calmotion.reduction.full_order.mesh_estimates import ALGEBRAIC, frequency_estimate, load_estimate
 from calmotion.reduction.full_order.mesh_extrapolation import (
     Estimate,
+    by_shape,
     deviation,
     extrapolation,
     interface_factors,
@@ -102,13 +103,14 @@ def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort
     meshes, estimates = _bisected(mesh, estimate, effort, one_factor)
     excess, error = extrapolation(estimates, one_factor)
     if not one_factor:
-        return _with_quality(meshes[-1], _quality(mesh, estimates[-1], estimates, 1.0 - excess, error))
+        return _with_quality(mesh, meshes[-1], _quality(mesh, estimates[-1], estimates, 1.0 - excess, error))
     kept, factor, apart = _smallest(estimates, effort.kept_nodes, max(_APART, _APART_OF_ERROR * error))
+    change, unsure = by_shape(estimates[0])
     quality = replace(
         mesh.quality, frequency_error=0.5 * (error + apart + _of_volume(mesh)), element_error=estimates[kept].error,
-        stiffness_factor=factor * (1.0 - excess),
+        stiffness_factor=factor * (1.0 - excess) * (1.0 + change), shape_error=0.5 * unsure,
     )  # fmt: skip
-    return _with_quality(meshes[kept], quality)
+    return _with_quality(mesh, meshes[kept], quality)
 
 
 def _smallest(estimates: Sequence[Estimate], nodes: float, enough: float) -> tuple[int, float, float]:
@@ -161,15 +163,17 @@ def with_finer_stiffness(
     quality = _quality(mesh, own, estimates, factor * (1.0 - excess), error)
     if known is not None and excess == 0.0 and kept == 0 and _error(known.quality) < _error(quality):
         return known
-    return _with_quality(meshes[kept], quality)
+    return _with_quality(mesh, meshes[kept], quality)
 
 
 def _error(quality: MeshQuality) -> float:
     return np.inf if quality.frequency_error is None else quality.frequency_error
 
 
-def _with_quality(mesh: FEMesh, quality: MeshQuality) -> FEMesh:
-    return replace(mesh, quality=replace(quality, min_dihedral_deg=min_dihedral_deg(mesh.points, mesh.tets)))
+def _with_quality(first: FEMesh, mesh: FEMesh, quality: MeshQuality) -> FEMesh:
+    """A mesh that was bisected from the first one, with its quality."""
+    quality = replace(quality, min_dihedral_deg=min_dihedral_deg(mesh.points, mesh.tets))
+    return replace(mesh, quality=quality, missing=first.missing)
 
 
 def _quality(mesh: FEMesh, own: Estimate, estimates: Sequence[Estimate], factor: float, error: float) -> MeshQuality:
@@ -183,12 +187,13 @@ def _quality(mesh: FEMesh, own: Estimate, estimates: Sequence[Estimate], factor:
         error: Of the compliance by the modes alone, relative.
     """
     rest = _of_volume(mesh) + (_KEPT * own.error if own is not estimates[-1] else 0.0)
-    factors, softest, directed = interface_factors(own, estimates) or (None, None, 0.0)
+    first = estimates[0]
+    factors, softest, directed = interface_factors(own, estimates, first.shape_stiffness) or (None, None, 0.0)
     if factors is not None and softest is not None:
         softest = softest - rest * factors
     return replace(
         mesh.quality, frequency_error=0.5 * (max(error, directed) + rest), element_error=own.error,
-        stiffness_factor=factor, interface_factors=factors, interface_softest=softest,
+        stiffness_factor=factor * (1.0 + by_shape(first)[0]), interface_factors=factors, interface_softest=softest,
     )  # fmt: skip
 
 
@@ -233,7 +238,7 @@ def bisected_where(mesh: FEMesh, indicators: Array, share: float = MARKED) -> FE
         share: Of the error.
     """
     points, tets = bisected(mesh.points, mesh.tets, _largest(indicators, share))
-    return replace(mesh, points=points, tets=tets)
+    return replace(mesh, points=points, tets=tets, missing=None)  # the first mesh tells it
 
 
 def _of_volume(mesh: FEMesh) -> float:
@@ -300,7 +305,7 @@ def load_estimator(
     def estimate(mesh: FEMesh) -> Estimate:
         full = known[1] if known is not None and mesh is known[0] else full_body(mesh, body, attachments, root)
         fixed = full.support.fixed(full.model, *coarser)
-        found = load_estimate(linear_modes(mesh, body, attachments, root, loads, tolerance, full), body)
+        found = load_estimate(linear_modes(mesh, body, attachments, root, loads, tolerance, full), body, mesh.missing)
         coarser[:] = [fixed.for_finer()]
         return found
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from calmotion.geometry.grids.boundary_fit import fitted
+from calmotion.geometry.grids.missing_volume import missing_volume
 from calmotion.geometry.tetrahedra import Indices, measure_quality
 from calmotion.reduction.interfaces.cut_patches import with_rims
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
@@ -53,7 +54,9 @@ def shaped(mesh: FEMesh, body: Body, surface: Surface, attachments: Sequence[Att
     moved = fitted(points, tets, surface.points, surface.triangles, surface.limit)
     cut, fit = (_with(mesh, x, tets, rims, surface.volume) for x in (points, moved))
     # a surface that runs through itself is not what the elements fill
-    return fit if fit.quality.volume_error <= cut.quality.volume_error else cut
+    found = fit if fit.quality.volume_error <= cut.quality.volume_error else cut
+    missing = missing_volume(found.points, found.tets, surface.points, surface.triangles, surface.limit)
+    return replace(found, missing=missing)
 
 
 def _with(mesh: FEMesh, points: Array, tets: IntArray, rims: Sequence[tuple[Array, IntArray]], volume: float) -> FEMesh:

@@ -125,4 +125,5 @@ def moved(mesh: FEMesh, isometry: Isometry, index: int, path: str) -> FEMesh:
     if isometry.distance > 0.0:
         note += f" (within {1e3 * isometry.distance:.2g} mm)"
     quality = replace(mesh.quality, repairs=(note,))
-    return FEMesh(index, isometry(mesh.points), np.ascontiguousarray(tets), quality, mesh.given, patches)
+    missing = mesh.missing and replace(mesh.missing, points=isometry(mesh.missing.points))
+    return FEMesh(index, isometry(mesh.points), np.ascontiguousarray(tets), quality, mesh.given, patches, missing)

@@ -102,7 +102,7 @@ def study(
             options = maker.MeshOptions(element_size=asked, time_limit=limit, cache=False)
             mesh = maker.mesh_body(0, link.body, options, frames_of(link), attachments_of(link))
             meshed = time.perf_counter() - start
-            row, told = _row(link, size, mesh, meshed), mesh.quality.frequency_error
+            row, told = _row(link, size, mesh, meshed), mesh.quality.error
             # of the automatic mesh what users are told
             rows.append(replace(row, estimate=100.0 * told) if np.isnan(size) and told is not None else row)
             if np.isnan(size) and refine:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,22 +12,24 @@ from calmotion.reduction.discretization_error import clamped_modes, element_erro
 from calmotion.reduction.elements.assembly import QuadraticMesh, assemble
 from calmotion.reduction.full_order.mesh_extrapolation import Estimate
 from calmotion.reduction.full_order.nested_modes import NestedModes
+from calmotion.reduction.full_order.shape_change import shape_forms
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.material_laws.choice import amplitudes
 from calmotion.reduction.reduce import LinearModes
 from calmotion.shot.character import Body, Frame, IntArray
-from calmotion.shot.meshes import CutPatch, FEMesh
+from calmotion.shot.meshes import CutPatch, FEMesh, MissingVolume
 
 _MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
 ALGEBRAIC = 3e-5  # relative error of the squares of frequencies whose mesh is wrong by a hundred times that and more
 
 
-def load_estimate(linear: LinearModes, body: Body) -> Estimate:
+def load_estimate(linear: LinearModes, body: Body, missing: MissingVolume | None = None) -> Estimate:
     """Error of the modes that the loads excite, and of the static responses of the interfaces.
 
     Args:
         linear: The body on a mesh, with its loads.
         body: With `flexible` settings.
+        missing: What the mesh leaves out.
     """
     envelope, fixed = linear.load_envelope, linear.support.fixed(linear.model)
     assert body.flexible is not None and envelope is not None
@@ -39,7 +42,8 @@ def load_estimate(linear: LinearModes, body: Body) -> Estimate:
     unit = compliance / np.sqrt(np.diag(compliance))  # responses to wrenches, of energy one half each
     k = len(unit)
     shapes = [(fixed.constraint @ unit).reshape(nodes, 3, k), linear.basis.modes[:, :, :count]]
-    errors, form = errors_and_form(linear.model.mesh, body.flexible.material, np.concatenate(shapes, axis=2))
+    all_shapes = np.concatenate(shapes, axis=2)
+    errors, form = errors_and_form(linear.model.mesh, body.flexible.material, all_shapes)
     wrenches = np.hstack([envelope.force, envelope.moment]).ravel()
     levers = np.hstack([np.ones_like(envelope.force), np.tile(envelope.lever_arm[:, None], 3)]).ravel()
     moved = (levers @ np.abs(unit)) * wrenches * np.sqrt(np.diag(compliance))  # how far each wrench moves targets
@@ -47,7 +51,13 @@ def load_estimate(linear: LinearModes, body: Body) -> Estimate:
     indicators = parts + errors[:, :k] @ (moved / max(moved.sum(), np.finfo(float).tiny))
     to_unit = np.linalg.inv(unit)
     forms = to_unit.T @ form[:k, :k] @ to_unit
-    return Estimate(float(parts.sum()), squares, weights, indicators, nodes, stiffness, forms, wrenches, levers)
+    found = Estimate(float(parts.sum()), squares, weights, indicators, nodes, stiffness, forms, wrenches, levers)
+    if missing is None:
+        return found
+    stiffer, heavier, whole = shape_forms(linear.model.mesh, body.flexible.material, missing, all_shapes)
+    changed = np.diag(stiffer)[k:] / squares - np.diag(heavier)[k:]
+    along_interfaces = to_unit.T @ stiffer[:k, :k] @ to_unit
+    return replace(found, shape_squares=changed, shape_whole=whole[k:] / squares, shape_stiffness=along_interfaces)
 
 
 def frequency_estimate(
@@ -81,7 +91,11 @@ def frequency_estimate(
     errors = element_errors(model.mesh, body.flexible.material, modes)
     total = float((errors * weights).sum(axis=0).max())
     squares = (2.0 * np.pi * frequencies) ** 2
-    return Estimate(total, squares, weights / weights.sum(), errors @ weights, len(model.mesh.nodes))
+    found = Estimate(total, squares, weights / weights.sum(), errors @ weights, len(model.mesh.nodes))
+    if mesh.missing is None:
+        return found
+    stiffer, heavier, whole = shape_forms(model.mesh, body.flexible.material, mesh.missing, modes)
+    return replace(found, shape_squares=np.diag(stiffer) / squares - np.diag(heavier), shape_whole=whole / squares)
 
 
 def _clamped_nodes(

@@ -19,6 +19,7 @@ _USUAL = 0.55  # error over the estimate of it, mostly
 _LEFT, _LEFT_BY_TWO, _DOUBTED = 0.2, 0.5, 0.7
 _USUAL_ALONG = 0.5  # the usual error over its estimate in one direction of an interface
 _FINE = 0.005  # error of the deflection, as estimated on the mesh before, below which estimates are reliable
+_SHAPE_LEFT = 0.2  # of what all places change where volume is missing or too much, that the sum of them may be off by
 _STIFFEST = 0.05  # excess of the stiffness of an interface in any direction that is extrapolated
 
 
@@ -62,6 +63,10 @@ class Estimate:
         forms: Error of the static responses to their motions x: it has the energy x^T Q x / 2, shape [6p, 6p].
         wrenches: Largest loads on the interfaces, shape [6p].
         levers: How far a unit motion of an interface moves the farthest target at most, shape [6p].
+        shape_squares: What the volume that the mesh leaves out changes about `squares`, relative, shape [k]; empty
+            where nothing is known to be missing.
+        shape_whole: The same where all that the mesh leaves out or has too much stiffens it, shape [k].
+        shape_stiffness: The same of `interfaces`.
     """
 
     error: float
@@ -73,6 +78,9 @@ class Estimate:
     forms: Array = field(default_factory=lambda: np.zeros((0, 0)))
     wrenches: Array = field(default_factory=lambda: np.zeros(0))
     levers: Array = field(default_factory=lambda: np.zeros(0))
+    shape_squares: Array = field(default_factory=lambda: np.zeros(0))
+    shape_whole: Array = field(default_factory=lambda: np.zeros(0))
+    shape_stiffness: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 def extrapolation(estimates: Sequence[Estimate], one_factor: bool = False) -> tuple[float, float]:
@@ -111,7 +119,22 @@ def _compared(estimates: Sequence[Estimate]) -> list[Estimate]:
     return [coarse for coarse in estimates[:-1] if coarse.error >= _GAIN * estimates[-1].error][-2:]
 
 
-def interface_factors(own: Estimate, estimates: Sequence[Estimate]) -> tuple[Array, Array, float] | None:
+def by_shape(estimate: Estimate) -> tuple[float, float]:
+    """What the volume that a mesh leaves out changes about its stiffness, relative, and the error of all modes then.
+
+    Args:
+        estimate: Of the mesh.
+    """
+    change, weights = estimate.shape_squares, estimate.weights
+    if not len(change) or not weights.any():
+        return 0.0, 0.0
+    mean = float(weights @ change / weights.sum())
+    return mean, float((np.abs(change - mean) + _SHAPE_LEFT * estimate.shape_whole).max(initial=0.0))
+
+
+def interface_factors(
+    own: Estimate, estimates: Sequence[Estimate], shape: Array | None = None
+) -> tuple[Array, Array, float] | None:
     """`MeshQuality.interface_factors` of a mesh by ever finer ones, extrapolated in each direction, and their errors.
 
     The elements that are bisected lower the error in one direction by another factor than in another: where those at a
@@ -120,6 +143,7 @@ def interface_factors(own: Estimate, estimates: Sequence[Estimate]) -> tuple[Arr
     Args:
         own: Of the mesh.
         estimates: Of it and finer ones.
+        shape: Stiffness that the missing volume adds, shape [6p, 6p], which is part of no error; empty: none.
 
     Returns:
         The factors, `MeshQuality.interface_softest`, and the relative error of the compliance as the targets see it;
@@ -146,9 +170,11 @@ def interface_factors(own: Estimate, estimates: Sequence[Estimate]) -> tuple[Arr
             then = _excess(G, more[-1], last) / np.maximum(before, np.finfo(float).tiny)
             left = np.maximum(left, claim.before * np.abs(then - _USUAL_ALONG) * estimated)
         left = np.where(by_change > 0.0, left, estimated)
-    error = float(left @ target_shares(G, fine))
     wrenches = K @ G
     K = K - (wrenches * excess) @ wrenches.T
+    if shape is not None and len(shape):
+        K = K + shape
+    error = float(left @ target_shares(G, fine))
     softest = K - (wrenches * left) @ wrenches.T
     return np.asarray(np.linalg.solve(own.interfaces, K)), np.asarray(np.linalg.solve(own.interfaces, softest)), error
 
