@@ -54,9 +54,10 @@ def shaped(mesh: FEMesh, body: Body, surface: Surface, attachments: Sequence[Att
     moved = fitted(points, tets, surface.points, surface.triangles, surface.limit)
     cut, fit = (_with(mesh, x, tets, rims, surface.volume) for x in (points, moved))
     # a surface that runs through itself is not what the elements fill
-    found = fit if fit.quality.volume_error <= cut.quality.volume_error else cut
-    missing = missing_volume(found.points, found.tets, surface.points, surface.triangles, surface.limit)
-    return replace(found, missing=missing)
+    if fit.quality.volume_error > cut.quality.volume_error:
+        return cut
+    missing = missing_volume(fit.points, fit.tets, surface.points, surface.triangles, surface.limit)
+    return replace(fit, missing=missing)
 
 
 def _with(mesh: FEMesh, points: Array, tets: IntArray, rims: Sequence[tuple[Array, IntArray]], volume: float) -> FEMesh:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from calmotion.geometry.grids.missing_volume import missing_volume
-from calmotion.geometry.tetrahedra import boundary_triangles
+from calmotion.geometry.tetrahedra import boundary_triangles, surface_volume, tet_volumes
+from round_bars import RADIUS, bar_surface, coarse_bar
 
 SIZE = np.array([0.2, 0.02, 0.02])
 
@@ -21,6 +22,15 @@ def test_the_layer_between_two_boxes_is_missing_or_too_much(helpers, thicker):
     assert found.volumes.sum() == pytest.approx(SIZE[0] * SIZE[1] * thicker, rel=1e-9)
     assert (np.sign(found.volumes) == np.sign(thicker)).all()
     assert found.points[:, 2] == pytest.approx(SIZE[2]) and len(np.unique(found.points, axis=0)) == 4 * 2 * 20
+
+
+def test_what_tetrahedra_leave_out_of_a_round_bar_is_missing(helpers):
+    surface, triangles = bar_surface()
+    points, tets = coarse_bar(helpers)
+    left_out = surface_volume(surface, triangles) - tet_volumes(points, tets).sum()
+    found = missing_volume(points, tets, surface, triangles, 0.3 * RADIUS)
+    assert found.volumes.sum() == pytest.approx(left_out, rel=0.06)  # chords are longer than the layer is thin
+    assert found.volumes.min() > 0.0
 
 
 def test_nothing_is_missing_of_the_same_box(helpers):

@@ -9,7 +9,7 @@ import pytest
 from calmotion.geometry.tetrahedra import tet_volumes
 from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
 from calmotion.shot import Frame
-from calmotion.shot.meshes import CutPatch
+from calmotion.shot.meshes import CutPatch, MissingVolume
 from mesher_links import bracket, divided, link, run, surface
 
 TURN = np.array([1.0, 0.0, 0.0, 0.0])
@@ -100,13 +100,16 @@ def test_links_with_other_triangles_are_twins_and_say_how_near(host, package):
     )
 
 
-def test_patches_are_moved_with_the_mesh(host, package):
+def test_patches_and_what_is_missing_are_moved_with_the_mesh(host, package):
     (mesh,) = run(host, link(bracket_surface(), element_size=0.02))
     corners = mesh.points[mesh.tets[0, [0, 2, 1]]]
-    mesh = replace(mesh, patches=(CutPatch(ROOT.position, corners[None]),))
+    missing = MissingVolume(corners, np.array([1e-9, -2e-9, 3e-9]))
+    mesh = replace(mesh, patches=(CutPatch(ROOT.position, corners[None]),), missing=missing)
     isometry = package("sources.twins").Isometry(MIRROR, np.array([0.0, 0.5, 0.0]))
     image = package("sources.twins").moved(mesh, isometry, 3, "/Arm/link")
     assert image.body == 3 and image.patches[0].origin == pytest.approx([-0.05, 0.5, 0.0])
     area = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     found = np.cross(*(image.patches[0].triangles[0, k] - image.patches[0].triangles[0, 0] for k in (1, 2)))
     assert found == pytest.approx(MIRROR @ area, abs=1e-12), "outward as before"
+    assert image.missing.points == pytest.approx(isometry(corners))
+    assert np.array_equal(image.missing.volumes, missing.volumes)

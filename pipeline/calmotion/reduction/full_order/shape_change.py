@@ -42,15 +42,15 @@ def shape_forms(
     lame, mu = lame_parameters(material.youngs_modulus, material.poissons_ratio)
     k = u.shape[2]
     stiffness, mass, whole = np.zeros((k, k)), np.zeros((k, k)), np.zeros(k)
+    places = embed(mesh, missing.points)
     for first in range(0, len(missing.volumes), _AT_ONCE):
         some = slice(first, first + _AT_ONCE)
-        volumes, places = missing.volumes[some], embed(mesh, missing.points[some])
-        local = u[places.nodes]
-        gradient = np.einsum("qaj,qaik->kqij", places.gradients, local, optimize=True)
+        volumes, local = missing.volumes[some], u[places.nodes[some]]
+        gradient = np.einsum("qaj,qaik->kqij", places.gradients[some], local, optimize=True)
         stress = linear_stress(gradient, lame, mu)
         whole += np.einsum("kqij,kqij,q->k", stress, gradient, np.abs(volumes), optimize=True)
         stress *= volumes[:, None, None]
         stiffness += stress.reshape(k, -1) @ gradient.reshape(k, -1).T
-        moved = np.einsum("qa,qaik->kqi", places.values, local, optimize=True)
+        moved = np.einsum("qa,qaik->kqi", places.values[some], local, optimize=True)
         mass += material.density * ((moved * volumes[:, None]).reshape(k, -1) @ moved.reshape(k, -1).T)
     return 0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T), whole
