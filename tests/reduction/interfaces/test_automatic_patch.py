@@ -62,7 +62,7 @@ def test_a_patch_has_the_same_area_on_every_mesh(helpers):
     areas = []
     for cells in (16, 20, 23):
         plate = quadratic_mesh(*helpers.box((cells, cells, 1), (0.2, 0.2, 0.01), origin=(-0.1, -0.1, 0.0)))
-        nodes = nodes_of_area(plate, plate.surface_nodes, center, radius)
+        nodes = nodes_of_area(plate, plate.surface_nodes, center, radius, np.array([0.0, 0.0, 1.0]))
         # what the midpoints of the surface's triangles stand for
         corners = plate.nodes[plate.surface[:, :3]]
         area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)

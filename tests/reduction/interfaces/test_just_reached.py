@@ -40,6 +40,34 @@ def test_only_what_is_nearly_as_far_as_the_sphere_is_left(helpers, radius, left)
     assert on_ground(mesh.nodes[mesh.surface[found, :3]].mean(axis=1)).all()
 
 
+def test_the_axis_tells_the_cheeks_of_a_fork_from_its_ground(helpers):
+    radius, (points, tets) = 0.0395, fork(helpers, 2)
+    mesh = quadratic_mesh(points, tets)
+    corners = mesh.surface[:, :3]
+    assert not just_reached(mesh.nodes, corners, np.zeros(3), radius).any()
+    found = just_reached(mesh.nodes, corners, np.zeros(3), radius, np.array([1.0, 0.0, 0.0]))
+    assert found.any() and on_ground(mesh.nodes[corners[found]].mean(axis=1)).all()
+    # an axis through the ground, which has little of the area, tells nothing; nor does one that nothing is around
+    for axis in ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]):
+        assert not just_reached(mesh.nodes, corners, np.zeros(3), radius, np.array(axis)).any()
+
+
+def test_a_bore_around_the_axis_is_held(helpers):
+    """A ring as far from the axis as the ground of a fork, and a plate that the axis passes through."""
+    angle = 2.0 * np.pi * np.arange(24) / 24
+    ring = 0.9 * np.stack([np.cos(angle), np.sin(angle), np.zeros(24)], axis=1)
+    k, n = np.arange(24), (np.arange(24) + 1) % 24
+    wall = np.concatenate([ring - [0, 0, 0.1], ring + [0, 0, 0.1]])
+    around = np.concatenate([np.stack([k, n, n + 24], 1), np.stack([k, n + 24, k + 24], 1)])
+    plate = np.array([[0.5, 0.0, 0.8], [-0.3, 0.5, 0.8], [-0.3, -0.5, 0.8]])
+    points, last = np.concatenate([wall, plate]), np.array([[48, 49, 50]])
+    axis, center = np.array([0.0, 0.0, 1.0]), np.zeros(3)
+    assert not just_reached(points, np.concatenate([around, last]), center, 1.0, axis, np.inf).any()
+    some = np.concatenate([around[np.tile(k < 5, 2)], last])  # of the ring on one side
+    assert just_reached(points, some, center, 1.0, axis, np.inf).tolist() == [True] * 10 + [False]
+    assert not just_reached(points, some, center, 1.0, beyond=np.inf).any()
+
+
 def test_a_measured_patch_holds_the_cheeks_and_a_given_one_what_is_within_its_radius(helpers, joint):
     """The measured radius is that of a ball of a quarter more than the gap, or farther."""
     points, tets = fork(helpers, 2)

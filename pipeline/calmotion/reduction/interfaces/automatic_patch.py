@@ -160,7 +160,7 @@ def _width_at(closest: Array, gaps: Array, triangles: Array, size: float) -> flo
 
 
 def nodes_of_area(
-    mesh: QuadraticMesh, candidates: IntArray, center: Array, radius: float, given: bool = False
+    mesh: QuadraticMesh, candidates: IntArray, center: Array, radius: float, axis: Array, given: bool = False
 ) -> IntArray:
     """The nearest surface nodes whose share of the surface is the area inside a sphere about a center.
 
@@ -172,6 +172,7 @@ def nodes_of_area(
         candidates: Surface nodes to choose from.
         center: [m], shape [3].
         radius: [m].
+        axis: Of the joint, unit vector, shape [3].
         given: Whether the radius is given: then all of the surface inside counts, else not what it just reaches.
     """
     corners = mesh.nodes[mesh.surface[:, :3]]
@@ -179,7 +180,7 @@ def nodes_of_area(
     # the share of each triangle that is inside, from the centers of its parts
     share = np.mean(np.linalg.norm(np.einsum("pk,tkx->tpx", _PARTS, corners) - center, axis=-1) <= radius, axis=1)
     if not given:
-        left = just_reached(mesh.nodes, mesh.surface[:, :3], center, radius)
+        left = just_reached(mesh.nodes, mesh.surface[:, :3], center, radius, axis)
         share[left] = 0.0
         candidates = np.setdiff1d(candidates, mesh.surface[left])
     wanted = float(area @ share)

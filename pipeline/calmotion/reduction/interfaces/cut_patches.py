@@ -16,7 +16,7 @@ from calmotion.reduction.interfaces.automatic_patch import Skin
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.interfaces.joint_places import Ball
 from calmotion.reduction.interfaces.just_reached import just_reached
-from calmotion.shot.character import Array, Body, BoolArray, IntArray
+from calmotion.shot.character import Array, Body, BoolArray, Frame, IntArray
 
 _PARTS = triangle_parts(12)
 _EDGE = 1.0  # of the radius: longest edge at a rim, so that it has eight sides or more
@@ -52,7 +52,7 @@ def with_rims(
         whole = interface_patches(quadratic_mesh(points, tets), attachments, radius, body.path, meshed=meshed)
     except ShotError:
         return points, tets, ()  # the reduction reports it
-    rims: list[tuple[Array, Array, float, Sequence[Ball]]] = []
+    rims: list[tuple[Frame, Array, float, Sequence[Ball]]] = []
     given = radius >= 0.0
     for patch in whole:
         if patch.center is None:
@@ -63,15 +63,15 @@ def with_rims(
         points, tets, radius = _cut_to_area(points, tets, center, radius, done)
         for ball in patch.balls:
             points, tets = cut(points, tets, *ball, _held(points, boundary_triangles(tets), [*done, (center, radius)]))
-        rims.append((attachments[patch.attachments[0]].frame.position, center, radius, patch.balls))
+        rims.append((attachments[patch.attachments[0]].frame, center, radius, patch.balls))
     found = []
-    for origin, center, radius, balls in rims:
+    for frame, center, radius, balls in rims:
         held = _within(points, tets, center, radius)
         if not given:
-            held = held[~just_reached(points, held, center, radius, beyond=np.inf)]
+            held = held[~just_reached(points, held, center, radius, frame.axis, beyond=np.inf)]
         for ball in balls:
             held = held[inside(points[held], *ball)]
-        found.append((origin, held))
+        found.append((frame.position, held))
     return points, tets, tuple((origin, triangles) for origin, triangles in found if len(triangles))
 
 

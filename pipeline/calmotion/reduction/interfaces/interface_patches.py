@@ -271,14 +271,14 @@ def _patch(
         if spans_a_plane(mesh.nodes[face]):
             extent = float(np.linalg.norm(mesh.nodes[face] - center, axis=1).max())
             return InterfacePatch(nodes=face.astype(np.int32), attachments=tuple(group), radius=extent)
-    nodes = nodes_of_area(mesh, candidates, center, radius, given=not automatic)
+    nodes = nodes_of_area(mesh, candidates, center, radius, place.axis, given=not automatic)
     if not spans_a_plane(mesh.nodes[nodes]):
         # elements larger than the radius: the nearest surface triangle is the smallest patch that carries a moment
         touched = np.intersect1d(mesh.surface[gaps <= gap + 1e-9 * size].ravel(), candidates)
         nodes = np.union1d(nodes, touched)
     while automatic and not spans_a_plane(mesh.nodes[nodes]) and radius < size:
         radius *= _GROWTH
-        nodes = nodes_of_area(mesh, candidates, center, radius)
+        nodes = nodes_of_area(mesh, candidates, center, radius, place.axis)
     if automatic and not spans_a_plane(mesh.nodes[nodes]):
         nodes = _nearest_spanning(mesh, free, center)  # frames so near to each other that one has hardly any surface
     if not spans_a_plane(mesh.nodes[nodes]):
