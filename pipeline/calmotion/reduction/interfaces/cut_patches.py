@@ -16,7 +16,7 @@ from calmotion.reduction.interfaces.automatic_patch import Skin
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.interfaces.joint_places import Ball
 from calmotion.reduction.interfaces.just_reached import just_reached
-from calmotion.shot.character import Array, Body, BoolArray, Frame, IntArray
+from calmotion.shot.character import Array, Body, BoolArray, IntArray
 
 _PARTS = triangle_parts(12)
 _EDGE = 1.0  # of the radius: longest edge at a rim, so that it has eight sides or more
@@ -52,26 +52,26 @@ def with_rims(
         whole = interface_patches(quadratic_mesh(points, tets), attachments, radius, body.path, meshed=meshed)
     except ShotError:
         return points, tets, ()  # the reduction reports it
-    rims: list[tuple[Frame, Array, float, Sequence[Ball]]] = []
+    rims: list[tuple[Array, Array, float, Array | None, Sequence[Ball]]] = []
     given = radius >= 0.0
     for patch in whole:
         if patch.center is None:
             continue
         center, radius = patch.center, patch.radius
         points, tets = _finer_at(points, tets, center, radius)
-        done = [(center, radius) for _, center, radius, _ in rims]
-        points, tets, radius = _cut_to_area(points, tets, center, radius, done)
+        done = [(center, radius) for _, center, radius, *_ in rims]
+        frame = attachments[patch.attachments[0]].frame
+        axis = None if given else frame.axis
+        points, tets, radius = _cut_to_area(points, tets, center, radius, done, axis)
         for ball in patch.balls:
             points, tets = cut(points, tets, *ball, _held(points, boundary_triangles(tets), [*done, (center, radius)]))
-        rims.append((attachments[patch.attachments[0]].frame, center, radius, patch.balls))
+        rims.append((frame.position, center, radius, axis, patch.balls))
     found = []
-    for frame, center, radius, balls in rims:
-        held = _within(points, tets, center, radius)
-        if not given:
-            held = held[~just_reached(points, held, center, radius, frame.axis, beyond=np.inf)]
+    for origin, center, radius, axis, balls in rims:
+        held = _within(points, tets, center, radius, axis)
         for ball in balls:
             held = held[inside(points[held], *ball)]
-        found.append((frame.position, held))
+        found.append((origin, held))
     return points, tets, tuple((origin, triangles) for origin, triangles in found if len(triangles))
 
 
@@ -84,8 +84,9 @@ def _held(points: Array, surface: IntArray, done: Sequence[tuple[Array, float]])
 
 
 def _cut_to_area(
-    points: Array, tets: IntArray, center: Array, radius: float, done: Sequence[tuple[Array, float]] = ()
-) -> tuple[Array, IntArray, float]:
+    points: Array, tets: IntArray, center: Array, radius: float, done: Sequence[tuple[Array, float]] = (),
+    axis: Array | None = None,
+) -> tuple[Array, IntArray, float]:  # fmt: skip
     """The mesh, cut along a sphere so that the polygon of its rim has the area within a radius, and its radius [m].
 
     Elements along which the sphere passes, as along the side of a cylinder, are inside or outside: where they are too
@@ -93,9 +94,10 @@ def _cut_to_area(
 
     Args:
         done: Spheres of patches along which it was cut before.
+        axis: Of the joint; None: the radius is given, and all of the surface within it counts.
     """
     for k in range(_ROUNDS):
-        cut_mesh, missing = _nearest_area(points, tets, center, radius, done)
+        cut_mesh, missing = _nearest_area(points, tets, center, radius, done, axis)
         if missing <= _FAR or k == _ROUNDS - 1:
             break
         triangles = boundary_triangles(tets)
@@ -105,21 +107,24 @@ def _cut_to_area(
 
 
 def _nearest_area(
-    points: Array, tets: IntArray, center: Array, radius: float, done: Sequence[tuple[Array, float]]
-) -> tuple[tuple[Array, IntArray, float], float]:
+    points: Array, tets: IntArray, center: Array, radius: float, done: Sequence[tuple[Array, float]],
+    axis: Array | None,
+) -> tuple[tuple[Array, IntArray, float], float]:  # fmt: skip
     """`_cut_to_area` with these elements, by the best of some spheres, and the relative error of the area.
 
     Corners that move onto a sphere change the area by steps, so that the best may not be the last.
     """
     surface = boundary_triangles(tets)
     held = _held(points, surface, done)
+    if axis is not None:
+        surface = surface[~just_reached(points, surface, center, radius, axis)]
     area, smaller, larger = (_area_within(points, surface, center, part * radius) for part in (1.0, 0.9, 1.1))
     slope = max((larger - smaller) / (0.2 * radius), np.finfo(float).tiny)
     best, least, trial = (points, tets, radius), np.inf, radius
     low = high = None  # the last spheres with too small and with too large an area
     for _ in range(_TRIALS):
         made, split = cut(points, tets, center, trial, held)
-        missing = area - surface_area(made, _within(made, split, center, trial))
+        missing = area - surface_area(made, _within(made, split, center, trial, axis))
         if abs(missing) < least:
             best, least = (made, split, trial), abs(missing)
         if least <= _AREA * area:
@@ -132,10 +137,13 @@ def _nearest_area(
     return best, least / max(area, np.finfo(float).tiny)
 
 
-def _within(points: Array, tets: IntArray, center: Array, radius: float) -> IntArray:
-    """Triangles of the surface of a mesh that was cut that are within the sphere, shape [k, 3]."""
+def _within(points: Array, tets: IntArray, center: Array, radius: float, axis: Array | None = None) -> IntArray:
+    """Triangles of the surface of a mesh that was cut that a joint holds within the sphere, shape [k, 3]."""
     triangles = boundary_triangles(tets)
-    return np.ascontiguousarray(triangles[inside(points[triangles], center, radius)])
+    held = triangles[inside(points[triangles], center, radius)]
+    if axis is not None:
+        held = held[~just_reached(points, held, center, radius, axis, beyond=np.inf)]
+    return np.ascontiguousarray(held)
 
 
 def _share_within(points: Array, triangles: IntArray, center: Array, radius: float) -> Array:
