@@ -21,8 +21,8 @@ _ON = 1e-9  # of the radius: triangles that end on the sphere
 # of bores are at most at 0.7, walls that a sphere just reaches mostly at 0.9 and more.
 _FARTHEST = 0.75
 # Of the angle about an axis, and how many of them what is around it covers; share of the area within the sphere that is
-# around it, from which the axis decides; and the distance from it, of the radius, of what it does not hold then. On ten
-# robots bottoms of forks cover 1 to 4 sectors and are at 0.8 to 0.95.
+# around it, from which the axis decides; and the distance from it, of the radius, of what it does not hold then. On
+# seven robots bottoms of forks cover 1 to 4 sectors and are at 0.8 to 0.95.
 _SECTORS, _COVERED, _MOSTLY, _AWAY = 16, 12, 0.5, 0.75
 _PARTS = triangle_parts(8)
 
