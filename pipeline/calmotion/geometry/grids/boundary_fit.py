@@ -20,7 +20,7 @@ _HOLD = 1e-3  # weight of the movement itself: keeps corners from sliding along 
 _THINNEST = 0.5  # least part of its volume that a tetrahedron keeps
 
 
-_PARTS = triangle_parts(6)
+PARTS = triangle_parts(6)  # of each triangle, at whose centers the distance is measured
 
 
 def fitted(points: Array, tets: IntArray, surface_points: Array, triangles: Indices, limit: float) -> Array:
@@ -51,30 +51,44 @@ def fitted(points: Array, tets: IntArray, surface_points: Array, triangles: Indi
         step[tets[flattened]] = 0.0
 
 
+def heights(corners: Array, surface: NearbyTriangles) -> tuple[Array, Array, Array]:
+    """How far a surface is above triangles, along their normals.
+
+    Args:
+        corners: Of the triangles [m], shape [t, 3, 3], outward.
+        surface: The surface.
+
+    Returns:
+        Heights above the centers of `PARTS` [m], shape [t, p], NaN where the surface is farther than its reach; unit
+        normals of the triangles, shape [t, 3]; and their areas [m^2], shape [t].
+    """
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    doubled = np.linalg.norm(normal, axis=1)
+    normal /= np.maximum(doubled, np.finfo(float).tiny)[:, None]
+    at = np.einsum("pk,tkx->tpx", PARTS, corners)
+    gap = surface.closest(at.reshape(-1, 3)).reshape(at.shape) - at
+    return np.einsum("tpx,tx->tp", gap, normal), normal, 0.5 * doubled
+
+
 def _step(points: Array, boundary: IntArray, surface: NearbyTriangles) -> Array:
     """Movement of all points that fits the boundary, to first order [m], shape [n, 3]."""
     from scipy.sparse import coo_matrix, diags
     from scipy.sparse.linalg import spsolve
 
-    corners = points[boundary]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    doubled = np.linalg.norm(normal, axis=1)
-    normal /= np.maximum(doubled, np.finfo(float).tiny)[:, None]
-    at = np.einsum("pk,tkx->tpx", _PARTS, corners)
-    gap = surface.closest(at.reshape(-1, 3)).reshape(at.shape) - at
-    known = np.isfinite(gap[..., 0])
-    distance = np.where(known, np.einsum("tpx,tx->tp", np.nan_to_num(gap), normal), 0.0)
-    weight = np.where(known, 0.5 * doubled[:, None] / len(_PARTS), 0.0)
+    height, normal, area = heights(points[boundary], surface)
+    known = np.isfinite(height)
+    distance = np.where(known, height, 0.0)
+    weight = np.where(known, area[:, None] / len(PARTS), 0.0)
     # the normal movement is N_k v_k . n on each triangle; normal equations for v, three entries a corner
-    shapes = np.einsum("tp,pk,pl->tkl", weight, _PARTS, _PARTS)
+    shapes = np.einsum("tp,pk,pl->tkl", weight, PARTS, PARTS)
     block = np.einsum("tkl,tx,ty->tkxly", shapes, normal, normal)
-    right = np.einsum("tp,tp,pk,tx->tkx", weight, distance, _PARTS, normal)
+    right = np.einsum("tp,tp,pk,tx->tkx", weight, distance, PARTS, normal)
     used, number = np.unique(boundary, return_inverse=True)
     places = (3 * number.reshape(boundary.shape)[:, :, None] + np.arange(3)).reshape(len(boundary), 9)
     size = 3 * len(used)
     rows, columns = np.repeat(places, 9, axis=1).ravel(), np.tile(places, 9).ravel()
     A = coo_matrix((block.reshape(len(boundary), -1).ravel(), (rows, columns)), shape=(size, size)).tocsc()
-    lumped = np.bincount(places.ravel(), np.repeat(doubled / 6.0, 9), size)
+    lumped = np.bincount(places.ravel(), np.repeat(area / 3.0, 9), size)
     b = np.bincount(places.ravel(), right.reshape(len(boundary), 9).ravel(), size)
     step = np.zeros_like(points)
     step[used] = spsolve(A + diags(_HOLD * lumped), b).reshape(-1, 3)

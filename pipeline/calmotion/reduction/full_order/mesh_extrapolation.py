@@ -170,11 +170,11 @@ def interface_factors(
             then = _excess(G, more[-1], last) / np.maximum(before, np.finfo(float).tiny)
             left = np.maximum(left, claim.before * np.abs(then - _USUAL_ALONG) * estimated)
         left = np.where(by_change > 0.0, left, estimated)
+    error = float(left @ target_shares(G, fine))
     wrenches = K @ G
     K = K - (wrenches * excess) @ wrenches.T
     if shape is not None and len(shape):
         K = K + shape
-    error = float(left @ target_shares(G, fine))
     softest = K - (wrenches * left) @ wrenches.T
     return np.asarray(np.linalg.solve(own.interfaces, K)), np.asarray(np.linalg.solve(own.interfaces, softest)), error
 

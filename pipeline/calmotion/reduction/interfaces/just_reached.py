@@ -81,6 +81,6 @@ def _beside(corners: Array, part: Indices, radius: float, axis: Array) -> BoolAr
     np.add.at(area, of, np.broadcast_to(double[:, None], within.shape)[within])
     np.minimum.at(away, of, np.hypot(x, y)[within])
     around = covered.sum(axis=1) >= _COVERED
-    if area[around].sum() < _MOSTLY * area.sum() or not around.any():
+    if area[around].sum() < _MOSTLY * area.sum():
         return np.zeros(count, dtype=bool)
     return np.asarray(~around & (away >= _AWAY * radius) & np.isfinite(away))
