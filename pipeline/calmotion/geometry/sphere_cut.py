@@ -58,7 +58,9 @@ def inside(corners: Array, center: Array, radius: float) -> BoolArray:
     """
     far = np.linalg.norm(corners - center, axis=2).max(axis=1)
     edge = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
-    return np.asarray(far <= radius * (1.0 + ON) + 1.5 * _LEAST * edge)
+    # where the sphere grazes the surface, a corner so far from it may be far along the surface
+    middle = np.linalg.norm(corners.mean(axis=1) - center, axis=1)
+    return np.asarray((far <= radius * (1.0 + ON) + 1.5 * _LEAST * edge) & (middle <= radius * (1.0 + ON)))
 
 
 def _crossing(points: Array, tets: IntArray, center: Array, radius: float) -> tuple[IntArray, Array]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from calmotion.geometry.surfaces.slits import slit_fillings
+from calmotion.geometry.surfaces.slits import facing, slit_fillings
 
 
 def blocks(gap, tilt=0.0, side=1.0):
@@ -63,3 +63,13 @@ def test_a_hole_thinner_than_the_limit_has_no_filling_that_turns_over():
     hole = trimesh.creation.cylinder(0.004, 2.0, sections=12)
     for body, _ in fillings(trimesh.creation.box((1, 1, 1)).difference(hole)):
         assert body.volume > 0.0
+
+
+def test_what_faces_another_side_within_the_width():
+    mesh = blocks(5e-3, side=0.5)
+    x = np.array(mesh.triangles)
+    middle, normal = x.mean(axis=1), np.array(mesh.face_normals)
+    faced = facing(middle, normal, x, 0.01)
+    under = (np.abs(middle[:, 2] - 0.5) < 0.01) & (np.abs(middle[:, :2]).max(axis=1) < 0.25)
+    assert np.array_equal(faced, under) and faced.any()
+    assert not facing(middle, normal, x, 4e-3).any()

@@ -135,3 +135,26 @@ def test_a_patch_keeps_its_area_where_the_sphere_of_another_one_crosses_it(helpe
         assert tet_volumes(made, split).sum() == pytest.approx(0.06 * 0.06 * 0.012, rel=1e-3)
         held.append(surface_area(made, _within(made, split, first[0], radius)))
     assert abs(held[1] / area - 1.0) < 1e-9 < abs(held[0] / area - 1.0)
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.3, 0.6])
+def test_the_rim_is_round_where_the_joint_is_far_from_the_surface(helpers, plastic, turned):
+    """A sphere four times as large as the disc that it cuts, on elements as large as the disc."""
+    away, disc = 0.04, 0.01
+    frames = [AttachmentFrame("/Arm/root", helpers.frame(0.0, 0.0, -away), "interface")]
+    settings = FlexibleSettings(plastic, interface_radius=float(np.hypot(away, disc)))
+    body = Body("/Arm/link", helpers.frame(0, 0, 0), None, flexible=settings)
+    points, tets = helpers.box((4, 4, 1), (0.08, 0.08, 0.02), origin=(-0.04, -0.04, 0.0))
+    c, s = np.cos(turned), np.sin(turned)
+    points = np.asarray(points) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + [3e-3, 1e-3, 0.0]
+    points, _, ((_, rim),) = with_rims(points, tets, body, frames)
+    area, corners = surface_area(points, rim), points[rim]
+    assert area == pytest.approx(np.pi * disc**2, rel=0.01)
+    middle = np.einsum("t,tx->x", np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]),
+                                                 axis=1), corners.mean(axis=1)) / (2.0 * area)  # fmt: skip
+    assert np.linalg.norm(middle) < 0.03 * disc
+    edges = np.sort(rim[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    outer = np.array([edge for edge, count in zip(*np.unique(edges, axis=0, return_counts=True), strict=True)
+                      if count == 1])  # fmt: skip
+    around = np.linalg.norm(points[outer[:, 0]] - points[outer[:, 1]], axis=1).sum()
+    assert 4.0 * np.pi * area / around**2 > 0.985  # 0.95 of a regular octagon, 0.987 of one with 16 sides

@@ -8,12 +8,28 @@ import numpy as np
 
 from calmotion.geometry.nearby_triangles import NearbyTriangles, unit_normals
 from calmotion.geometry.tetrahedra import Indices
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, BoolArray
 
 _OPPOSITE = -0.85  # largest product of the normals of two sides: within 32 degrees; else they are those of a corner
 _SMOOTH = 0.8  # least product of the normals of triangles with an edge in common that have one filling
 _UPRIGHT = 0.3  # least product of the normals of a triangle and of the far side of its filling
+_ROUNDING = 1e-3  # of the widest slit: how far behind a place the other side may be
 _LATERAL = 2.0  # way of a corner, of that along the normals of its triangles
+
+
+def facing(places: Array, normals: Array, triangles: Array, widest: float) -> BoolArray:
+    """Which places of a surface face another side of it across a slit, shape [n].
+
+    Args:
+        places: [m], shape [n, 3].
+        normals: Outward, unit vectors, shape [n, 3].
+        triangles: Surface [m], shape [k, 3, 3], outward.
+        widest: Slit [m].
+    """
+    corners = triangles.reshape(-1, 3)
+    near = NearbyTriangles(corners, np.arange(len(corners)).reshape(-1, 3), widest)
+    gap, product = near.faced(places, normals, _ROUNDING * widest)
+    return np.asarray((gap <= widest) & (product < _OPPOSITE))
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,9 @@
 A frame may be at the joint's place in a neighbour, in the middle of a bearing, or behind a flange. What holds the joint
 is then the nearest part of the surface that goes around its axis: a bore or a boss, as of a bearing or a servo horn,
 or a flange. Without one, it is the nearest place of the surface.
+
+A slit across the axis, between a flange and what it is fastened to, holds nothing, even where it is what a frame is
+next to: link6 of the Panda was held by both walls of one of 1 mm in its middle.
 """
 
 from __future__ import annotations
@@ -11,7 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.geometry.distances import closest_on_triangles, triangle_parts
+from calmotion.geometry.distances import closest_on_triangles, ray_length, triangle_parts
+from calmotion.geometry.nearby_triangles import unit_normals
+from calmotion.geometry.surfaces.slits import facing
 from calmotion.shot.character import Array, BoolArray
 
 LARGEST_GAP = 0.5  # of the size of a body, between its surface and a frame inside its convex hull that touches it
@@ -21,6 +26,7 @@ _SECTORS, _COVERED = 16, 12  # of the angle around the axis, and how many a ring
 _BIN = 0.02  # of the size: rings of one radius, flanges in one plane
 _FEW = 5_000  # triangles, below which a triangle may be long
 _FARTHER, _ASIDE = 1.5, 0.1  # a ring may be farther than the nearest place, by a factor and a part of the size
+_SLIT, _ROUNDING = 0.01, 1e-5  # of the size: widest slit that holds nothing; that of a place on a side
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +45,7 @@ class ContactPlace:
 
 
 def contact_place(center: Array, axis: Array, triangles: Array, points: Array) -> ContactPlace | None:
-    """The contact place of an attachment frame; None where the frame itself touches the body.
+    """The contact place of an attachment frame; None where the frame itself touches the body, and not in a slit.
 
     Args:
         center: Origin of the attachment frame [m], shape [3].
@@ -52,9 +58,17 @@ def contact_place(center: Array, axis: Array, triangles: Array, points: Array) -
     gaps = np.linalg.norm(closest - center, axis=1)
     gap = float(gaps.min())
     inside = gap <= OUTSIDE * size or inside_hull(points, center, OUTSIDE * size)
-    if inside and gap <= LARGEST_GAP * size:
+    touched = gaps.argmin(keepdims=True)
+    normal = unit_normals(triangles[touched])[0]
+    slit = ray_length(closest[touched[0]], normal[0], triangles, _ROUNDING * size) <= _SLIT * size and bool(
+        _in_slit(closest[touched], normal, axis, triangles, size)[0]
+    )
+    if inside and gap <= LARGEST_GAP * size and not slit:
         return None
     x, normal = _places(triangles)
+    if slit:
+        held = ~_in_slit(x, normal, axis, triangles, size)
+        x, normal = x[held], normal[held]
     away = x - center
     height = away @ axis
     radial = away - height[:, None] * axis
@@ -72,7 +86,25 @@ def contact_place(center: Array, axis: Array, triangles: Array, points: Array) -
     level = _nearest_level(height, flange, sector, np.hypot(radius, height), limit, _BIN * size)
     if level is not None:
         return ContactPlace(center + level * axis, "flange", gap)
-    return ContactPlace(np.asarray(closest[int(gaps.argmin())]), "face", gap)
+    if not slit:
+        return ContactPlace(np.asarray(closest[int(gaps.argmin())]), "face", gap)
+    if not len(x):
+        return None
+    return ContactPlace(x[int(np.hypot(radius, height).argmin())], "face", gap)
+
+
+def _in_slit(places: Array, normals: Array, axis: Array, triangles: Array, size: float) -> BoolArray:
+    """Which places of a surface are on the sides of slits across the axis, shape [n].
+
+    Args:
+        places: [m], shape [n, 3].
+        normals: Outward, unit vectors, shape [n, 3].
+        axis, triangles: As of `contact_place`.
+        size: Of the body [m].
+    """
+    found = np.abs(normals @ axis) > _ALONG
+    found[found] = facing(places[found], normals[found], triangles, _SLIT * size)
+    return np.asarray(found)
 
 
 def inside_hull(points: Array, place: Array, margin: float) -> bool:

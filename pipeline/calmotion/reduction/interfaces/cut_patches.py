@@ -19,7 +19,7 @@ from calmotion.reduction.interfaces.just_reached import just_reached
 from calmotion.shot.character import Array, Body, BoolArray, IntArray
 
 _PARTS = triangle_parts(12)
-_EDGE = 1.0  # of the radius: longest edge at a rim, so that it has eight sides or more
+_EDGE = 0.5  # of the radius of a disc of a patch's area: longest edge at its rim, so that it has eight sides or more
 _BISECTIONS = 12
 # Spheres of a patch that are tried, and relative error of its area that is enough; how often elements along which a
 # sphere passes are bisected, and error from which they are
@@ -58,10 +58,10 @@ def with_rims(
         if patch.center is None:
             continue
         center, radius = patch.center, patch.radius
-        points, tets = _finer_at(points, tets, center, radius)
-        done = [(center, radius) for _, center, radius, *_ in rims]
         frame = attachments[patch.attachments[0]].frame
         axis = None if given else frame.axis
+        points, tets = _finer_at(points, tets, center, radius, axis)
+        done = [(center, radius) for _, center, radius, *_ in rims]
         points, tets, radius = _cut_to_area(points, tets, center, radius, done, axis)
         for ball in patch.balls:
             points, tets = cut(points, tets, *ball, _held(points, boundary_triangles(tets), [*done, (center, radius)]))
@@ -114,10 +114,8 @@ def _nearest_area(
 
     Corners that move onto a sphere change the area by steps, so that the best may not be the last.
     """
-    surface = boundary_triangles(tets)
-    held = _held(points, surface, done)
-    if axis is not None:
-        surface = surface[~just_reached(points, surface, center, radius, axis)]
+    held = _held(points, boundary_triangles(tets), done)
+    surface = _held_about(points, tets, center, radius, axis)
     area, smaller, larger = (_area_within(points, surface, center, part * radius) for part in (1.0, 0.9, 1.1))
     slope = max((larger - smaller) / (0.2 * radius), np.finfo(float).tiny)
     best, least, trial = (points, tets, radius), np.inf, radius
@@ -135,6 +133,12 @@ def _nearest_area(
         else:
             trial = low[0] + (high[0] - low[0]) * low[1] / (low[1] - high[1])
     return best, least / max(area, np.finfo(float).tiny)
+
+
+def _held_about(points: Array, tets: IntArray, center: Array, radius: float, axis: Array | None) -> IntArray:
+    """The surface of a mesh without what a sphere just reaches and the joint in its center does not hold."""
+    surface = boundary_triangles(tets)
+    return surface if axis is None else surface[~just_reached(points, surface, center, radius, axis)]
 
 
 def _within(points: Array, tets: IntArray, center: Array, radius: float, axis: Array | None = None) -> IntArray:
@@ -164,14 +168,22 @@ def _area_within(points: Array, triangles: IntArray, center: Array, radius: floa
     return float(area @ _share_within(points, triangles, center, radius))
 
 
-def _finer_at(points: Array, tets: IntArray, center: Array, radius: float) -> tuple[Array, IntArray]:
-    """The mesh, bisected where edges of the surface at the sphere are long beside it."""
+def _finer_at(
+    points: Array, tets: IntArray, center: Array, radius: float, axis: Array | None
+) -> tuple[Array, IntArray]:
+    """The mesh, bisected where edges of the surface at the sphere are long beside what it holds.
+
+    A sphere about a joint far from the surface is much larger than the disc that it cuts: of a flange of the Panda it
+    held six triangles, whose frequency differed by 4% on three meshes.
+    """
+    area = _area_within(points, _held_about(points, tets, center, radius, axis), center, radius)
+    longest = _EDGE * min(radius, float(np.sqrt(area / np.pi)) or radius)
     for _ in range(_BISECTIONS):
         triangles = boundary_triangles(tets)
         x = points[triangles]
         edge = np.linalg.norm(x - x[:, [1, 2, 0]], axis=2).max(axis=1)
         share = _share_within(points, triangles, center, radius)
-        long = (share > 0.0) & (share < 1.0) & (edge > _EDGE * radius)
+        long = (share > 0.0) & (share < 1.0) & (edge > longest)
         if not long.any():
             break
         points, tets = bisected(points, tets, _behind(tets, triangles[long]))
