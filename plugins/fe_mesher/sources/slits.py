@@ -46,22 +46,29 @@ def without_slits(whole: Part, scale: float, repairs: list[str]) -> Part:
         return whole
     simpler = solid.simplify(_DETAIL)
     solid = simpler if abs(simpler.volume() - whole.volume) < _LOST * whole.volume else solid
-    slits, widest, whole = _filled(solid, int(_MORE * len(whole.triangles)) + _BESIDES) or (0, 0.0, whole)
+    slits, widest, filled = _filled(solid, int(_MORE * len(whole.triangles)) + _BESIDES)
+    whole = whole if filled is None else filled
     pieces = connected_pieces(whole.points, whole.triangles)
     kept = [piece for piece in pieces if not _is_thin_cavity(piece)]
     cavities = len(pieces) - len(kept)
-    if slits:
+    if slits and filled is None:
+        repairs.append(
+            f"left {slits} slit{'s' if slits > 1 else ''} of up to {1e3 * scale * widest:.2g} mm open, since filling "
+            "them makes too many triangles: a mesh may join their sides in places, and be stiffer there"
+        )
+    elif slits:
         repairs.append(f"filled {slits} slit{'s' if slits > 1 else ''} of up to {1e3 * scale * widest:.2g} mm")
-    if cavities and not slits:
+    if cavities and (not slits or filled is None):
         limit = 1e3 * scale * NARROW
         repairs.append(f"filled {cavities} cavit{'ies' if cavities > 1 else 'y'} thinner than {limit:.2g} mm")
     return concatenated(kept) if cavities else whole
 
 
-def _filled(solid: Any, most: int) -> tuple[int, float, Part] | None:
-    """The number of slits of a manifold, the width of the widest, and the solid without them; None where it has none.
+def _filled(solid: Any, most: int) -> tuple[int, float, Part | None]:
+    """The number of slits of a manifold, the width of the widest, and the solid without them.
 
-    Fillings of its smallest slits are left out where they make more triangles than allowed.
+    Fillings of its smallest slits are left out where they make more triangles than allowed. Without slits, and where
+    the others make more still, there is no other solid.
 
     Args:
         solid: In units of the size of the body.
@@ -70,6 +77,7 @@ def _filled(solid: Any, most: int) -> tuple[int, float, Part] | None:
     import manifold3d
 
     fine = part_of(solid.refine_to_length(_SIDE))
+    slits, widest = 0, 0.0
     for least in _LEASTS:
         fillings = slit_fillings(fine.points, fine.triangles, NARROW, _SINK, _BESIDE, least)
         made = [(body, filling.width) for filling in fillings if (body := _body(filling)) is not None]
@@ -77,9 +85,10 @@ def _filled(solid: Any, most: int) -> tuple[int, float, Part] | None:
             break
         filling = manifold3d.Manifold.batch_boolean([body for body, _ in made], manifold3d.OpType.Add)
         filled = part_of(solid + filling)
+        slits, widest = len(filling.decompose()), max(width for _, width in made)
         if len(filled.triangles) <= most:
-            return len(filling.decompose()), max(width for _, width in made), filled
-    return None
+            return slits, widest, filled
+    return slits, widest, None
 
 
 def _body(filling: Filling) -> Any:
