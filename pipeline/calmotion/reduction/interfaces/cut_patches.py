@@ -19,7 +19,7 @@ from calmotion.reduction.interfaces.just_reached import just_reached
 from calmotion.shot.character import Array, Body, BoolArray, IntArray
 
 _PARTS = triangle_parts(12)
-_EDGE = 0.5  # of the radius of a disc of a patch's area: longest edge at its rim, so that it has eight sides or more
+_EDGE = 0.5  # of the radius of a disc of the area of a patch: longest edge at its rim, which has twelve sides or more
 _BISECTIONS = 12
 # Spheres of a patch that are tried, and relative error of its area that is enough; how often elements along which a
 # sphere passes are bisected, and error from which they are
