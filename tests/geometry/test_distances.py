@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.geometry.distances import closest_on_triangles, ray_length
+from calmotion.geometry.distances import closest_on_triangles, meets_plane, ray_length
 
 TRIANGLE = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
 
@@ -58,3 +58,11 @@ def test_rays_intersect_as_linear_equations_say():
     assert 10 < np.isfinite(expected).sum() < 95
     found = [ray_length(o, d, triangles, 0.1) for o, d in zip(origins, directions, strict=True)]
     np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_a_plane_meets_triangles_with_corners_on_both_sides_or_on_it():
+    rng = np.random.default_rng(3)
+    triangles, origin, normal = rng.standard_normal((200, 3, 3)), rng.standard_normal(3), rng.standard_normal(3)
+    height = (triangles - origin) @ normal
+    assert np.array_equal(meets_plane(triangles, origin, normal), (height.min(axis=1) <= 0) & (height.max(axis=1) >= 0))
+    assert meets_plane(TRIANGLE, np.zeros(3), np.array([1.0, 0.0, 0.0])).all()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, BoolArray
 from calmotion.support.compilation import kernel
 
 
@@ -54,6 +54,31 @@ def _closest_on_segments(point: Array, a: Array, b: Array) -> Array:
     length2 = np.maximum(np.einsum("ij,ij->i", d, d), np.finfo(float).tiny)
     t = np.clip(np.einsum("ij,ij->i", point - a, d) / length2, 0.0, 1.0)
     return np.asarray(a + t[:, None] * d)
+
+
+def meets_plane(triangles: Array, origin: Array, normal: Array) -> BoolArray:
+    """Which triangles a plane meets, shape [k].
+
+    Args:
+        triangles: Corners [m], shape [k, 3, 3].
+        origin: A point of the plane [m], shape [3].
+        normal: Of the plane, shape [3].
+    """
+    found = np.empty(len(triangles), dtype=np.bool_)
+    _meets_plane(np.ascontiguousarray(triangles), np.ascontiguousarray(origin), np.ascontiguousarray(normal), found)
+    return found
+
+
+@kernel
+def _meets_plane(triangles: Array, origin: Array, normal: Array, found: BoolArray) -> None:
+    offset = normal[0] * origin[0] + normal[1] * origin[1] + normal[2] * origin[2]
+    for k in range(len(triangles)):
+        low, high = np.inf, -np.inf
+        for i in range(3):
+            p = triangles[k, i]
+            height = normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2] - offset
+            low, high = min(low, height), max(high, height)
+        found[k] = low <= 0.0 and high >= 0.0
 
 
 def ray_length(origin: Array, direction: Array, triangles: Array, skip: float) -> float:

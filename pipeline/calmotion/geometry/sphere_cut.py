@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.geometry.nearby_triangles import unit_normals
 from calmotion.geometry.tetrahedra import boundary_triangles, corner_keys, tet_volumes
 from calmotion.shot.character import Array, BoolArray, IntArray
 
@@ -65,12 +66,14 @@ def inside(corners: Array, center: Array, radius: float) -> BoolArray:
 
 def _crossing(points: Array, tets: IntArray, center: Array, radius: float) -> tuple[IntArray, Array]:
     """Edges of the surface that cross the sphere, from inside to outside, shape [k, 2], and where, shape [k]."""
-    triangles = boundary_triangles(tets)
+    distance = np.linalg.norm(points - center, axis=1) - radius
+    side = np.where(np.abs(distance) <= ON * radius, 0.0, np.sign(distance))
+    # all elements with a triangle that crosses the sphere cross it, so that no others are needed
+    crossing = tets[(side[tets].min(axis=1) < 0.0) & (side[tets].max(axis=1) > 0.0)]
+    triangles = boundary_triangles(crossing)
     sides = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]))
     edges = sides[np.unique(corner_keys(sides), return_index=True)[1]]
-    distance = np.linalg.norm(points - center, axis=1) - radius
-    side = np.where(np.abs(distance) <= ON * radius, 0.0, np.sign(distance))[edges]
-    edges = edges[side[:, 0] * side[:, 1] < 0.0]
+    edges = edges[side[edges[:, 0]] * side[edges[:, 1]] < 0.0]
     edges = np.where((distance[edges[:, 0]] < 0.0)[:, None], edges, edges[:, ::-1])
     start, way = points[edges[:, 0]] - center, points[edges[:, 1]] - points[edges[:, 0]]
     # |start + t way| = radius
@@ -89,10 +92,9 @@ def _moved_onto(points: Array, tets: IntArray, center: Array, radius: float, fix
     at = points[edges[:, 0]] + part[:, None] * (points[edges[:, 1]] - points[edges[:, 0]])
     step = np.concatenate([at, at]) - points[ends]
     length = np.tile(np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1), 2)
+    tets = tets[np.isin(tets, ends).any(axis=1)]  # all elements around these
     triangles = boundary_triangles(tets)
-    x = points[triangles]
-    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    normal = unit_normals(points[triangles])[0]
     around = [normal[(triangles == end).any(axis=1)] for end in ends]
     lift = np.array([np.abs(n @ s).max() for n, s in zip(around, step / length[:, None], strict=True)])
     volumes, moved = tet_volumes(points, tets), points.copy()

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from calmotion.geometry.distances import closest_on_triangles, ray_length, triangle_parts
+from calmotion.geometry.distances import closest_on_triangles, meets_plane, ray_length, triangle_parts
 from calmotion.geometry.tetrahedra import Indices, part_of_each
 from calmotion.reduction.elements.assembly import QuadraticMesh
 from calmotion.reduction.interfaces.just_reached import just_reached
@@ -194,8 +194,7 @@ def nodes_of_area(
 
 
 def _half_width(start: Array, across: Array, triangles: Array) -> float:
-    height = (triangles - start) @ np.cross(across[0], across[1])
-    triangles = triangles[(height.min(axis=1) <= 0.0) & (height.max(axis=1) >= 0.0)]  # that rays across can hit
+    triangles = triangles[meets_plane(triangles, start, np.cross(across[0], across[1]))]  # that rays across can hit
     angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     rays = np.stack([np.cos(angles), np.sin(angles)], axis=1) @ across
     lengths = np.array([ray_length(start, ray, triangles, 0.0) for ray in rays])

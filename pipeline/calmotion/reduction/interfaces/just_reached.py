@@ -56,7 +56,7 @@ def just_reached(
     np.minimum.at(nearest, part, gaps[reached])
     least = float(nearest.min())
     far = np.asarray(nearest > least + _FARTHEST * (radius - least))
-    if axis is not None:
+    if axis is not None and len(nearest) > 1:
         far |= _beside(corners[reached] - center, part, radius, axis)
         slits = _slits(corners[reached], part, radius, axis)
         far |= slits & ~np.all(far | slits)
