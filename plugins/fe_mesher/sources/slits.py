@@ -51,14 +51,15 @@ def without_slits(whole: Part, scale: float, repairs: list[str]) -> Part:
     pieces = connected_pieces(whole.points, whole.triangles)
     kept = [piece for piece in pieces if not _is_thin_cavity(piece)]
     cavities = len(pieces) - len(kept)
-    if slits and filled is None:
-        repairs.append(
-            f"left {slits} slit{'s' if slits > 1 else ''} of up to {1e3 * scale * widest:.2g} mm open, since filling "
-            "them makes too many triangles: a mesh may join their sides in places, and be stiffer there"
-        )
+    told = f"{slits} slit{'s' if slits > 1 else ''} of up to {1e3 * scale * widest:.2g} mm"
+    if filled is not None:
+        repairs.append(f"filled {told}")
     elif slits:
-        repairs.append(f"filled {slits} slit{'s' if slits > 1 else ''} of up to {1e3 * scale * widest:.2g} mm")
-    if cavities and (not slits or filled is None):
+        repairs.append(
+            f"left {told} open, since filling them makes too many triangles: a mesh may join their sides in places, "
+            "and be stiffer there"
+        )
+    if cavities and filled is None:
         limit = 1e3 * scale * NARROW
         repairs.append(f"filled {cavities} cavit{'ies' if cavities > 1 else 'y'} thinner than {limit:.2g} mm")
     return concatenated(kept) if cavities else whole

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from calmotion.geometry.distances import triangle_parts
-from calmotion.geometry.nearby_triangles import NearbyTriangles
+from calmotion.geometry.nearby_triangles import NearbyTriangles, unit_normals
 from calmotion.geometry.tetrahedra import Indices, boundary_triangles, tet_volumes
 from calmotion.shot.character import Array, IntArray
 
@@ -62,12 +62,10 @@ def heights(corners: Array, surface: NearbyTriangles) -> tuple[Array, Array, Arr
         Heights above the centers of `PARTS` [m], shape [t, p], NaN where the surface is farther than its reach; unit
         normals of the triangles, shape [t, 3]; and their areas [m^2], shape [t].
     """
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    doubled = np.linalg.norm(normal, axis=1)
-    normal /= np.maximum(doubled, np.finfo(float).tiny)[:, None]
+    normal, area = unit_normals(corners)
     at = np.einsum("pk,tkx->tpx", PARTS, corners)
     gap = surface.closest(at.reshape(-1, 3)).reshape(at.shape) - at
-    return np.einsum("tpx,tx->tp", gap, normal), normal, 0.5 * doubled
+    return np.einsum("tpx,tx->tp", gap, normal), normal, area
 
 
 def _step(points: Array, boundary: IntArray, surface: NearbyTriangles) -> Array:

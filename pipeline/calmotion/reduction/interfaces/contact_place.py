@@ -16,7 +16,7 @@ import numpy as np
 
 from calmotion.geometry.distances import closest_on_triangles, ray_length, triangle_parts
 from calmotion.geometry.nearby_triangles import unit_normals
-from calmotion.geometry.surfaces.slits import facing
+from calmotion.geometry.surfaces.slits import facing_along
 from calmotion.shot.character import Array, BoolArray
 
 LARGEST_GAP = 0.5  # of the size of a body, between its surface and a frame inside its convex hull that touches it
@@ -61,13 +61,13 @@ def contact_place(center: Array, axis: Array, triangles: Array, points: Array) -
     touched = gaps.argmin(keepdims=True)
     normal = unit_normals(triangles[touched])[0]
     slit = ray_length(closest[touched[0]], normal[0], triangles, _ROUNDING * size) <= _SLIT * size and bool(
-        _in_slit(closest[touched], normal, axis, triangles, size)[0]
+        facing_along(axis, closest[touched], normal, triangles, _SLIT * size)[0]
     )
     if inside and gap <= LARGEST_GAP * size and not slit:
         return None
     x, normal = _places(triangles)
     if slit:
-        held = ~_in_slit(x, normal, axis, triangles, size)
+        held = ~facing_along(axis, x, normal, triangles, _SLIT * size)
         x, normal = x[held], normal[held]
     away = x - center
     height = away @ axis
@@ -91,20 +91,6 @@ def contact_place(center: Array, axis: Array, triangles: Array, points: Array) -
     if not len(x):
         return None
     return ContactPlace(x[int(np.hypot(radius, height).argmin())], "face", gap)
-
-
-def _in_slit(places: Array, normals: Array, axis: Array, triangles: Array, size: float) -> BoolArray:
-    """Which places of a surface are on the sides of slits across the axis, shape [n].
-
-    Args:
-        places: [m], shape [n, 3].
-        normals: Outward, unit vectors, shape [n, 3].
-        axis, triangles: As of `contact_place`.
-        size: Of the body [m].
-    """
-    found = np.abs(normals @ axis) > _ALONG
-    found[found] = facing(places[found], normals[found], triangles, _SLIT * size)
-    return np.asarray(found)
 
 
 def inside_hull(points: Array, place: Array, margin: float) -> bool:

@@ -114,8 +114,9 @@ def _nearest_area(
 
     Corners that move onto a sphere change the area by steps, so that the best may not be the last.
     """
-    held = _held(points, boundary_triangles(tets), done)
-    surface = _held_about(points, tets, center, radius, axis)
+    surface = boundary_triangles(tets)
+    held = _held(points, surface, done)
+    surface = _held_about(points, surface, center, radius, axis)
     area, smaller, larger = (_area_within(points, surface, center, part * radius) for part in (1.0, 0.9, 1.1))
     slope = max((larger - smaller) / (0.2 * radius), np.finfo(float).tiny)
     best, least, trial = (points, tets, radius), np.inf, radius
@@ -135,9 +136,8 @@ def _nearest_area(
     return best, least / max(area, np.finfo(float).tiny)
 
 
-def _held_about(points: Array, tets: IntArray, center: Array, radius: float, axis: Array | None) -> IntArray:
-    """The surface of a mesh without what a sphere just reaches and the joint in its center does not hold."""
-    surface = boundary_triangles(tets)
+def _held_about(points: Array, surface: IntArray, center: Array, radius: float, axis: Array | None) -> IntArray:
+    """A surface without what a sphere just reaches and the joint in its center does not hold."""
     return surface if axis is None else surface[~just_reached(points, surface, center, radius, axis)]
 
 
@@ -176,7 +176,7 @@ def _finer_at(
     A sphere about a joint far from the surface is much larger than the disc that it cuts: of a flange of the Panda it
     held six triangles, whose frequency differed by 4% on three meshes.
     """
-    area = _area_within(points, _held_about(points, tets, center, radius, axis), center, radius)
+    area = _area_within(points, _held_about(points, boundary_triangles(tets), center, radius, axis), center, radius)
     longest = _EDGE * min(radius, float(np.sqrt(area / np.pi)) or radius)
     for _ in range(_BISECTIONS):
         triangles = boundary_triangles(tets)

@@ -14,7 +14,7 @@ import numpy as np
 
 from calmotion.geometry.distances import closest_on_triangles, triangle_parts
 from calmotion.geometry.nearby_triangles import unit_normals
-from calmotion.geometry.surfaces.slits import facing
+from calmotion.geometry.surfaces.slits import facing_along
 from calmotion.geometry.tetrahedra import Indices, part_of_each
 from calmotion.shot.character import Array, BoolArray
 
@@ -27,8 +27,7 @@ _FARTHEST = 0.75
 # seven robots bottoms of forks cover 1 to 4 sectors and are at 0.8 to 0.95.
 _SECTORS, _COVERED, _MOSTLY, _AWAY = 16, 12, 0.5, 0.75
 _PARTS = triangle_parts(8)
-# Widest slit, of the radius; least product of the axis and the normal of its sides; share of a part that is its sides
-_SLIT, _ALONG, _MOST = 0.05, np.cos(np.radians(15.0)), 0.5
+_SLIT, _MOST = 0.05, 0.5  # widest slit, of the radius; share of a part that is its sides
 
 
 def just_reached(
@@ -102,9 +101,8 @@ def _slits(corners: Array, part: Indices, radius: float, axis: Array) -> BoolArr
         axis: Unit vector, shape [3].
     """
     normal, area = unit_normals(corners)
-    across = np.flatnonzero(np.abs(normal @ axis) > _ALONG)
-    faced = facing(corners[across].mean(axis=1), normal[across], corners, _SLIT * radius)
+    faced = facing_along(axis, corners.mean(axis=1), normal, corners, _SLIT * radius)
     whole, sides = np.zeros((2, int(part.max()) + 1))
     np.add.at(whole, part, area)
-    np.add.at(sides, part[across[faced]], area[across[faced]])
+    np.add.at(sides, part[faced], area[faced])
     return np.asarray(sides > _MOST * whole)
