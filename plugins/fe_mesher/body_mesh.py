@@ -51,11 +51,13 @@ class MeshOptions:
         element_size: [m]; negative: that of the shot.
         time_limit: Of the processor time of the meshes of one body [s].
         cache: Whether the cache is used.
+        envelope_factor: Factor of the distance that meshes may be from their surfaces.
     """
 
     element_size: float = -1.0
     time_limit: float = TIME_LIMIT
     cache: bool = True
+    envelope_factor: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +229,7 @@ def geometry_of(index: int, body: Body, options: MeshOptions, frames: Sequence[F
         solid = hollowed(solid, settings.wall_thickness, settings.section, body.path)
     solid = replace(solid, repairs=(*repairs, *solid.repairs))
     size = options.element_size if options.element_size > 0.0 else settings.element_size
-    shape = shape_of(solid.points, solid.triangles)
+    shape = replace(shape_of(solid.points, solid.triangles), envelope_factor=options.envelope_factor)
     if size > 0.0:
         refuse_too_many(shape, size, ProcessorTime(options.time_limit), body.path)
     return Volume(solid, shape, size)
@@ -271,7 +273,7 @@ def _shaped(mesh: FEMesh, body: Body, volume: Volume, size: float, attachments: 
 
     solid, shape = volume.solid, volume.shape
     diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
-    limit = _FIT * envelope(size, diagonal, shape.thickness, len(solid.triangles), 0)
+    limit = _FIT * envelope(size, diagonal, shape, len(solid.triangles), 0)
     return shaped(mesh, body, Surface(solid.points, solid.triangles, solid.volume, limit), attachments)
 
 

@@ -155,7 +155,7 @@ def _attempt(solid: Solid, shape: Shape, size: float, number: int, longer: float
         number: 0 first; further ones come closer.
         solid, shape, size, longer: As of `filled`.
     """
-    distance = envelope(size, _diagonal(solid.points), shape.thickness, len(solid.triangles), number)
+    distance = envelope(size, _diagonal(solid.points), shape, len(solid.triangles), number)
     attempt = _Attempt(*simplified(solid, _DETAIL * distance), size, distance)
     if len(attempt.triangles) > DENSE:
         points, triangles = decimated(attempt.points, attempt.triangles, DENSE, _DENSE_DETAIL * distance)
@@ -167,7 +167,7 @@ def _attempt(solid: Solid, shape: Shape, size: float, number: int, longer: float
 
 def _detailed(attempt: _Attempt, solid: Solid, shape: Shape, size: float, longer: float, count: int) -> _Attempt:
     """That of a surface whose details would take too long, with a number of triangles; the others as of `filled`."""
-    narrow = envelope(size, _diagonal(solid.points), shape.thickness, len(solid.triangles), 0)
+    narrow = envelope(size, _diagonal(solid.points), shape, len(solid.triangles), 0)
     distance = max(min(_WIDER * narrow, _OF_WALL * shape.thickness), narrow)
     points, triangles = decimated(attempt.points, attempt.triangles, count, distance)
     return _Attempt(points, triangles, longer * size, distance, detailed=True)
@@ -191,7 +191,7 @@ def _refuse_hopeless(attempt: _Attempt, path: str, time: ProcessorTime) -> None:
 def _coarser(solid: Solid, shape: Shape, attempt: _Attempt) -> _Attempt:
     """That of a mesh that took too long, as far from the surface as one of many triangles is followed."""
     size = _COARSER * attempt.size
-    distance = max(_COARSER * attempt.distance, envelope(size, _diagonal(solid.points), shape.thickness, DENSE, 0))
+    distance = max(_COARSER * attempt.distance, envelope(size, _diagonal(solid.points), shape, DENSE, 0))
     points, triangles = simplified(solid, _DETAIL * distance)
     return _Attempt(points, triangles, size, distance)
 

@@ -37,12 +37,14 @@ class Shape:
         length: Longest side of its bounding box [m].
         volume: [m^3].
         area: [m^2].
+        envelope_factor: Factor of the distance that a mesh may be from the surface.
     """
 
     thickness: float
     length: float
     volume: float
     area: float
+    envelope_factor: float = 1.0
 
 
 def shape_of(points: Array, triangles: Indices) -> Shape:
@@ -120,7 +122,7 @@ def smallest_size(shape: Shape, max_nodes: int) -> float:
     return float(brentq(lambda size: expected_nodes(shape, size) - max_nodes, low, high, xtol=1e-6 * shape.length))
 
 
-def envelope(element_size: float, diagonal: float, thickness: float, triangles: int, attempt: int) -> float:
+def envelope(element_size: float, diagonal: float, shape: Shape, triangles: int, attempt: int) -> float:
     """How far the mesh may leave the surface [m].
 
     It, more than the element size, decides how many elements the small features of a surface cost. Walls keep their
@@ -129,11 +131,11 @@ def envelope(element_size: float, diagonal: float, thickness: float, triangles: 
     Args:
         element_size: [m].
         diagonal: Of the body's bounding box [m].
-        thickness: Of its thinner walls [m].
+        shape: Of the body.
         triangles: Of the surface.
         attempt: 0 first; halved for each further one, since the volume was off.
     """
-    simple = _SIMPLE if element_size < _SHELL * thickness else _FLAT
+    simple = _SIMPLE if element_size < _SHELL * shape.thickness else _FLAT
     part = 100.0 if triangles <= simple else 20.0
-    distance = min(element_size / part, _FORM * diagonal, _WALL * thickness)
-    return max(distance, _LEAST * diagonal) * 0.5**attempt
+    distance = min(element_size / part, _FORM * diagonal, _WALL * shape.thickness)
+    return max(distance, _LEAST * diagonal) * shape.envelope_factor * 0.5**attempt

@@ -24,6 +24,7 @@ from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, l
 from calmotion.benchmarks.scenes.mesher import mesher
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array
+from calmotion.workflow.plain import plain
 
 FREQUENCIES = "largest error of three frequencies"  # what is off
 _QUANTILES = (0.5, 0.8, 0.95, 1.0)
@@ -137,7 +138,7 @@ def tell(rows: Sequence[Any], heads: Sequence[str], cells: Sequence[Sequence[str
         what: As of `honesty`.
     """
     if as_json:
-        print(json.dumps({"rows": [asdict(row) | {"off": None if np.isnan(row.off) else row.off} for row in rows]}))
+        print(json.dumps(plain({"rows": [asdict(row) for row in rows]})))
     else:
         print(f"{markdown(heads, cells)}\n{honesty(rows, what)}")
 

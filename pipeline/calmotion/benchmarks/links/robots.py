@@ -21,7 +21,7 @@ from calmotion.reduction.cache import cache_key
 from calmotion.support.processes.workers import Fault, results_of
 
 _SAME = 1e-7  # distance of points of links that are the same [m]
-_PATIENCE = 30.0  # of the time limit, that a link may take on a busy machine
+PATIENCE = 30.0  # of the time limit, that a link may take on a busy machine
 
 
 def survey_robots(found: Sequence[tuple[Link, str]], options: Namespace, say: Callable[[str], None]) -> list[LinkRow]:
@@ -47,7 +47,7 @@ def survey_robots(found: Sequence[tuple[Link, str]], options: Namespace, say: Ca
     rows = {k: kept[robot, link.name] for k, (link, robot) in enumerate(found) if (robot, link.name) in kept}
     own = [k for k in sorted(set(first)) if any(same == k and n not in rows for n, same in enumerate(first))]
     work = [(found[k][0], found[k][1], options.time_limit, options.geometry_only, pictures[k]) for k in own]
-    start, patience = time.monotonic(), _PATIENCE * options.time_limit + 300.0
+    start, patience = time.monotonic(), PATIENCE * options.time_limit + 300.0
 
     def keep() -> None:
         so_far = {k: rows[k] for k in sorted(rows)}

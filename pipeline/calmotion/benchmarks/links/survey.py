@@ -14,6 +14,7 @@ from calmotion.benchmarks.links.pictures import draw_link
 from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of
 from calmotion.errors import ShotError
 from calmotion.shot import FEMesh
+from calmotion.shot.character import Array
 from calmotion.support.processes.workers import Fault
 
 LIMIT = 20.0  # processor time of a link that is wanted [s]
@@ -157,7 +158,16 @@ def _with_solid(row: LinkRow, geometry: Any, visual: Sequence[Any], frames: Sequ
     )  # fmt: skip
 
 
-def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
+def held_frequencies(mesh: FEMesh, link: Link) -> tuple[Array, int]:
+    """First three frequencies of a link, held by its joint towards the world [Hz], and its nodes.
+
+    Args:
+        mesh: Of the link.
+        link: Free, without that joint.
+
+    Raises:
+        ShotError: The joint holds nothing.
+    """
     from calmotion.reduction.discretization_error import clamped_modes
     from calmotion.reduction.elements.assembly import assemble
     from calmotion.reduction.interfaces.interface_patches import interface_patches
@@ -169,13 +179,18 @@ def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
         model.mesh, attachments_of(link), settings.interface_radius, link.body.path, mesh.patches
     )
     clamped = patches[0].nodes if link.carrier is not None else None
-    f1, f2, f3 = np.sqrt(mesh.quality.stiffness_factor) * clamped_modes(model, 3, clamped)[0]
+    frequencies = np.sqrt(mesh.quality.stiffness_factor) * clamped_modes(model, 3, clamped)[0]
+    return np.asarray(frequencies), len(model.mesh.nodes)
+
+
+def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
+    (f1, f2, f3), nodes = held_frequencies(mesh, link)
     error = mesh.quality.error
     late = [
         note for note in mesh.quality.repairs if "too long" in note or "would exceed" in note or "on a grid" in note
     ]
     return replace(
-        row, source=mesh.quality.source, nodes=len(model.mesh.nodes), volume_error=100.0 * mesh.quality.volume_error,
+        row, source=mesh.quality.source, nodes=nodes, volume_error=100.0 * mesh.quality.volume_error,
         f1=float(f1), f2=float(f2), f3=float(f3), estimate=np.nan if error is None else 100.0 * error,
         note="; ".join(filter(None, (row.note, *late))),
     )  # fmt: skip

@@ -20,6 +20,7 @@ WHAT = {
     "calibration": ("accuracy.calibration", "known parameters of random arms, found from noisy recordings"),
     "takes": ("accuracy.takes", "a robot that is not the model, recorded and refined, take by take"),
     "meshing": ("links.meshing", "links of robots: their solids, meshes, frequencies and errors"),
+    "mesh-spread": ("links.spread", "frequencies of links on meshes that follow their surfaces less and more closely"),
     "mesh-extrapolation": ("links.extrapolation", "links on ever finer meshes: what extrapolations claim and leave"),
     "interface-extrapolation": ("links.interfaces", "the same for interfaces of shots' bodies"),
     "integrators": ("integrators.integrators", "orders and numerical damping of the integrators"),
