@@ -21,12 +21,12 @@ class NearbyTriangles:
     Args:
         points: [m], shape [n, 3].
         triangles: Shape [m, 3].
-        reach: Triangles farther than this from a point are not found [m].
+        reach: Triangles farther than this from a point are not found [m]; also an attribute.
     """
 
     def __init__(self, points: Array, triangles: Indices, reach: float):
         self._corners = np.ascontiguousarray(points[triangles])
-        self._reach = reach
+        self.reach = reach
         low, high = points.min(axis=0) - reach, points.max(axis=0) + reach
         self._low, self._size = low, float((high - low).max()) / _CELLS
         self._count = np.maximum(np.ceil((high - low) / self._size).astype(np.int64), 1)
@@ -44,7 +44,7 @@ class NearbyTriangles:
         found = np.full(points.shape, np.nan)
         near = np.ascontiguousarray(points)
         cells = self._cells(points)
-        _closest(near, cells, self._start, self._listed, self._corners, self._reach, np.zeros(3), found)
+        _closest(near, cells, self._start, self._listed, self._corners, self.reach, np.zeros(3), found)
         return found
 
     def faced(self, points: Array, directions: Array, skip: float) -> tuple[Array, Array]:
@@ -62,7 +62,7 @@ class NearbyTriangles:
         x, normal = self._corners, self._normals
         distance, product = np.full(len(points), np.inf), np.zeros(len(points))
         origins, ways = np.ascontiguousarray(points), np.ascontiguousarray(directions)
-        bounds = (self._reach, skip)
+        bounds = (self.reach, skip)
         _faced(origins, ways, self._cells(points), self._start, self._listed, x, normal, bounds, distance, product)
         return distance, product
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from calmotion.geometry.grids.boundary_fit import fitted
 from calmotion.geometry.grids.missing_volume import missing_volume
+from calmotion.geometry.nearby_triangles import NearbyTriangles
 from calmotion.geometry.tetrahedra import Indices, measure_quality
 from calmotion.reduction.interfaces.cut_patches import with_rims
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
@@ -51,13 +52,13 @@ def shaped(mesh: FEMesh, body: Body, surface: Surface, attachments: Sequence[Att
         attachments: Frames of the joints and targets of the body; without any, nothing is cut.
     """
     points, tets, rims = with_rims(mesh.points, mesh.tets, body, attachments, surface)
-    moved = fitted(points, tets, surface.points, surface.triangles, surface.limit)
+    near = NearbyTriangles(surface.points, surface.triangles, surface.limit)
+    moved = fitted(points, tets, near)
     cut, fit = (_with(mesh, x, tets, rims, surface.volume) for x in (points, moved))
     # a surface that runs through itself is not what the elements fill
     if fit.quality.volume_error > cut.quality.volume_error:
         return cut
-    missing = missing_volume(fit.points, fit.tets, surface.points, surface.triangles, surface.limit)
-    return replace(fit, missing=missing)
+    return replace(fit, missing=missing_volume(fit.points, fit.tets, near))
 
 
 def _with(mesh: FEMesh, points: Array, tets: IntArray, rims: Sequence[tuple[Array, IntArray]], volume: float) -> FEMesh:

@@ -9,15 +9,16 @@ from calmotion.accuracy.element_size import Shape, expected_nodes, smallest_size
 from calmotion.errors import ShotError
 from calmotion.geometry.grids.boundary_fit import fitted
 from calmotion.geometry.grids.grid_tets import GRID, grid_tets
+from calmotion.geometry.nearby_triangles import NearbyTriangles
 from calmotion.geometry.tetrahedra import measure_quality
 from calmotion.shot import Body, FEMesh
 
 from ..repair import Solid
 from ..tetwild import ProcessorTime
 
-# Largest number of nodes of ten-node tetrahedra: twice as many where walls are
-# thin, for some ten seconds (with 16,000, links took 21 to 34 s and were no more exact); walls that are thinner than
-# the spacing have gaps. A longer limit of time allows more.
+# Largest number of nodes of ten-node tetrahedra: twice as many where walls are thin, for some ten seconds (with 16,000,
+# links took 21 to 34 s and were no more exact); walls that are thinner than the spacing have gaps. A longer limit of
+# time allows more.
 _GRID_NODES, _GRID_TIME = 10_000, 60.0
 _GRID_WALL = 0.8  # of the thinner walls: spacing with which they have none
 # Factor of the spacing while the volume error is larger than that; largest way of a corner to the surface
@@ -61,7 +62,8 @@ def on_grid(index: int, body: Body, solid: Solid, shape: Shape, size: float, nod
     while True:
         try:
             points, tets = grid_tets(solid.points, solid.triangles, spacing)
-            points = fitted(points, tets, solid.points, solid.triangles, _MOVED * spacing)  # with its edges
+            near = NearbyTriangles(solid.points, solid.triangles, _MOVED * spacing)
+            points = fitted(points, tets, near)  # with its edges
         except ValueError:
             pass
         else:

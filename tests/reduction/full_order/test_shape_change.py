@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.geometry.grids.missing_volume import missing_volume
+from calmotion.geometry.nearby_triangles import NearbyTriangles
 from calmotion.geometry.tetrahedra import boundary_triangles, measure_quality
 from calmotion.reduction.full_order.mesh_estimates import frequency_estimate, load_estimate
 from calmotion.reduction.full_order.mesh_extrapolation import Estimate, by_shape
@@ -26,7 +27,8 @@ def mesh_of(helpers, size, missing_of=None):
         return mesh
     corners, bricks = helpers.box((1, 1, 1), missing_of)
     corners = np.asarray(corners) - [0.0, 0.5 * missing_of[1], 0.5 * missing_of[2]]
-    found = missing_volume(mesh.points, mesh.tets, corners, boundary_triangles(bricks), 2e-3)
+    surface = NearbyTriangles(corners, boundary_triangles(bricks), 2e-3)
+    found = missing_volume(mesh.points, mesh.tets, surface)
     return replace(mesh, missing=found)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from calmotion.geometry.distances import triangle_parts
 from calmotion.geometry.nearby_triangles import NearbyTriangles, unit_normals
-from calmotion.geometry.tetrahedra import Indices, boundary_triangles, tet_volumes
+from calmotion.geometry.tetrahedra import boundary_triangles, tet_volumes
 from calmotion.shot.character import Array, IntArray
 
 _PASSES = 2
@@ -23,21 +23,19 @@ _THINNEST = 0.5  # least part of its volume that a tetrahedron keeps
 PARTS = triangle_parts(6)  # of each triangle, at whose centers the distance is measured
 
 
-def fitted(points: Array, tets: IntArray, surface_points: Array, triangles: Indices, limit: float) -> Array:
+def fitted(points: Array, tets: IntArray, surface: NearbyTriangles) -> Array:
     """Points of the tetrahedra with the boundary moved to the best fit of a surface, by least squares of the distance.
 
     Args:
         points: [m], shape [n, 3].
         tets: Shape [m, 4], positive volumes.
-        surface_points: Of the closed surface that was meshed [m], shape [k, 3].
-        triangles: Of the surface, shape [l, 3].
-        limit: Largest distance of the two [m]: where they are farther apart, as in a groove that the mesh omits, the
-            boundary is not fitted, and no corner moves farther.
+        surface: The closed surface that was meshed. Where the two are farther apart than its reach, as in a groove that
+            the mesh omits, the boundary is not fitted, and no corner moves farther.
 
     Returns:
         The points [m], shape [n, 3].
     """
-    boundary, surface = boundary_triangles(tets), NearbyTriangles(surface_points, triangles, limit)
+    boundary, limit = boundary_triangles(tets), surface.reach
     volumes, moved = tet_volumes(points, tets), points
     for _ in range(_PASSES):
         moved = moved + _step(moved, boundary, surface)

@@ -7,7 +7,7 @@ import numpy as np
 from calmotion.geometry.distances import triangle_parts
 from calmotion.geometry.grids.boundary_fit import PARTS, heights
 from calmotion.geometry.nearby_triangles import NearbyTriangles
-from calmotion.geometry.tetrahedra import Indices, boundary_triangles
+from calmotion.geometry.tetrahedra import boundary_triangles
 from calmotion.shot.character import Array, IntArray
 from calmotion.shot.meshes import MissingVolume
 
@@ -15,20 +15,17 @@ _PLACES = triangle_parts(2)  # of a triangle, for which the volume is kept
 _EXACT = 1e-6  # distance that is none, of the diagonal
 
 
-def missing_volume(
-    points: Array, tets: IntArray, surface_points: Array, triangles: Indices, limit: float
-) -> MissingVolume | None:
+def missing_volume(points: Array, tets: IntArray, surface: NearbyTriangles) -> MissingVolume | None:
     """The volume between the boundary of tetrahedra and a surface; None where they agree.
 
     Args:
         points: [m], shape [n, 3].
         tets: Shape [m, 4], positive volumes.
-        surface_points: Of the closed surface that was meshed [m], shape [k, 3].
-        triangles: Of the surface, outward, shape [l, 3].
-        limit: Largest distance of the two [m]: where they are farther apart nothing is known, and nothing counted.
+        surface: The closed, outward surface that was meshed. Where the two are farther apart than its reach nothing is
+            known, and nothing counted.
     """
     corners = points[boundary_triangles(tets)]
-    height, _, area = heights(corners, NearbyTriangles(surface_points, triangles, limit))
+    height, _, area = heights(corners, surface)
     volumes = area[:, None] / len(PARTS) * (np.nan_to_num(height) @ _NEAREST)
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     counted = np.abs(volumes) > _EXACT * diagonal * area[:, None] / len(_PLACES)

@@ -16,7 +16,7 @@ from calmotion.reduction.full_order.shape_change import shape_forms
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.material_laws.choice import amplitudes
 from calmotion.reduction.reduce import LinearModes
-from calmotion.shot.character import Body, Frame, IntArray
+from calmotion.shot.character import Array, Body, Frame, IntArray
 from calmotion.shot.meshes import CutPatch, FEMesh, MissingVolume
 
 _MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
@@ -55,9 +55,9 @@ def load_estimate(linear: LinearModes, body: Body, missing: MissingVolume | None
     if missing is None:
         return found
     stiffer, heavier, whole = shape_forms(linear.model.mesh, body.flexible.material, missing, all_shapes)
-    changed = np.diag(stiffer)[k:] / squares - np.diag(heavier)[k:]
     along_interfaces = to_unit.T @ stiffer[:k, :k] @ to_unit
-    return replace(found, shape_squares=changed, shape_whole=whole[k:] / squares, shape_stiffness=along_interfaces)
+    found = replace(found, shape_stiffness=along_interfaces)
+    return _with_shape(found, np.diag(stiffer)[k:], np.diag(heavier)[k:], whole[k:])
 
 
 def frequency_estimate(
@@ -95,7 +95,18 @@ def frequency_estimate(
     if mesh.missing is None:
         return found
     stiffer, heavier, whole = shape_forms(model.mesh, body.flexible.material, mesh.missing, modes)
-    return replace(found, shape_squares=np.diag(stiffer) / squares - np.diag(heavier), shape_whole=whole / squares)
+    return _with_shape(found, np.diag(stiffer), np.diag(heavier), whole)
+
+
+def _with_shape(estimate: Estimate, stiffer: Array, heavier: Array, whole: Array) -> Estimate:
+    """The estimate with what missing volume changes about its modes, of mass one each.
+
+    Args:
+        estimate: Of the mesh.
+        stiffer, heavier, whole: Stiffness and mass that it adds to each mode, and `shape_forms`' third, shape [k].
+    """
+    squares = estimate.squares
+    return replace(estimate, shape_squares=stiffer / squares - heavier, shape_whole=whole / squares)
 
 
 def _clamped_nodes(

@@ -21,6 +21,7 @@ _USUAL_ALONG = 0.5  # the usual error over its estimate in one direction of an i
 _FINE = 0.005  # error of the deflection, as estimated on the mesh before, below which estimates are reliable
 _SHAPE_LEFT = 0.2  # of what all places change where volume is missing or too much, that the sum of them may be off by
 _STIFFEST = 0.05  # excess of the stiffness of an interface in any direction that is extrapolated
+_NOTHING = np.zeros((0, 0))  # form without directions
 
 
 @dataclass(frozen=True)
@@ -74,13 +75,13 @@ class Estimate:
     weights: Array
     indicators: Array
     nodes: int
-    interfaces: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    forms: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    interfaces: Array = field(default_factory=lambda: _NOTHING)
+    forms: Array = field(default_factory=lambda: _NOTHING)
     wrenches: Array = field(default_factory=lambda: np.zeros(0))
     levers: Array = field(default_factory=lambda: np.zeros(0))
     shape_squares: Array = field(default_factory=lambda: np.zeros(0))
     shape_whole: Array = field(default_factory=lambda: np.zeros(0))
-    shape_stiffness: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    shape_stiffness: Array = field(default_factory=lambda: _NOTHING)
 
 
 def extrapolation(estimates: Sequence[Estimate], one_factor: bool = False) -> tuple[float, float]:
@@ -133,7 +134,7 @@ def by_shape(estimate: Estimate) -> tuple[float, float]:
 
 
 def interface_factors(
-    own: Estimate, estimates: Sequence[Estimate], shape: Array | None = None
+    own: Estimate, estimates: Sequence[Estimate], shape: Array = _NOTHING
 ) -> tuple[Array, Array, float] | None:
     """`MeshQuality.interface_factors` of a mesh by ever finer ones, extrapolated in each direction, and their errors.
 
@@ -143,7 +144,8 @@ def interface_factors(
     Args:
         own: Of the mesh.
         estimates: Of it and finer ones.
-        shape: Stiffness that the missing volume adds, shape [6p, 6p], which is part of no error; empty: none.
+        shape: Stiffness that the missing volume adds, shape [6p, 6p], which is part of no error; empty where nothing is
+            known to be missing.
 
     Returns:
         The factors, `MeshQuality.interface_softest`, and the relative error of the compliance as the targets see it;
@@ -173,7 +175,7 @@ def interface_factors(
     error = float(left @ target_shares(G, fine))
     wrenches = K @ G
     K = K - (wrenches * excess) @ wrenches.T
-    if shape is not None and len(shape):
+    if len(shape):
         K = K + shape
     softest = K - (wrenches * left) @ wrenches.T
     return np.asarray(np.linalg.solve(own.interfaces, K)), np.asarray(np.linalg.solve(own.interfaces, softest)), error
