@@ -218,13 +218,17 @@ def _outward(parts: list[Part], path: str, repairs: list[str]) -> list[Part]:
         repairs.append(f"{path}: reoriented the surface, which was inside out")
         parts = [_inverted(part) for part in parts]
     solids = sorted((part for part in parts if part.volume > 0.0), key=lambda part: part.volume)
+    turned = 0
     for part in [part for part in parts if part.volume < 0.0]:
         around = [i for i, s in enumerate(solids) if s.volume > -part.volume and _contains(s, part.points[0])]
         if around:
             solids[around[0]] = concatenated([solids[around[0]], part])
         else:
-            repairs.append(f"{path}: reoriented a part that was inside out")
+            turned += 1
             solids.append(_inverted(part))
+    if turned:
+        told = "a part that was" if turned == 1 else f"{turned} parts that were"
+        repairs.append(f"{path}: reoriented {told} inside out")
     inside = sum(any(t.volume > s.volume and _contains(t, s.points[0]) for t in solids) for s in solids)
     if inside:
         repairs.append(

@@ -53,6 +53,17 @@ def test_a_mesh_inside_out_and_single_flipped_triangles_are_repaired(package):
     assert any("orientation" in repair for repair in made.repairs)
 
 
+@pytest.mark.parametrize(("count", "told"), [(1, "a part that was"), (2, "2 parts that were")])
+def test_parts_that_are_inside_out_are_counted(package, count, told):
+    whole = box((0.2, 0.02, 0.02))
+    knobs = [box((0.01, 0.01, 0.02), at=(0.05 * k, 0.0, -0.019)) for k in range(count)]  # 1 mm in the box
+    for knob in knobs:
+        knob.invert()
+    made = solid(package, surface(trimesh.util.concatenate([whole, *knobs])))
+    assert made.volume == pytest.approx(8e-5 + count * 1.9e-6)
+    assert [repair.split(": ")[1] for repair in made.repairs] == [f"reoriented {told} inside out"]
+
+
 def test_small_holes_loose_corners_and_scraps_are_repaired_and_reported(package):
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.05)
     faces = np.array(ball.faces)[3:]
