@@ -123,7 +123,7 @@ def _smallest(estimates: Sequence[Estimate], nodes: float, enough: float) -> tup
     """
     few = max([0, *(k for k, one in enumerate(estimates) if one.nodes <= nodes)])
     for k in range(few, len(estimates)):
-        ratios, weights = mode_ratios(estimates[k], estimates[-1])
+        ratios, weights = mode_ratios(estimates[k], estimates[-1], complete=True)
         factor = float(weights @ ratios)
         apart = float(np.abs(ratios / factor - 1.0).max())
         if apart <= enough:
