@@ -6,6 +6,7 @@ from calmotion.reduction.full_order.mesh_extrapolation import (
     Estimate,
     extrapolation,
     interface_factors,
+    mode_ratios,
 )
 
 
@@ -26,6 +27,21 @@ def test_stiffness_is_extrapolated_by_its_change_and_by_the_estimated_error():
     assert extrapolation(meshes[:1]) == (0.0, 0.04)
     stiffer = estimate(0.005, exact * 1.02)  # than the coarser mesh, which refinement does not do
     assert extrapolation([meshes[2], stiffer]) == (0.0, 0.005)
+
+
+def test_modes_that_are_not_those_of_the_coarser_mesh_are_not_compared():
+    coarse, fine = estimate(0.02, [4.04, 9.09]), estimate(0.01, [4.02, 9.045])
+    ratios, weights = mode_ratios(coarse, fine)
+    assert ratios == pytest.approx([4.02 / 4.04, 9.045 / 9.09]) and weights == pytest.approx([0.75, 0.25])
+    # loads choose another basis: a mode above, or one that the other mesh has left out, is in the place of the second
+    for other in (9.9, 16.0, 6.0):
+        found = estimate(0.01, [4.02, other])
+        ratios, weights = mode_ratios(coarse, found)
+        assert weights == pytest.approx([1.0, 0.0]) and weights @ ratios == pytest.approx(4.02 / 4.04)
+        assert extrapolation([coarse, found])[0] == pytest.approx(extrapolation([coarse, fine])[0], rel=1e-3)
+        assert mode_ratios(coarse, found, complete=True)[1] == pytest.approx([0.75, 0.25])
+    strange = estimate(0.01, [6.0, 16.0])
+    assert not mode_ratios(coarse, strange)[1].any() and extrapolation([coarse, strange]) == (0.0, 0.01)
 
 
 def test_a_change_that_is_not_the_estimate_is_less_certain():
