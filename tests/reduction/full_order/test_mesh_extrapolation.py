@@ -40,6 +40,8 @@ def test_modes_that_are_not_those_of_the_coarser_mesh_are_not_compared():
         assert weights == pytest.approx([1.0, 0.0]) and weights @ ratios == pytest.approx(4.02 / 4.04)
         assert extrapolation([coarse, found])[0] == pytest.approx(extrapolation([coarse, fine])[0], rel=1e-3)
         assert mode_ratios(coarse, found, complete=True)[1] == pytest.approx([0.75, 0.25])
+    # a mesh whose estimate was far too small
+    assert mode_ratios(coarse, estimate(0.01, [3.2, 7.2]))[1] == pytest.approx([0.75, 0.25])
     strange = estimate(0.01, [6.0, 16.0])
     assert not mode_ratios(coarse, strange)[1].any() and extrapolation([coarse, strange]) == (0.0, 0.01)
 

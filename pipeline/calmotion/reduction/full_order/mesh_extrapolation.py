@@ -22,7 +22,7 @@ _FINE = 0.005  # error of the deflection, as estimated on the mesh before, below
 _SHAPE_LEFT = 0.2  # of what all places change where volume is missing or too much, that the sum of them may be off by
 _STIFFEST = 0.05  # excess of the stiffness of an interface in any direction that is extrapolated
 # Of the estimated error of a mesh: by how much a mode of a finer one is stiffer, or softer, and still the same mode
-_STIFFER, _SOFTER = 0.1, 2.0
+_STIFFER, _SOFTER = 0.1, 3.0
 _NOTHING = np.zeros((0, 0))  # form without directions
 
 
@@ -206,7 +206,8 @@ def mode_ratios(coarse: Estimate, fine: Estimate, complete: bool = False) -> tup
 
     Modes that loads excite are chosen on each mesh: one mesh may lack a mode of the other, or have a mixture of several
     in its place. Those are not compared; a random arm became 13% too stiff by one of 203 Hz in place of 194 Hz, and
-    another one 14 times as stiff. A finer mesh is softer, by no more than about its error.
+    another one 14 times as stiff. A finer mesh is softer, by no more than about its error; where it is softer in all
+    modes by more, the estimate is wrong, and all count.
 
     Args:
         complete: Whether both have all of their first modes.
@@ -214,8 +215,9 @@ def mode_ratios(coarse: Estimate, fine: Estimate, complete: bool = False) -> tup
     count = min(len(coarse.squares), len(fine.squares))
     ratios, weights = fine.squares[:count] / coarse.squares[:count], fine.weights[:count]
     if not complete:
-        same = (ratios < 1.0 + _STIFFER * coarse.error) & (ratios > 1.0 - _SOFTER * coarse.error)
-        weights = np.where(same, weights, 0.0)
+        softer = ratios < 1.0 + _STIFFER * coarse.error
+        same = softer & (ratios > 1.0 - _SOFTER * coarse.error)
+        weights = np.where(same if weights[same].any() else softer, weights, 0.0)
     return ratios, weights / max(weights.sum(), np.finfo(float).tiny)
 
 
