@@ -30,7 +30,7 @@ def test_meshes_of_a_reference_are_regular_and_of_the_same_links():
 
 
 def test_links_that_are_alike_take_the_same_stiffness_from_finer_meshes():
-    """Loads choose other bases on finer meshes of the first link: it took 0.925 of its stiffness, the other one 0.982."""
+    """Loads choose other bases on finer meshes of the first link: it took a factor of 0.925, the other one 0.982."""
     shot = drawn(145)
     options = estimates.RunSettings(tolerance=shot.tolerance)
     reduction = estimates.reduction_for(shot.character, shot.animation, shot.meshes, options)
