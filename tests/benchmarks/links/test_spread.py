@@ -51,3 +51,9 @@ def test_a_table_has_the_difference_of_each_envelope_and_why_there_is_no_mesh():
 def test_links_that_cannot_be_read_or_meshed_end_with_an_error(tmp_path, capsys):
     assert spread.main([str(tmp_path / "missing.usda")]) == 1
     assert "missing.usda" in capsys.readouterr().err
+
+
+def test_factors_are_positive(capsys):
+    with pytest.raises(SystemExit):
+        spread.main(["arm.usda", "--factors", "0.5", "0"])
+    assert "positive" in capsys.readouterr().err

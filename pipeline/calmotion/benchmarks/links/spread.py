@@ -145,13 +145,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     output_options(parser, csv="a row for each mesh", markdown=True)
     parser.add_argument("--resume", action="store_true", help="keep the rows that the file of --csv has")
     options = parser.parse_args(arguments)
+    if not all(factor > 0.0 for factor in options.factors):
+        parser.error("--factors of the envelope are positive")
     rows: list[SpreadRow] = resumed_rows(parser, options, SpreadRow)
     found = [(link, Path(file_of(source)).stem) for source, link in links_of_all(options.links, say)]
     first = first_of_its_kind([link for link, _ in found])
     known = {(row.robot, row.link, row.factor) for row in rows}
     work = [
         (*found[k], factor, options.time_limit)
-        for k in sorted(set(first)) for factor in (1.0, *options.factors)
+        for k in sorted(set(first)) for factor in dict.fromkeys((1.0, *options.factors))
         if (found[k][1], found[k][0].name, factor) not in known
     ]  # fmt: skip
     for index, result in results_of(spread_row, work, options.jobs, PATIENCE * options.time_limit):
