@@ -31,7 +31,9 @@ def test_a_bar_has_the_same_frequencies_within_other_envelopes(tmp_path, capsys)
 
 def test_a_table_has_the_difference_of_each_envelope_and_why_there_is_no_mesh():
     def row(factor, f1, f2, f3, link="arm", nodes=100, note=""):
-        return spread.SpreadRow("robot", link, factor, "visual surface", nodes, 1.0, f1, f2, f3, 0.7, note)
+        return spread.SpreadRow(
+            "robot", link, "visual surface", nodes=nodes, f1=f1, f2=f2, f3=f3, estimate=0.7, note=note, factor=factor
+        )
 
     missing = row(0.5, np.nan, np.nan, np.nan, nodes=0, note="takes too long")
     rows = [row(1.5, 101.0, 196.2, 300.0), row(1.0, 100.0, 200.0, 300.0), missing, row(1.0, 5.0, 6.0, 7.0, "lone")]

@@ -21,7 +21,7 @@ from calmotion.reduction.cache import cache_key
 from calmotion.support.processes.workers import Fault, results_of
 
 _SAME = 1e-7  # distance of points of links that are the same [m]
-PATIENCE = 30.0  # of the time limit, that a link may take on a busy machine
+_PATIENCE = 30.0  # of the time limit, that a link may take on a busy machine
 
 
 def survey_robots(found: Sequence[tuple[Link, str]], options: Namespace, say: Callable[[str], None]) -> list[LinkRow]:
@@ -47,7 +47,7 @@ def survey_robots(found: Sequence[tuple[Link, str]], options: Namespace, say: Ca
     rows = {k: kept[robot, link.name] for k, (link, robot) in enumerate(found) if (robot, link.name) in kept}
     own = [k for k in sorted(set(first)) if any(same == k and n not in rows for n, same in enumerate(first))]
     work = [(found[k][0], found[k][1], options.time_limit, options.geometry_only, pictures[k]) for k in own]
-    start, patience = time.monotonic(), PATIENCE * options.time_limit + 300.0
+    start, longest = time.monotonic(), patience(options.time_limit)
 
     def keep() -> None:
         so_far = {k: rows[k] for k in sorted(rows)}
@@ -59,7 +59,7 @@ def survey_robots(found: Sequence[tuple[Link, str]], options: Namespace, say: Ca
             text = page(list(so_far.values()), shown, _command(options))
             Path(options.page).write_text(text, encoding="utf-8")
 
-    for done_work, (index, result) in enumerate(results_of(survey_link, work, options.jobs, patience), 1):
+    for done_work, (index, result) in enumerate(results_of(survey_link, work, options.jobs, longest), 1):
         link, robot = found[own[index]]
         row = faulty_row(link, robot, result) if isinstance(result, Fault) else result
         for k, same in enumerate(first):
@@ -71,6 +71,11 @@ def survey_robots(found: Sequence[tuple[Link, str]], options: Namespace, say: Ca
     if not work:
         keep()
     return [rows[k] for k in sorted(rows)]
+
+
+def patience(time_limit: float) -> float:
+    """After which the process of a link is ended [s], by the limit of its processor time [s]."""
+    return _PATIENCE * time_limit + 300.0
 
 
 def _resumed(options: Namespace) -> list[LinkRow]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +20,10 @@ import numpy as np
 from calmotion.benchmarks.common.messages import say
 from calmotion.benchmarks.common.parsers import links_parser, output_options
 from calmotion.benchmarks.common.tables import markdown, resumed_rows, write_rows
-from calmotion.benchmarks.common.timing import processor_time
-from calmotion.benchmarks.links.robots import PATIENCE, file_of, first_of_its_kind
-from calmotion.benchmarks.links.survey import held_frequencies
-from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, links_of_all
+from calmotion.benchmarks.links.robots import file_of, first_of_its_kind, patience
+from calmotion.benchmarks.links.survey import LinkRow, faulty_row, survey_row
+from calmotion.benchmarks.scenes.links import Link, links_of_all
 from calmotion.benchmarks.scenes.mesher import mesher
-from calmotion.errors import ShotError
 from calmotion.shot.character import Array
 from calmotion.support.processes.workers import Fault, results_of
 from calmotion.workflow.plain import plain
@@ -34,31 +32,14 @@ _WANTED = 2.0  # largest difference that is wanted [%]
 
 
 @dataclass(frozen=True)
-class SpreadRow:
-    """One mesh of one link.
+class SpreadRow(LinkRow):
+    """One mesh of one link; the others as of `LinkRow`.
 
     Attributes:
-        robot, link: Names.
         factor: Of the distance that the mesh may be from its surface; 1: the automatic mesh.
-        source: What its solid was made of; empty where there is no mesh.
-        nodes: Of the ten-node tetrahedra.
-        seconds: Processor time of the mesh [s].
-        f1, f2, f3: First frequencies, held by the joint towards the world, in polyamide [Hz].
-        estimate: Error of the frequencies that is estimated [%].
-        note: Why there is no mesh.
     """
 
-    robot: str
-    link: str
-    factor: float
-    source: str = ""
-    nodes: int = 0
-    seconds: float = np.nan
-    f1: float = np.nan
-    f2: float = np.nan
-    f3: float = np.nan
-    estimate: float = np.nan
-    note: str = ""
+    factor: float = 1.0
 
 
 def spread_row(link: Link, robot: str, factor: float, time_limit: float) -> SpreadRow:
@@ -70,20 +51,7 @@ def spread_row(link: Link, robot: str, factor: float, time_limit: float) -> Spre
         factor: Of the distance that the mesh may be from its surface.
         time_limit: Processor time of the mesh [s].
     """
-    maker = mesher()
-    body, frames = replace(link.body, mass=link.mass), frames_of(link)
-    options = maker.MeshOptions(time_limit=time_limit, cache=False, envelope_factor=factor)
-    row, begin = SpreadRow(robot, link.name, factor), processor_time()
-    try:
-        mesh = maker.mesh_body(0, body, options, frames, attachments_of(link))
-        row = replace(row, seconds=processor_time() - begin)
-        (f1, f2, f3), nodes = held_frequencies(mesh, link)
-    except ShotError as problem:
-        return replace(row, note=str(problem))
-    error = np.nan if mesh.quality.error is None else 100.0 * mesh.quality.error
-    return replace(
-        row, source=mesh.quality.source, nodes=nodes, f1=float(f1), f2=float(f2), f3=float(f3), estimate=error
-    )
+    return SpreadRow(**asdict(survey_row(link, robot, mesher(), time_limit, envelope_factor=factor)), factor=factor)
 
 
 def differences(rows: Sequence[SpreadRow]) -> Array:
@@ -156,12 +124,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for k in sorted(set(first)) for factor in dict.fromkeys((1.0, *options.factors))
         if (found[k][1], found[k][0].name, factor) not in known
     ]  # fmt: skip
-    for index, result in results_of(spread_row, work, options.jobs, PATIENCE * options.time_limit):
+    for index, result in results_of(spread_row, work, options.jobs, patience(options.time_limit)):
         link, robot, factor, _ = work[index]
-        row = SpreadRow(robot, link.name, factor, note=result.reason) if isinstance(result, Fault) else result
-        rows.append(row)
-        what = f"{row.f1:.4g} Hz, {row.nodes} nodes" if row.nodes else row.note
-        say(f"[{len(rows) - len(known)}/{len(work)}] {robot} {link.name}, envelope times {factor:g}: {what}")
+        if isinstance(result, Fault):
+            result = SpreadRow(**asdict(faulty_row(link, robot, result)), factor=factor)
+        rows.append(result)
+        say(f"[{len(rows) - len(known)}/{len(work)}] {robot} {link.name}, envelope times {factor:g}: {result.outcome}")
         if options.csv:
             write_rows(options.csv, SpreadRow, rows)
     shown = table(rows)

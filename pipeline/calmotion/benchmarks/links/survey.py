@@ -14,7 +14,6 @@ from calmotion.benchmarks.links.pictures import draw_link
 from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of
 from calmotion.errors import ShotError
 from calmotion.shot import FEMesh
-from calmotion.shot.character import Array
 from calmotion.support.processes.workers import Fault
 
 LIMIT = 20.0  # processor time of a link that is wanted [s]
@@ -96,8 +95,9 @@ def same_row(row: LinkRow, link: Link, robot: str) -> LinkRow:
 
 
 def survey_row(
-    link: Link, robot: str, mesher: Any, time_limit: float, geometry_only: bool = False, picture: str = ""
-) -> LinkRow:
+    link: Link, robot: str, mesher: Any, time_limit: float, geometry_only: bool = False, picture: str = "",
+    envelope_factor: float = 1.0,
+) -> LinkRow:  # fmt: skip
     """The row of a link; what is wrong with it is in its note.
 
     Args:
@@ -107,6 +107,7 @@ def survey_row(
         time_limit: Processor time of its meshes [s].
         geometry_only: Whether its solid is made but not meshed.
         picture: File of a picture of its mesh and interface patches; empty for none.
+        envelope_factor: Factor of the distance that the mesh may be from its surface.
     """
     from calmotion.reduction.cache import recomputed
 
@@ -121,7 +122,7 @@ def survey_row(
         return replace(row, source="none", note="no geometry and no joints")
     begin = processor_time()
     try:
-        options = mesher.MeshOptions(time_limit=time_limit, cache=False)
+        options = mesher.MeshOptions(time_limit=time_limit, cache=False, envelope_factor=envelope_factor)
         geometry = mesher.geometry_of(0, body, options, frames)
         row = _with_solid(row, geometry, visual, frames)
         if not geometry_only:
@@ -158,16 +159,7 @@ def _with_solid(row: LinkRow, geometry: Any, visual: Sequence[Any], frames: Sequ
     )  # fmt: skip
 
 
-def held_frequencies(mesh: FEMesh, link: Link) -> tuple[Array, int]:
-    """First three frequencies of a link, held by its joint towards the world [Hz], and its nodes.
-
-    Args:
-        mesh: Of the link.
-        link: Free, without that joint.
-
-    Raises:
-        ShotError: The joint holds nothing.
-    """
+def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
     from calmotion.reduction.discretization_error import clamped_modes
     from calmotion.reduction.elements.assembly import assemble
     from calmotion.reduction.interfaces.interface_patches import interface_patches
@@ -179,18 +171,13 @@ def held_frequencies(mesh: FEMesh, link: Link) -> tuple[Array, int]:
         model.mesh, attachments_of(link), settings.interface_radius, link.body.path, mesh.patches
     )
     clamped = patches[0].nodes if link.carrier is not None else None
-    frequencies = np.sqrt(mesh.quality.stiffness_factor) * clamped_modes(model, 3, clamped)[0]
-    return np.asarray(frequencies), len(model.mesh.nodes)
-
-
-def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
-    (f1, f2, f3), nodes = held_frequencies(mesh, link)
+    f1, f2, f3 = np.sqrt(mesh.quality.stiffness_factor) * clamped_modes(model, 3, clamped)[0]
     error = mesh.quality.error
     late = [
         note for note in mesh.quality.repairs if "too long" in note or "would exceed" in note or "on a grid" in note
     ]
     return replace(
-        row, source=mesh.quality.source, nodes=nodes, volume_error=100.0 * mesh.quality.volume_error,
+        row, source=mesh.quality.source, nodes=len(model.mesh.nodes), volume_error=100.0 * mesh.quality.volume_error,
         f1=float(f1), f2=float(f2), f3=float(f3), estimate=np.nan if error is None else 100.0 * error,
         note="; ".join(filter(None, (row.note, *late))),
     )  # fmt: skip
