@@ -55,16 +55,20 @@ def test_a_thin_slit_is_filled_and_the_rest_of_the_surface_stays(package):
     assert made.bounds == pytest.approx(bar.bounds, abs=beside * 1.01)
 
 
-def test_slits_stay_where_fillings_would_make_too_many_triangles(package, monkeypatch):
+def test_a_grid_closes_slits_where_fillings_would_make_too_many_triangles(package, monkeypatch):
     bar, slits = slit_bar(THIN), package("sources.slits")
-    whole, repairs = filled(package, bar)
-    assert repairs != []
-    for spare in (0, -1):
-        monkeypatch.setattr(slits, "_BESIDES", len(whole.faces) - int(slits._MORE * len(bar.faces)) + spare)
-        made, repairs = filled(package, bar)
-        kept = spare < 0
-        assert np.array_equal(made.faces, bar.faces if kept else whole.faces) and len(repairs) == 1
-        assert repairs[0].startswith("left 1 slit of up to 0.04 mm open, since" if kept else "filled 1 slit of")
+    whole, _ = filled(package, bar)
+    monkeypatch.setattr(slits, "_BESIDES", len(whole.faces) - int(slits._MORE * len(bar.faces)))
+    assert np.array_equal(filled(package, bar)[0].faces, whole.faces)
+    monkeypatch.setattr(slits, "_BESIDES", slits._BESIDES - 1)
+    made, repairs = filled(package, bar)
+    assert len(repairs) == 1 and repairs[0].startswith("closed 1 slit and all gaps of up to 2 mm on a grid,")
+    assert boundary_walks(np.asarray(made.faces)) == []
+    edge = slits._SPACING * SIZE
+    assert made.volume == pytest.approx(LENGTH * SIDE**2, abs=4.0 * (LENGTH + 2.0 * SIDE) * edge**2)
+    assert np.abs(made.bounds - bar.bounds).max() < edge
+    middle = np.abs(made.vertices[:, 0]) < 0.4 * LENGTH
+    assert np.abs(made.vertices[middle][:, 1:]).max(axis=1).min() > SIDE / 2 - edge
 
 
 @pytest.mark.parametrize("width", [WIDE, 2.2e-3 * SIZE])

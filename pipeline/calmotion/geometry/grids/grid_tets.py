@@ -24,6 +24,7 @@ _REACH = 1.8  # of the spacing: the diagonal of a cell
 _FLAT = 1e-3  # of the volume of a tetrahedron of the grid: no smaller ones are made
 # Six tetrahedra around the diagonal of a cell, corners x + 2 y + 4 z; neighbouring cells have the same diagonals
 _KUHN = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
+_CELL = np.array([[k & 1, k >> 1 & 1, k >> 2] for k in range(8)])  # the corners of a cell, of the spacing
 
 
 def grid_tets(points: Array, triangles: Indices, spacing: float) -> tuple[Array, IntArray]:
@@ -42,12 +43,8 @@ def grid_tets(points: Array, triangles: Indices, spacing: float) -> tuple[Array,
     inside = wound(points, triangles, low, counts, spacing) > 0
     if not inside.any():
         raise ValueError("the grid has no corner inside the surface")
-    corners = _cells(inside)[:, None] + np.array([[k & 1, k >> 1 & 1, k >> 2] for k in range(8)]) @ np.array(
-        [counts[1] * counts[2], counts[2], 1]
-    )
-    used, place = np.unique(corners, return_inverse=True)
-    at = low + spacing * np.stack(np.unravel_index(used, tuple(counts)), axis=1)
-    tets = place.reshape(-1, 8)[:, _KUHN].reshape(-1, 4).astype(np.int32)
+    used, tets = kuhn_tets(cells_with(inside), inside.shape)
+    at = low + spacing * np.stack(np.unravel_index(used, inside.shape), axis=1)
     near = NearbyTriangles(points, triangles, _REACH * spacing).closest(at)
     distance = np.nan_to_num(np.linalg.norm(at - near, axis=1), nan=_REACH * spacing)
     depth = np.where(inside.ravel()[used], 1.0, -1.0) * np.maximum(distance, 1e-9 * spacing)
@@ -58,13 +55,29 @@ def grid_tets(points: Array, triangles: Indices, spacing: float) -> tuple[Array,
     return without_contacts(made, cut, points, triangles, 0.5 * spacing)
 
 
-def _cells(inside: BoolArray) -> Indices:
-    """First corners of the cells with a corner inside."""
-    some = inside
+def cells_with(corners: BoolArray) -> BoolArray:
+    """Whether each cell of a grid has one of some corners, shape (n - 1, m - 1, k - 1).
+
+    Args:
+        corners: Shape (n, m, k).
+    """
+    some = corners
     for axis in range(3):
         last = some.shape[axis] - 1
         some = np.take(some, range(last), axis) | np.take(some, range(1, last + 1), axis)
-    return np.asarray(np.ravel_multi_index(np.nonzero(some), inside.shape), np.int64)
+    return some
+
+
+def kuhn_tets(cells: BoolArray, shape: tuple[int, ...]) -> tuple[Indices, IntArray]:
+    """The corners of the grid that some cells have, ascending, and the tetrahedra of these cells with their places.
+
+    Args:
+        cells: Which, shape (n - 1, m - 1, k - 1).
+        shape: Of the grid's corners.
+    """
+    first = np.ravel_multi_index(np.nonzero(cells), shape)
+    used, place = np.unique(first[:, None] + np.ravel_multi_index(tuple(_CELL.T), shape), return_inverse=True)
+    return np.asarray(used, np.int64), place.reshape(-1, 8)[:, _KUHN].reshape(-1, 4).astype(np.int32)
 
 
 def _snapped(at: Array, depth: Array, near: Array, tets: IntArray, spacing: float) -> tuple[Array, Array]:
