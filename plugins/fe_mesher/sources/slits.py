@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from calmotion.geometry.grids.slit_closing import RADIUS, closed_slits
-from calmotion.geometry.surfaces.slits import Filling, slit_fillings
+from calmotion.geometry.grids.slit_closing import CLOSED, closed_slits
+from calmotion.geometry.nearby_triangles import unit_normals
+from calmotion.geometry.surfaces.slits import Filling, facing, slit_fillings
 from calmotion.geometry.tetrahedra import surface_area
 
 from ..closing import Part, concatenated, connected_pieces
@@ -24,13 +25,14 @@ _SINK = 1e-4  # of the size, by which fillings reach into both sides
 # tunnels, to 4,400 with its slits and to 3,000 without both
 _DETAIL, _BESIDE = 1e-4, 0.5 * NARROW
 _LOST = 5e-3  # largest change of the volume by that: solids that overlap are counted twice before
-_LEASTS = (NARROW**2, 1e-4)  # areas of a part of a side that is filled, of the squared size
-# Most triangles with fillings, of those before, and besides: where there are more, the surface is made anew on a grid.
-# Of link6 of the Panda fillings made 104,000 triangles of 27,500, which could not be simplified; with slits of up to
-# 1.4 mm that stayed it had 485, 439 and 461 Hz on three meshes, and has 490, 490 and 489 Hz since.
-_MORE, _BESIDES = 2.0, 20_000
+# Where more of the surface than that has gaps which are wider than those that are filled, it is made anew on a grid of
+# this spacing, of the size: link6 of the Panda (18%) and the base of the xArm's gripper (6%); of others 1.2 to 1.8% do.
+# Their meshes, which follow dense surfaces the less closely, joined the sides of such gaps in places: 485, 439 and
+# 461 Hz on three meshes, and 491 Hz on each since; 251, 239 and 243 Hz, and 332 Hz on each since.
+_OFTEN, _SPACING = 0.04, 3.5e-3
 _CUT = 0.05  # of the spacing of that grid: detail that is left out
-_SPACING = 2.5e-3  # of the size: gaps of up to 1e-2 are closed, whose sides such meshes may join (`filling.py`)
+# Most triangles with fillings, of those before, and besides; where there are more, a grid takes their place, too
+_MORE, _BESIDES = 2.0, 20_000
 
 
 def without_slits(whole: Part, scale: float, repairs: list[str]) -> Part:
@@ -50,57 +52,62 @@ def without_slits(whole: Part, scale: float, repairs: list[str]) -> Part:
         return whole
     simpler = solid.simplify(_DETAIL)
     solid = simpler if abs(simpler.volume() - whole.volume) < _LOST * whole.volume else solid
-    slits, widest, filled = _filled(solid, int(_MORE * len(whole.triangles)) + _BESIDES)
-    if filled is not None:
-        whole = filled
-        repairs.append(f"filled {slits} slit{'s' if slits > 1 else ''} of up to {1e3 * scale * widest:.2g} mm")
-    elif slits:
-        whole = _on_grid(whole)
-        limit, edge = 1e3 * scale * 2.0 * RADIUS * _SPACING, 1e3 * scale * _SPACING
-        repairs.append(
-            f"closed {slits} slit{'s' if slits > 1 else ''} and all gaps of up to {limit:.2g} mm on a grid, since "
-            f"filling each would make too many triangles: edges are cut off by up to {edge:.2g} mm"
-        )
+    fine = part_of(solid.refine_to_length(_SIDE))
+    wider = _facing(fine, CLOSED * _SPACING) - _facing(fine, NARROW)
+    made: Part | None = None
+    told, reason = "", f"{100.0 * wider:.2g}% of its surface has wider ones than are filled"
+    if wider <= _OFTEN:
+        made, told = _filled(solid, fine, scale)
+        reason = "filling each would make too many triangles"
+    if wider > _OFTEN or (made is not None and len(made.triangles) > _MORE * len(whole.triangles) + _BESIDES):
+        made, told = _on_grid(whole, scale, reason)
+    if made is not None:
+        whole = made
+        repairs.append(told)
     pieces = connected_pieces(whole.points, whole.triangles)
     kept = [piece for piece in pieces if not _is_thin_cavity(piece)]
     cavities = len(pieces) - len(kept)
-    if cavities and filled is None:
+    if cavities and made is None:
         limit = 1e3 * scale * NARROW
         repairs.append(f"filled {cavities} cavit{'ies' if cavities > 1 else 'y'} thinner than {limit:.2g} mm")
     return concatenated(kept) if cavities else whole
 
 
-def _filled(solid: Any, most: int) -> tuple[int, float, Part | None]:
-    """The number of slits of a manifold, the width of the widest, and the solid without them.
+def _facing(fine: Part, widest: float) -> float:
+    """Share of a surface of small triangles that faces another side of it across a gap no wider than that."""
+    corners = fine.points[fine.triangles]
+    normals, areas = unit_normals(corners)
+    found = facing(corners.mean(axis=1), normals, corners, widest)
+    return float(areas[found].sum() / areas.sum())
 
-    Fillings of its smallest slits are left out where they make more triangles than allowed. Without slits, and where
-    the others make more still, there is no other solid.
+
+def _filled(solid: Any, fine: Part, scale: float) -> tuple[Part | None, str]:
+    """A manifold without its slits, and a message; None where it has none.
 
     Args:
         solid: In units of the size of the body.
-        most: Number of triangles.
+        fine: The same with small triangles.
+        scale: Size of the body [m].
     """
     import manifold3d
 
-    fine = part_of(solid.refine_to_length(_SIDE))
-    slits, widest = 0, 0.0
-    for least in _LEASTS:
-        fillings = slit_fillings(fine.points, fine.triangles, NARROW, _SINK, _BESIDE, least)
-        made = [(body, filling.width) for filling in fillings if (body := _body(filling)) is not None]
-        if not made:
-            break
-        filling = manifold3d.Manifold.batch_boolean([body for body, _ in made], manifold3d.OpType.Add)
-        filled = part_of(solid + filling)
-        slits, widest = len(filling.decompose()), max(width for _, width in made)
-        if len(filled.triangles) <= most:
-            return slits, widest, filled
-    return slits, widest, None
+    fillings = slit_fillings(fine.points, fine.triangles, NARROW, _SINK, _BESIDE, NARROW**2)
+    made = [(body, filling.width) for filling in fillings if (body := _body(filling)) is not None]
+    if not made:
+        return None, ""
+    filling = manifold3d.Manifold.batch_boolean([body for body, _ in made], manifold3d.OpType.Add)
+    slits, widest = len(filling.decompose()), 1e3 * scale * max(width for _, width in made)
+    return part_of(solid + filling), f"filled {slits} slit{'s' if slits > 1 else ''} of up to {widest:.2g} mm"
 
 
-def _on_grid(whole: Part) -> Part:
-    """A solid of which a grid closes the slits; its flat walls have few triangles again."""
+def _on_grid(whole: Part, scale: float, reason: str) -> tuple[Part, str]:
+    """A solid whose slits a grid closes, with few triangles on flat walls; and a message; arguments as of others."""
     made = Part(*closed_slits(whole.points, whole.triangles, _SPACING))
-    return without_detail(made, _CUT * _SPACING)
+    told = (
+        f"closed its slits of up to {1e3 * scale * CLOSED * _SPACING:.2g} mm on a grid, since {reason}: edges are cut "
+        f"off by up to {1e3 * scale * _SPACING:.2g} mm"
+    )
+    return without_detail(made, _CUT * _SPACING), told
 
 
 def _body(filling: Filling) -> Any:

@@ -55,17 +55,26 @@ def test_a_thin_slit_is_filled_and_the_rest_of_the_surface_stays(package):
     assert made.bounds == pytest.approx(bar.bounds, abs=beside * 1.01)
 
 
-def test_a_grid_closes_slits_where_fillings_would_make_too_many_triangles(package, monkeypatch):
-    bar, slits = slit_bar(THIN), package("sources.slits")
-    whole, _ = filled(package, bar)
-    monkeypatch.setattr(slits, "_BESIDES", len(whole.faces) - int(slits._MORE * len(bar.faces)))
-    assert np.array_equal(filled(package, bar)[0].faces, whole.faces)
-    monkeypatch.setattr(slits, "_BESIDES", slits._BESIDES - 1)
+@pytest.mark.parametrize("dense", [True, False])
+def test_a_grid_closes_many_wide_slits_and_those_whose_fillings_have_too_many_triangles(package, monkeypatch, dense):
+    slits = package("sources.slits")
+    if dense:
+        bar, reason = slit_bar(THIN), "filling each would make too many triangles"
+        count = len(filled(package, bar)[0].faces)
+        monkeypatch.setattr(slits, "_BESIDES", count - int(slits._MORE * len(bar.faces)))
+        assert len(filled(package, bar)[0].faces) == count
+        monkeypatch.setattr(slits, "_BESIDES", slits._BESIDES - 1)
+    else:
+        bar, reason = box((LENGTH, SIDE, SIDE)), "9.7% of its surface has wider ones than are filled"
+        for at in (-0.25 * LENGTH, 0.0, 0.25 * LENGTH):
+            bar = bar.difference(box((WIDE, 2 * SIDE, SIDE), at=(at, 0.0, SIDE / 4)))
     made, repairs = filled(package, bar)
-    assert len(repairs) == 1 and repairs[0].startswith("closed 1 slit and all gaps of up to 2 mm on a grid,")
+    assert repairs == [
+        f"closed its slits of up to 1.4 mm on a grid, since {reason}: edges are cut off by up to 0.71 mm"
+    ]
     assert boundary_walks(np.asarray(made.faces)) == []
     edge = slits._SPACING * SIZE
-    assert made.volume == pytest.approx(LENGTH * SIDE**2, abs=4.0 * (LENGTH + 2.0 * SIDE) * edge**2)
+    assert made.volume == pytest.approx(LENGTH * SIDE**2, abs=0.5 * 4.0 * (LENGTH + 2.0 * SIDE) * edge**2)
     assert np.abs(made.bounds - bar.bounds).max() < edge
     middle = np.abs(made.vertices[:, 0]) < 0.4 * LENGTH
     assert np.abs(made.vertices[middle][:, 1:]).max(axis=1).min() > SIDE / 2 - edge
@@ -91,7 +100,7 @@ def test_sharp_corners_are_no_slits(package):
 
 def test_a_slit_that_narrows_to_nothing_is_filled_where_it_is_thin(package):
     """As between an ear and the wall that it leaves at a small angle."""
-    angle = np.radians(2.0)
+    angle = np.radians(4.0)
     corners = np.array([[-0.02, 0.0], [0.2, 0.0], [0.2, 0.22 * np.tan(angle)]])
     flat = [[x, y, z] for y in (-SIDE, SIDE) for x, z in corners]
     wedge = trimesh.Trimesh(flat).convex_hull

@@ -18,13 +18,14 @@ from calmotion.geometry.nearby_triangles import NearbyTriangles
 from calmotion.geometry.tetrahedra import Indices, tet_volumes
 from calmotion.shot.character import Array
 
-RADIUS = 2  # of the ball, in spacings
+CLOSED = 2.0  # spacings: gaps that are always closed; of those up to three, some
+_SQUARED = 2  # largest squared distance of a corner of the grid from the middle of the ball
 _NEAR = 1.8  # spacings: the diagonal of a cell
 _LEAST = 0.02  # of the spacing: corners of the grid count as no nearer to the surface, which has no flat triangles so
 
 
 def closed_slits(points: Array, triangles: Indices, spacing: float) -> tuple[Array, Indices]:
-    """The surface of a solid with its slits and holes of up to four spacings closed.
+    """The surface of a solid with its slits and holes of up to two spacings closed, and some of up to three.
 
     Args:
         points: [m], shape [n, 3].
@@ -37,11 +38,11 @@ def closed_slits(points: Array, triangles: Indices, spacing: float) -> tuple[Arr
     """
     from scipy.ndimage import binary_closing
 
-    aside = (RADIUS + 1.5) * spacing
+    aside = 2.5 * spacing
     low = points.min(axis=0) - aside
     counts = np.ceil((points.max(axis=0) + aside - low) / spacing).astype(np.int64) + 1
     inside = wound(points, triangles, low, counts, spacing) > 0
-    ball = (np.mgrid[(slice(-RADIUS, RADIUS + 1),) * 3] ** 2).sum(axis=0) <= RADIUS**2
+    ball = (np.mgrid[-1:2, -1:2, -1:2] ** 2).sum(axis=0) <= _SQUARED
     closed = binary_closing(inside, ball) | inside
     used, tets = kuhn_tets(cells_with(closed) & cells_with(~closed), closed.shape)
     at = low + spacing * np.stack(np.unravel_index(used, closed.shape), axis=1)
