@@ -1,23 +1,29 @@
-"""Accuracy of the first frequencies of a mesh."""
+"""Meshes that are accurate enough for the first frequencies, and what is said about their accuracy."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from calmotion.accuracy.element_size import ACCURACY
+from calmotion.accuracy.element_size import ACCURACY, envelope
+from calmotion.errors import ShotError
 from calmotion.geometry.tetrahedra import tet_volumes
 from calmotion.shot import Body, Character, FEMesh, Frame
 from calmotion.shot.materials.parts import Part
 from calmotion.shot.meshes import MeshQuality
 
-from .filling import INTERSECTS, MAX_VOLUME_ERROR
+from .filling import INTERSECTS, MAX_VOLUME_ERROR, filled
+from .tetwild import DENSE, ProcessorTime
 
 if TYPE_CHECKING:
     from calmotion.geometry.makeup import Makeup
+    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
     from calmotion.reduction.mesh_refinement import Effort
+
+    from .body_mesh import MeshOptions, Volume
 
 # The estimate is 1.2 to 3 times the true error of clamped beams and plates on meshes that are nearly fine enough, and
 # larger for links with many edges (see `calmotion bench meshing`). Twice the wanted error is therefore accepted.
@@ -36,7 +42,61 @@ _KEPT = 22_000  # nodes of the mesh that takes the stiffness of these, where one
 # Relative error of the squares of frequencies that a solver may leave on surfaces of more triangles than these: of the
 # G1's wrist 40% fewer steps, with frequencies that differ by 0.07% where 1.6% are estimated
 _ALGEBRAIC, _DETAILED = 3e-4, 2_000
+_LONGER = 1.5  # factor of the element size where a surface has many details: they are refined where it matters
+_FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
+# Error of the frequencies by what a mesh leaves out of its surface, from which one follows it within half the distance,
+# unless the surface had to be simplified by as much: left finger of the xArm
+_LEFT_OUT, _CLOSER = 0.01, 0.5
 _SAME_MASS, _HOLLOW = 0.05, 0.7  # difference that is reported; ratio below which a body may be hollow
+
+
+def accurate(
+    index: int, body: Body, volume: Volume, size: float, options: MeshOptions, carrier: Frame | None,
+    attachments: Sequence[AttachmentFrame],
+) -> FEMesh:  # fmt: skip
+    """Tetrahedra fine enough for the first frequencies; where the shot needs more, they are refined for its loads.
+
+    Args:
+        index, body, options, attachments: As of `mesh_of`.
+        volume: To fill.
+        size: Of the elements before they are refined [m].
+        carrier: Frame of the joint to the parent, body frame.
+    """
+    from calmotion.reduction.mesh_refinement import refined_for_frequencies
+
+    time = ProcessorTime(options.time_limit)
+
+    def made(volume: Volume) -> FEMesh:
+        mesh = filled(index, body, volume.solid, volume.shape, size, time, options.cache, _LONGER)
+        return shaped_to(volume, size, mesh, body, attachments)
+
+    def refined(mesh: FEMesh, shape: float = np.inf) -> FEMesh:
+        effort = replace(effort_after(time.triangles), shape=shape)
+        return refined_for_frequencies(mesh, body, carrier, effort, attachments)
+
+    first = made(volume)
+    limit = 2.0 * _LEFT_OUT if time.triangles <= DENSE else np.inf
+    mesh = refined(first, limit)
+    if 2.0 * mesh.quality.shape_error > limit:
+        shape = replace(volume.shape, envelope_factor=_CLOSER * volume.shape.envelope_factor)
+        with suppress(ShotError):  # it takes too long
+            closer = made(replace(volume, shape=shape))
+            first = closer if closer.quality.volume_error <= MAX_VOLUME_ERROR else first
+        mesh = refined(first)
+    repairs = (*mesh.quality.repairs, *remark(mesh.quality))
+    return replace(mesh, quality=replace(mesh.quality, repairs=repairs))
+
+
+def shaped_to(
+    volume: Volume, size: float, mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame]
+) -> FEMesh:  # fmt: skip
+    """The mesh of a volume with elements of a size [m], which follows its surface in the mean."""
+    from calmotion.reduction.mesh_shaping import Surface, shaped
+
+    solid, shape = volume.solid, volume.shape
+    diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    limit = _FIT * envelope(size, diagonal, shape, len(solid.triangles), 0)
+    return shaped(mesh, body, Surface(solid.points, solid.triangles, solid.volume, limit), attachments)
 
 
 def effort_after(triangles: int) -> Effort:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from calmotion.accuracy.element_size import MAX_NODES, Shape, element_size, envelope, shape_of
+from calmotion.accuracy.element_size import MAX_NODES, Shape, element_size, shape_of
 from calmotion.errors import ShotError
 from calmotion.geometry.grids.contacts import without_contacts
 from calmotion.geometry.matching.congruence import Isometry
@@ -23,7 +23,7 @@ from calmotion.geometry.tetrahedra import (
 )
 from calmotion.shot import Body, Character, FEMesh, Frame, TetGeometry
 
-from .accuracy import effort_after, makeup_note, mass_note, remark, volume_note
+from .accuracy import accurate, makeup_note, mass_note, shaped_to, volume_note
 from .filling import filled, refuse_loose_parts, refuse_too_many
 from .mesh_file import read_mesh_file
 from .repair import Solid
@@ -36,8 +36,6 @@ from .tetwild import DENSE, TIME_LIMIT, OutOfTime, ProcessorTime
 if TYPE_CHECKING:
     from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 
-_LONGER = 1.5  # factor of the element size where a surface has many details: they are refined where it matters
-_FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
 FAR = 5.0  # distance of a mesh from all joints of its body, over its size, that nobody means
 _SIMPLE = ("collision surface", "wrapped collision surface", "equivalent beam")
 _WELD = 1e-6  # distance of coincident points, of the diagonal
@@ -176,7 +174,7 @@ def _meshed(
     elif geometry.size > 0.0:
         time = ProcessorTime(options.time_limit)
         mesh = filled(index, body, geometry.solid, geometry.shape, geometry.size, time, options.cache)
-        mesh = _judged(_shaped(mesh, body, geometry, geometry.size, attachments), body, carrier, attachments)
+        mesh = _judged(shaped_to(geometry, geometry.size, mesh, body, attachments), body, carrier, attachments)
     else:
         mesh = accurate(index, body, geometry, element_size(geometry.shape), options, carrier, attachments)
     quality = mesh.quality
@@ -265,36 +263,3 @@ def _judged(mesh: FEMesh, body: Body, carrier: Frame | None, attachments: Sequen
     if len(mesh.points) > MAX_NODES:
         return replace(mesh, given=True)
     return replace(refined_for_frequencies(mesh, body, carrier, Effort(np.inf, 0), attachments), given=True)
-
-
-def _shaped(mesh: FEMesh, body: Body, volume: Volume, size: float, attachments: Sequence[AttachmentFrame]) -> FEMesh:
-    """The mesh of a volume with elements of a size [m], which follows its surface in the mean."""
-    from calmotion.reduction.mesh_shaping import Surface, shaped
-
-    solid, shape = volume.solid, volume.shape
-    diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
-    limit = _FIT * envelope(size, diagonal, shape, len(solid.triangles), 0)
-    return shaped(mesh, body, Surface(solid.points, solid.triangles, solid.volume, limit), attachments)
-
-
-def accurate(
-    index: int, body: Body, volume: Volume, size: float, options: MeshOptions, carrier: Frame | None,
-    attachments: Sequence[AttachmentFrame],
-) -> FEMesh:  # fmt: skip
-    """Tetrahedra fine enough for the first frequencies; where the shot needs more, they are refined for its loads.
-
-    Args:
-        index, body, options, attachments: As of `mesh_of`.
-        volume: To fill.
-        size: Of the elements before they are refined [m].
-        carrier: Frame of the joint to the parent, body frame.
-    """
-    from calmotion.reduction.mesh_refinement import refined_for_frequencies
-
-    solid, shape = volume.solid, volume.shape
-    time = ProcessorTime(options.time_limit)
-    mesh = filled(index, body, solid, shape, size, time, options.cache, _LONGER)
-    mesh = _shaped(mesh, body, volume, size, attachments)
-    mesh = refined_for_frequencies(mesh, body, carrier, effort_after(time.triangles), attachments)
-    repairs = (*mesh.quality.repairs, *remark(mesh.quality))
-    return replace(mesh, quality=replace(mesh.quality, repairs=repairs))

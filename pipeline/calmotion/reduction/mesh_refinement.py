@@ -61,6 +61,7 @@ class Effort:
         algebraic: Relative error of the squares of frequencies of a mesh that the solver may leave.
         bad: An error, that of the volume included, for which still more nodes are spent.
         bad_nodes: Largest number of nodes of a mesh that follows one with a larger error.
+        shape: An error by what a mesh leaves out of its surface, with which it stays as it is: no finer one repairs it.
     """
 
     wanted: float
@@ -71,6 +72,7 @@ class Effort:
     algebraic: float = ALGEBRAIC
     bad: float = np.inf
     bad_nodes: int = 0
+    shape: float = np.inf
 
     def ends(self, error: float, nodes: int) -> bool:
         """Whether a mesh with an error is enough."""
@@ -202,6 +204,8 @@ def _bisected(
 ) -> tuple[list[FEMesh], list[Estimate]]:  # fmt: skip
     """Ever finer meshes from the given one on, until what an extrapolation leaves is small enough; their estimates."""
     meshes, estimates = [mesh], [estimate(mesh)]
+    if by_shape(estimates[0])[1] > effort.shape:
+        return meshes, estimates
     # elements do not repair the volume, and far below its error they gain nothing
     by_volume = _of_volume(mesh)
     effort = replace(

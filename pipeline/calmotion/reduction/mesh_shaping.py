@@ -14,6 +14,8 @@ from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.shot.character import Array, Body, IntArray
 from calmotion.shot.meshes import CutPatch, FEMesh
 
+_FILLED = 5e-3  # error of the volume of elements that fill what the surface encloses, and no other body
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -56,9 +58,8 @@ def shaped(mesh: FEMesh, body: Body, surface: Surface, attachments: Sequence[Att
     moved = fitted(points, tets, near)
     cut, fit = (_with(mesh, x, tets, rims, surface.volume) for x in (points, moved))
     # a surface that runs through itself is not what the elements fill
-    if fit.quality.volume_error > cut.quality.volume_error:
-        return cut
-    return replace(fit, missing=missing_volume(fit.points, fit.tets, near))
+    made = cut if fit.quality.volume_error > max(cut.quality.volume_error, _FILLED) else fit
+    return replace(made, missing=missing_volume(made.points, made.tets, near))
 
 
 def _with(mesh: FEMesh, points: Array, tets: IntArray, rims: Sequence[tuple[Array, IntArray]], volume: float) -> FEMesh:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from calmotion.shot import FEMesh, MassProperties, TetGeometry
+from calmotion.shot import FEMesh, Frame, MassProperties, TetGeometry
 from calmotion.shot.materials.parts import Part
 from calmotion.shot.materials.printed import core_of
 from calmotion.shot.meshes import MeshQuality
@@ -49,9 +49,41 @@ def test_a_mesh_is_refined_as_far_as_its_surface_left_time(package):
     assert all(effort.kept_nodes < effort.poor_nodes and effort.wanted < effort.poor for effort in efforts)
 
 
+def test_a_mesh_that_leaves_out_too_much_of_its_surface_is_made_again_closer_to_it(package, monkeypatch):
+    mesher, accuracy = package("body_mesh"), package("accuracy")
+    body = link(surface(trimesh.creation.cylinder(0.01, 0.2, sections=24)))
+    options = mesher.MeshOptions(cache=False)
+
+    def made(limit, closer=1.0, dense=100_000):
+        monkeypatch.setattr(accuracy, "_LEFT_OUT", limit)
+        monkeypatch.setattr(accuracy, "DENSE", dense)
+        chosen = replace(options, envelope_factor=closer)
+        return mesher.mesh_body(0, body, chosen, (Frame(np.array([0.0, 0.0, -0.1]), np.array([1.0, 0.0, 0.0, 0.0])),))
+
+    first, closer = made(np.inf), made(np.inf, 0.5)
+    assert 0.0 < first.quality.shape_error and len(first.points) != len(closer.points)
+    limit = 0.5 * first.quality.shape_error
+    again = made(limit)
+    assert (
+        np.array_equal(again.points, closer.points) and again.quality.frequency_error == closer.quality.frequency_error
+    )
+    assert np.array_equal(made(limit, dense=1).points, first.points)  # simplified by as much, however close
+    assert np.array_equal(made(2.0 * first.quality.shape_error).points, first.points)
+
+    def late(*arguments):
+        if arguments[3].envelope_factor < 1.0:
+            raise mesher.ShotError("too late", path=body.path)
+        return filled(*arguments)
+
+    filled = accuracy.filled
+    monkeypatch.setattr(accuracy, "filled", late)
+    kept = made(limit)
+    assert np.array_equal(kept.points, first.points) and kept.quality.error == first.quality.error
+
+
 def test_the_triangles_that_were_meshed_decide_about_it(host, package, monkeypatch):
     told, effort_after = [], package("accuracy").effort_after
-    monkeypatch.setattr(package("body_mesh"), "effort_after", lambda count: told.append(count) or effort_after(count))
+    monkeypatch.setattr(package("accuracy"), "effort_after", lambda count: told.append(count) or effort_after(count))
     cube, ball = box((0.2, 0.02, 0.02)), trimesh.creation.icosphere(subdivisions=3, radius=0.03)
     for _ in range(2):  # the second time from the cache
         for shape in (cube, ball):
