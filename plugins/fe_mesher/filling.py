@@ -161,14 +161,14 @@ def _attempt(solid: Solid, shape: Shape, size: float, number: int, longer: float
         points, triangles = decimated(attempt.points, attempt.triangles, DENSE, _DENSE_DETAIL * distance)
         attempt = _Attempt(points, triangles, longer * size, distance)
     if len(attempt.triangles) > DENSE:
-        return _detailed(attempt, solid, shape, size, longer, _TRIANGLES)
+        return _detailed(attempt, solid, shape, size, longer, int(shape.detail * _TRIANGLES))
     return attempt
 
 
 def _detailed(attempt: _Attempt, solid: Solid, shape: Shape, size: float, longer: float, count: int) -> _Attempt:
     """That of a surface whose details would take too long, with a number of triangles; the others as of `filled`."""
     narrow = envelope(size, _diagonal(solid.points), shape, len(solid.triangles), 0)
-    distance = max(min(_WIDER * narrow, _OF_WALL * shape.thickness), narrow)
+    distance = max(min(_WIDER / shape.detail * narrow, _OF_WALL * shape.thickness), narrow)
     points, triangles = decimated(attempt.points, attempt.triangles, count, distance)
     return _Attempt(points, triangles, longer * size, distance, detailed=True)
 

@@ -38,6 +38,7 @@ class Shape:
         volume: [m^3].
         area: [m^2].
         envelope_factor: Factor of the distance that a mesh may be from the surface.
+        detail: Factor of the number of triangles that a surface with many details keeps, and of how close they are.
     """
 
     thickness: float
@@ -45,6 +46,7 @@ class Shape:
     volume: float
     area: float
     envelope_factor: float = 1.0
+    detail: float = 1.0
 
 
 def shape_of(points: Array, triangles: Indices) -> Shape:
