@@ -25,17 +25,17 @@ def bracket_surface(mirrored=False):
 
 
 def test_the_mirror_image_of_a_link_is_meshed_once(host, package, monkeypatch):
-    made, accuracy = package("body_mesh"), package("accuracy")
+    accuracy = package("accuracy")
     # a twentieth of the nodes: the meshes are refined as usual, and less far
     for name, nodes in (("_REFINED", 600), ("_POOR_REFINED", (2_000, 3_000)), ("_KEPT", 1_100)):
         monkeypatch.setattr(accuracy, name, nodes)
-    fill, count = made.filled, []
+    fill, count = accuracy.filled, []
 
     def counted(*arguments):
         count.append(arguments[1].path)
         return fill(*arguments)
 
-    monkeypatch.setattr(made, "filled", counted)
+    monkeypatch.setattr(accuracy, "filled", counted)
     left, right = link(bracket_surface()), replace(link(bracket_surface(mirrored=True)), path="/Arm/right")
     stiffer = replace(left.flexible, interface_radius=0.02)
     first, second, third = run(host, left, right, replace(left, path="/Arm/third", flexible=stiffer))
