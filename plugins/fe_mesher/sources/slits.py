@@ -26,7 +26,7 @@ _SINK = 1e-4  # of the size, by which fillings reach into both sides
 _DETAIL, _BESIDE = 1e-4, 0.5 * NARROW
 _LOST = 5e-3  # largest change of the volume by that: solids that overlap are counted twice before
 # Where more of the surface than that has gaps which are wider than those that are filled, it is made anew on a grid of
-# this spacing, of the size: link6 of the Panda (18%) and the base of the xArm's gripper (6%); of others 1.2 to 1.8% do.
+# this spacing, of the size: link6 of the Panda (15%) and the base of the xArm's gripper (6%); of others 1.2 to 1.8% do.
 # Their meshes, which follow dense surfaces the less closely, joined the sides of such gaps in places: 485, 439 and
 # 461 Hz on three meshes, and 491 Hz on each since; 251, 239 and 243 Hz, and 332 Hz on each since.
 _OFTEN, _SPACING = 0.04, 3.5e-3
