@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from calmotion.geometry.grids.slit_closing import CLOSED, closed_slits
 from calmotion.geometry.nearby_triangles import unit_normals
-from calmotion.geometry.surfaces.slits import Filling, facing, slit_fillings
+from calmotion.geometry.surfaces.slits import Filling, slit_fillings, slit_widths
 from calmotion.geometry.tetrahedra import surface_area
 
 from ..closing import Part, concatenated, connected_pieces
@@ -53,14 +54,14 @@ def without_slits(whole: Part, scale: float, repairs: list[str]) -> Part:
     simpler = solid.simplify(_DETAIL)
     solid = simpler if abs(simpler.volume() - whole.volume) < _LOST * whole.volume else solid
     fine = part_of(solid.refine_to_length(_SIDE))
-    wider = _facing(fine, CLOSED * _SPACING) - _facing(fine, NARROW)
-    made: Part | None = None
-    told, reason = "", f"{100.0 * wider:.2g}% of its surface has wider ones than are filled"
-    if wider <= _OFTEN:
+    wider = _too_wide(fine)
+    made: Part | None
+    if wider > _OFTEN:
+        made, told = _on_grid(whole, scale, f"{100.0 * wider:.2g}% of its surface has wider ones than are filled")
+    else:
         made, told = _filled(solid, fine, scale)
-        reason = "filling each would make too many triangles"
-    if wider > _OFTEN or (made is not None and len(made.triangles) > _MORE * len(whole.triangles) + _BESIDES):
-        made, told = _on_grid(whole, scale, reason)
+        if made is not None and len(made.triangles) > _MORE * len(whole.triangles) + _BESIDES:
+            made, told = _on_grid(whole, scale, "filling each would make too many triangles")
     if made is not None:
         whole = made
         repairs.append(told)
@@ -73,12 +74,12 @@ def without_slits(whole: Part, scale: float, repairs: list[str]) -> Part:
     return concatenated(kept) if cavities else whole
 
 
-def _facing(fine: Part, widest: float) -> float:
-    """Share of a surface of small triangles that faces another side of it across a gap no wider than that."""
+def _too_wide(fine: Part) -> float:
+    """Share of a surface of small triangles with gaps that are wider than those that are filled, as a grid closes."""
     corners = fine.points[fine.triangles]
     normals, areas = unit_normals(corners)
-    found = facing(corners.mean(axis=1), normals, corners, widest)
-    return float(areas[found].sum() / areas.sum())
+    widths = slit_widths(corners.mean(axis=1), normals, corners, CLOSED * _SPACING)
+    return float(areas[np.isfinite(widths) & (widths > NARROW)].sum() / areas.sum())
 
 
 def _filled(solid: Any, fine: Part, scale: float) -> tuple[Part | None, str]:

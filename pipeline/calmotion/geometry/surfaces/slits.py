@@ -18,8 +18,8 @@ _ROUNDING = 1e-3  # of the widest slit: how far behind a place the other side ma
 _LATERAL = 2.0  # way of a corner, of that along the normals of its triangles
 
 
-def facing(places: Array, normals: Array, triangles: Array, widest: float) -> BoolArray:
-    """Which places of a surface face another side of it across a slit, shape [n].
+def slit_widths(places: Array, normals: Array, triangles: Array, widest: float) -> Array:
+    """Widths of the slits across which places of a surface face another side of it [m], shape [n]; infinite for none.
 
     Args:
         places: [m], shape [n, 3].
@@ -30,7 +30,12 @@ def facing(places: Array, normals: Array, triangles: Array, widest: float) -> Bo
     corners = triangles.reshape(-1, 3)
     near = NearbyTriangles(corners, np.arange(len(corners)).reshape(-1, 3), widest)
     gap, product = near.faced(places, normals, _ROUNDING * widest)
-    return np.asarray((gap <= widest) & (product < _OPPOSITE))
+    return np.asarray(np.where((gap <= widest) & (product < _OPPOSITE), gap, np.inf))
+
+
+def facing(places: Array, normals: Array, triangles: Array, widest: float) -> BoolArray:
+    """Which places of a surface face another side of it across a slit, shape [n]; arguments as of `slit_widths`."""
+    return np.isfinite(slit_widths(places, normals, triangles, widest))
 
 
 def facing_along(axis: Array, places: Array, normals: Array, triangles: Array, widest: float) -> BoolArray:
