@@ -105,6 +105,18 @@ def test_machines_can_share_a_key(folder, monkeypatch):
     assert signing_key() != key
 
 
+def test_what_one_machine_stores_in_a_shared_folder_another_one_reads(folder, monkeypatch, tmp_path):
+    store_arrays("meshes", "0" * 64, {"points": np.ones(3)})
+    monkeypatch.setenv("CALMOTION_CONFIG", str(tmp_path / "of another machine"))
+    signing._kept.cache_clear()
+    assert stored_arrays("meshes", "0" * 64) is None, "it has another key"
+    monkeypatch.setenv(VARIABLE, "of our farm")
+    store_arrays("meshes", "0" * 64, {"points": np.arange(3.0)})
+    monkeypatch.setenv("CALMOTION_CONFIG", str(folder))
+    found = stored_arrays("meshes", "0" * 64)
+    assert found is not None and found["points"].tolist() == [0.0, 1.0, 2.0] and len(entries("meshes")) == 1
+
+
 def test_without_a_folder_for_the_key_caches_work(folder, monkeypatch, tmp_path):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("CALMOTION_CONFIG", str(tmp_path / "file"))

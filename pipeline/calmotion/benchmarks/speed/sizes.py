@@ -23,7 +23,7 @@ from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import markdown
 from calmotion.benchmarks.scenes.many_arms import write_many_arms
 from calmotion.benchmarks.speed.stages import STAGES
-from calmotion.support.caching.cache_folder import SHARED, cache_folder
+from calmotion.support.caching.cache_folder import MESHES, REDUCTIONS, cache_folder
 
 EXPONENT, LEAST = 1.15, 1.0  # largest growth that counts as linear, and shortest times that are compared [s]
 # What grows, and the bodies, motors and frames of its shots.
@@ -85,7 +85,7 @@ def measured(law: str, bodies: int, motors: int, frames: int) -> Run:
         caches = Path(folder) / "cache"
         caches.mkdir()
         for kept in cache_folder().iterdir():  # kernels would be compiled for minutes
-            if kept.name not in SHARED:
+            if kept.name not in (MESHES, REDUCTIONS):
                 (caches / kept.name).symlink_to(kept)
         done = subprocess.run(  # nosec B603  # no shell
             [sys.executable, "-c", _RUN, str(shot)], stdout=subprocess.PIPE, text=True, check=True,

@@ -17,11 +17,6 @@ CACHES = {
 # Folders of earlier versions, which nothing reads any more; they go when the cache that replaces them is pruned.
 FORMER = {MESHES: "tetrahedra", REDUCTIONS: "reduced"}
 
-# A folder, or the address of an object store (`object_store`), of meshes and reduced bodies that machines share.
-# Compiled kernels stay in each one's own: they fit one processor, and are unpickled.
-SHARED_VARIABLE = "CALMOTION_SHARED_CACHE"
-SHARED = (MESHES, REDUCTIONS)
-
 CONFIGURATION_VARIABLE = "CALMOTION_CONFIG"
 
 
@@ -32,18 +27,6 @@ def cache_folder() -> Path:
         return Path(chosen)
     base = _absolute(os.environ, "XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
     return Path(base) / "calmotion"
-
-
-def folder_of(cache: str) -> Path:
-    """The folder of a cache: the shared one where the environment names one and the cache may be shared. In front of an
-    object store it is this user's own.
-
-    Args:
-        cache: A name in `CACHES`.
-    """
-    shared = os.environ.get(SHARED_VARIABLE) if cache in SHARED else None
-    shared = None if shared and "://" in shared else shared
-    return (Path(shared).expanduser() if shared else cache_folder()) / cache
 
 
 def configuration_folder(environment: Mapping[str, str] | None = None) -> Path:

@@ -18,8 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.support.caching.cache_folder import CACHES, FORMER, cache_folder, folder_of
-from calmotion.support.caching.object_store import fetch, publish
+from calmotion.support.caching.cache_folder import CACHES, FORMER, cache_folder
 from calmotion.support.caching.signing import signing_key
 from calmotion.support.caching.verified_files import DamagedFileError, ForeignFileError, read_arrays, write_arrays
 from calmotion.support.files import PREFIX, remove_abandoned
@@ -54,8 +53,6 @@ def stored_arrays(cache: str, key: str) -> dict[str, np.ndarray] | None:
     path = _file(cache, key)
     _tidy(path.parent)
     arrays = _read(path)
-    if arrays is None and fetch(cache, path, signing_key()):
-        arrays = _read(path)
     if arrays is not None:
         mark_used(path)
     return arrays
@@ -87,7 +84,6 @@ def store_arrays(cache: str, key: str, arrays: Mapping[str, Any], keep_existing:
     path = _file(cache, key)
     with contextlib.suppress(OSError):
         write_arrays(path, arrays, keep_existing, signing_key(), path.name)
-        publish(cache, path)
         prune(cache)
 
 
@@ -109,7 +105,7 @@ def entries(cache: str) -> list[Entry]:
     Args:
         cache: A name in `CACHES`.
     """
-    return _entries_in(folder_of(cache))
+    return _entries_in(cache_folder() / cache)
 
 
 def _entries_in(folder: Path) -> list[Entry]:
@@ -170,7 +166,7 @@ def _remove_former(cache: str) -> list[Entry]:
 
 
 def _file(cache: str, key: str) -> Path:
-    return folder_of(cache) / f"{key}.npz"
+    return cache_folder() / cache / f"{key}.npz"
 
 
 def _size(path: Path) -> int:

@@ -16,8 +16,6 @@ from typing import Any
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
 from calmotion.support import interrupts
-from calmotion.support.caching.cache_folder import SHARED_VARIABLE
-from calmotion.support.caching.object_store import check_store, is_address
 from calmotion.support.files import try_writing, write_text
 from calmotion.workflow.batch.attempt import DIED, MARK
 from calmotion.workflow.batch.backends import LOCAL, Backend, backend_for, refuse_unknown_place
@@ -43,7 +41,6 @@ def batch(
     extras: Sequence[str] = (),
     on: str = LOCAL,
     workers: int | None = None,
-    shared_cache: str | os.PathLike[str] | None = None,
     environment: Mapping[str, str] | None = None,
     progress: Callable[[Progress], None] | None = None,
     cancel: Callable[[], bool] | None = None,
@@ -62,8 +59,6 @@ def batch(
         extras: Further outputs of each shot: `csv`, `rrd`, `figures`, `video`.
         on: `local`, `dask://HOST:PORT` or `slurm`, also with its parameters (`slurm?partition=cpu`).
         workers: Most jobs at once; None: one for each processor (local), or all.
-        shared_cache: Folder or object store (`s3://bucket/folder`) of meshes and reduced bodies that the workers share;
-            None: each worker's own.
         environment: Variables of the jobs' processes.
         progress: Called with a `Progress`.
         cancel: Called often; the batch stops when it returns True.
@@ -81,13 +76,7 @@ def batch(
             "a batch does not support this", path="extras" if unknown else "--workers",
             found=unknown[0] if unknown else workers, remedy=f"Use {', '.join(EXTRAS)}" if unknown else "Use 1 or more",
         )  # fmt: skip
-    variables = dict(environment or {})
-    if shared_cache is not None:
-        place = os.fspath(shared_cache)
-        if is_address(place):
-            check_store(place)
-        variables[SHARED_VARIABLE] = place if is_address(place) else os.path.abspath(place)
-    jobs = jobs_for(shots, target, command, arguments, extras, variables)
+    jobs = jobs_for(shots, target, command, arguments, extras, dict(environment or {}))
     return run_jobs(jobs, target, command, on, workers, progress, cancel)
 
 

@@ -39,11 +39,6 @@ def add_to(commands: Commands) -> None:
         type=worker_count,
         help="most jobs at once (default: one for each processor; elsewhere all)",
     )
-    file_argument(
-        group, "--shared-cache", metavar="PLACE",
-        help="folder or object store (s3://bucket/folder) of meshes and reduced bodies that the workers share; "
-        "compiled kernels are each worker's own",
-    )  # fmt: skip
     forwarded_options(command)
 
 
@@ -61,7 +56,7 @@ def _run(args: argparse.Namespace, output: Output) -> int:
     with ProgressDisplay(args.quiet, args.progress) as display:
         result = batch(
             args.shots, args.output, command=command_of(args), arguments=forwarded(args), extras=extras_of(args),
-            on=args.on, workers=args.workers, shared_cache=args.shared_cache, progress=display,
+            on=args.on, workers=args.workers, progress=display,
         )  # fmt: skip
     conclude(result.report(), [], output, None if args.quiet else _print)
     if result.interrupted:
