@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -197,8 +196,8 @@ class VerifyResult(Operator):
     properties = (
         Property(
             "on", str, "",
-            description="Where parts of a long shot are simulated independently: local, dask://HOST:PORT, or slurm, as "
-            "of `calmotion batch --on`; empty: in one piece, here",
+            description="Where parts of a long shot are simulated independently: local or dask://HOST:PORT, as of "
+            "`calmotion batch --on`; empty: in one piece, here",
         ),
         Property("workers", int, 0, minimum=1, description="Most parts at once; 0: one for each processor, or all"),
         Property("part", float, 60.0, unit="s", minimum=1.0, description="Length of these parts at least [s]"),
@@ -223,21 +222,19 @@ class VerifyResult(Operator):
         options = run_settings(source, context.get(ModelChoices))
         elsewhere = None
         if context.properties.on:
-            elsewhere = Elsewhere(
-                partial(self._performed, context, os.path.dirname(source.path)), context.properties.part
-            )
+            elsewhere = Elsewhere(partial(self._performed, context), context.properties.part)
         return [verify(shot, reduction, context.get(Result), options, context.progress, elsewhere)]
 
     @staticmethod
     def _performed(
-        context: RunContext, folder: str, function: Callable[..., Any], work: Sequence[tuple[Any, ...]]
+        context: RunContext, function: Callable[..., Any], work: Sequence[tuple[Any, ...]]
     ) -> Iterator[tuple[int, Any]]:
         """The parts on the backend that the properties name, with the progress of their number."""
         from calmotion.workflow.batch.backends import backend_for
         from calmotion.workflow.batch.calls import results_on
 
         chosen = context.properties
-        backend = backend_for(chosen.on, chosen.workers or None, os.path.abspath(folder))
+        backend = backend_for(chosen.on, chosen.workers or None)
         for done, found in enumerate(results_on(backend, function, work), 1):
             context.progress(0.5 + 0.5 * done / len(work), f"{done} of {len(work)} parts are simulated")
             yield found

@@ -286,8 +286,8 @@ class SimulationResult:
         """Measure the error of the result against a finer run of the same curves: takes several times as long.
 
         Args:
-            on: Where parts of a long shot are simulated independently: `local`, `dask://HOST:PORT` or `slurm`, as of
-                `batch`; empty: in one piece, here.
+            on: Where parts of a long shot are simulated independently: `local` or `dask://HOST:PORT`, as of `batch`;
+                empty: in one piece, here.
             workers: Most parts at once; None: one for each processor (local), or all.
 
         Raises:

@@ -20,7 +20,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -126,10 +125,9 @@ def outcomes(numbers: Sequence[int], finer: bool, on: str, workers: int) -> Iter
             except ShotError as error:
                 yield number, error
         return
-    with TemporaryDirectory() as logs:
-        work = [(number, finer) for number in numbers]
-        for index, found in results_on(backend_for(on, workers, logs), tried, work):
-            yield numbers[index], found
+    work = [(number, finer) for number in numbers]
+    for index, found in results_on(backend_for(on, workers), tried, work):
+        yield numbers[index], found
 
 
 def table_of(rows: Sequence[Recovered]) -> list[list[str]]:

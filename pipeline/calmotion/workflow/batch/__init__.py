@@ -1,1 +1,1 @@
-"""Many shots as independent jobs on this machine, a Dask cluster or Slurm."""
+"""Many shots as independent jobs on this machine or a Dask cluster."""

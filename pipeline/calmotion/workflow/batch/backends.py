@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import os
 import queue
-import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import suppress
 from typing import Any
-from urllib.parse import parse_qsl
 
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
@@ -19,9 +17,8 @@ from calmotion.support.processes.workers import Fault, results_of
 from calmotion.version import __version__
 from calmotion.workflow.batch.attempt import attempt, kill_running
 
-LOCAL, DASK, SLURM = "local", "dask", "slurm"
+LOCAL, DASK = "local", "dask"
 _PATIENCE = 60.0  # for a scheduler that was there before [s]
-_POLL = 1.0  # between two looks at jobs of Slurm [s]
 
 
 class Backend(ABC):
@@ -159,7 +156,9 @@ class DaskBackend(Backend):
         try:
             from distributed import Client
         except ImportError as error:
-            raise _missing("dask", "distributed") from error
+            raise ShotError(
+                "distributed is not installed", path="distributed", remedy="pip install 'calmotion[dask]'"
+            ) from error
         try:
             client: Any = Client
             return client(f"tcp://{self._address}", timeout=seconds, set_as_default=False)
@@ -170,110 +169,22 @@ class DaskBackend(Backend):
             ) from error  # fmt: skip
 
 
-class SlurmBackend(Backend):
-    """Jobs of Slurm, by `submitit`.
-
-    Args:
-        folder: Of the files of submitit, which all nodes see.
-        parameters: Of `submitit.AutoExecutor.update_parameters`; `cluster` names another of its clusters.
-        workers: Most jobs at once; None: all.
-
-    Raises:
-        ShotError: `submitit` is not installed, or there is no Slurm here.
-        SettingError: A parameter does not fit.
-    """
-
-    def __init__(self, folder: str, parameters: dict[str, str], workers: int | None):
-        try:
-            import submitit
-        except ImportError as error:
-            raise _missing(SLURM, "submitit") from error
-        self.limit = workers
-        values: dict[str, Any] = {key: int(v) if v.isdigit() else v for key, v in parameters.items()}
-        cluster = str(values.pop("cluster", SLURM))
-        try:
-            executor = submitit.AutoExecutor(folder=folder, cluster=cluster)
-            executor.update_parameters(**{"timeout_min": 24 * 60, "name": "calmotion", **values})
-        except RuntimeError as error:
-            raise ShotError(
-                "jobs cannot be submitted to Slurm here", path=cluster, found=error, remedy="Run it where sbatch is"
-            ) from error
-        except (NameError, TypeError, ValueError) as error:
-            raise SettingError("Slurm does not take this parameter", path="--on", found=error) from error
-        self._executor = SubmititExecutor(executor)
-
-    def submit(self, fields: dict[str, Any], avoid: str) -> Future[dict[str, Any]]:
-        return self._executor.submit(attempt, fields)
-
-    def call(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        return self._executor.submit(function, *arguments)
-
-    def close(self) -> None:
-        self._executor.shutdown(wait=False, cancel_futures=True)
-
-
-class SubmititExecutor(Executor):
-    """`submitit` behind the interface of `concurrent.futures`.
-
-    Args:
-        executor: A `submitit.Executor`.
-    """
-
-    def __init__(self, executor: Any):
-        self._executor, self._closed = executor, threading.Event()
-        self._jobs: dict[Future[Any], Any] = {}
-        self._thread = threading.Thread(target=self._watch, daemon=True)
-        self._thread.start()
-
-    def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Submit a call."""
-        future: Future[Any] = Future()
-        future.set_running_or_notify_cancel()
-        self._jobs[future] = self._executor.submit(function, *args, **kwargs)
-        return future
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End; with `cancel_futures` jobs that run are cancelled too."""
-        if cancel_futures:
-            for job in list(self._jobs.values()):
-                job.cancel(check=False)
-        elif wait:
-            while self._jobs:
-                time.sleep(_POLL)
-        self._closed.set()
-
-    def _watch(self) -> None:
-        while not self._closed.wait(_POLL):
-            for future, job in list(self._jobs.items()):
-                if job.done():
-                    try:
-                        future.set_result(job.result())
-                    except Exception as error:  # of the job, or of a node that is gone
-                        future.set_exception(error)
-                    del self._jobs[future]
-
-
-def backend_for(on: str, workers: int | None, folder: str) -> Backend:
+def backend_for(on: str, workers: int | None) -> Backend:
     """The backend that a text names.
 
     Args:
-        on: `local`, `dask://HOST:PORT` or `slurm`, also with parameters (`slurm?slurm_partition=cpu`).
+        on: `local` or `dask://HOST:PORT`.
         workers: Most jobs at once; None: one for each processor (local), or as many as there is room for.
-        folder: Of the batch's logs.
 
     Raises:
         SettingError: There is no such backend.
         ShotError: It is not there.
     """
     refuse_unknown_place(on)
-    kind, _, rest = on.partition("://")
     if on == LOCAL:
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         return LocalBackend(workers or cores)
-    if kind == DASK and rest:
-        return DaskBackend(rest, workers)
-    parameters = on.partition("?")[2]
-    return SlurmBackend(os.path.join(folder, SLURM), dict(parse_qsl(parameters)), workers)
+    return DaskBackend(on.partition("://")[2], workers)
 
 
 def refuse_unknown_place(on: str) -> None:
@@ -283,10 +194,12 @@ def refuse_unknown_place(on: str) -> None:
         SettingError: There is none of that name.
     """
     kind, _, rest = on.partition("://")
-    if on != LOCAL and not (kind == DASK and rest) and on.partition("?")[0] != SLURM:
-        raise SettingError(
-            "a batch cannot run there", path="--on", found=on, remedy="Use local, dask://HOST:PORT, or slurm"
-        )
+    if on == LOCAL or (kind == DASK and rest):
+        return
+    remedy = "Use local or dask://HOST:PORT"
+    if on.startswith("slurm"):
+        remedy = "Start Dask in Slurm (SLURMCluster of dask-jobqueue), and use dask://HOST:PORT of its scheduler"
+    raise SettingError("a batch cannot run there", path="--on", found=on, remedy=remedy)
 
 
 def _version() -> str:
@@ -305,7 +218,3 @@ def _on_dask(fields: dict[str, Any]) -> dict[str, Any]:
     from distributed import get_worker
 
     return attempt(fields) | {"worker": get_worker().address}
-
-
-def _missing(extra: str, package: str) -> ShotError:
-    return ShotError(f"{package} is not installed", path=package, remedy=f"pip install 'calmotion[{extra}]'")

@@ -57,7 +57,7 @@ def batch(
         command: `optimize` or `simulate`.
         arguments: Options of that command, such as `("--tolerance", "1mm")`.
         extras: Further outputs of each shot: `csv`, `rrd`, `figures`, `video`.
-        on: `local`, `dask://HOST:PORT` or `slurm`, also with its parameters (`slurm?partition=cpu`).
+        on: `local` or `dask://HOST:PORT`.
         workers: Most jobs at once; None: one for each processor (local), or all.
         environment: Variables of the jobs' processes.
         progress: Called with a `Progress`.
@@ -102,7 +102,7 @@ def run_jobs(
         left = [job for job in jobs if not state.keep(job)]
         state.write()
         if left:
-            backend = backend_for(on, workers, os.path.join(target, LOGS))
+            backend = backend_for(on, workers)
             try:
                 _work(backend, left, state, cancel)
             except KeyboardInterrupt:

@@ -29,10 +29,7 @@ def add_to(commands: Commands) -> None:
     report_options(command)
     command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
     group = command.add_argument_group("workers")
-    group.add_argument(
-        "--on", metavar="WHERE", default="local",
-        help="local (default), dask://HOST:PORT, or slurm, also with its parameters: 'slurm?slurm_partition=cpu'",
-    )  # fmt: skip
+    group.add_argument("--on", metavar="WHERE", default="local", help="local (default) or dask://HOST:PORT")
     group.add_argument(
         "--workers",
         metavar="N",
