@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
@@ -78,6 +80,38 @@ def test_a_flexible_link_without_inertia_has_the_mass_of_its_material(make):
     fore = next(body for body in character.bodies if body.path == FORE)
     assert fore.mass is None and fore.flexible.material.density == pytest.approx(ABS.density)
     assert any("of their material: fore.arm" in note for note in notes)
+
+
+def geoms(*authored):
+    """The fore arm with cubes of 0.1 m as an MJCF converter writes them, each with one attribute."""
+    cube = """def Cube "geom{}" (prepend apiSchemas = ["PhysicsCollisionAPI", "MjcCollisionAPI", "PhysicsMassAPI"])
+        {{
+            double size = 0.1
+            float physics:{}
+        }}
+        def Xform "tool0\""""
+    cubes = [cube.format(k, text) for k, text in enumerate(authored)]
+    return lambda text: functools.reduce(lambda t, c: t.replace('def Xform "tool0"', c, 1), cubes, text)
+
+
+def fore_mass(make, *authored, **options):
+    character, _, _ = make(geoms(*authored), without_mass=(), **options)
+    mass = next(body.mass for body in character.bodies if body.path == FORE)
+    return None if mass is None else mass.mass
+
+
+@pytest.mark.parametrize("nothing", ["mass = 0", "density = 0"])
+def test_a_geom_of_no_mass_weighs_nothing(make, nothing):
+    assert fore_mass(make, "mass = 0.5", nothing) == pytest.approx(0.5, rel=1e-6)
+    assert fore_mass(make, nothing) == pytest.approx(1e-6), "a link of such geoms alone is a frame"
+
+
+def test_what_the_geoms_of_a_flexible_link_weigh_is_believed_and_a_default_density_is_not(make):
+    links = (FlexibleLinks("fore*", "abs", ABS),)
+    assert fore_mass(make, "mass = 0.5", flexible=links) == pytest.approx(0.5)
+    assert fore_mass(make, "density = 2700", flexible=links) == pytest.approx(2.7, rel=1e-6)
+    assert fore_mass(make, "density = 1000", flexible=links) is None, "the material decides"
+    assert fore_mass(make, "mass = 0", flexible=links) is None, "the material decides"
 
 
 def test_links_of_no_mass_are_frames_of_almost_none(make):

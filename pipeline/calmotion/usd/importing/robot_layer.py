@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 _FRAME_MASS, _FRAME_INERTIA = 1e-6, 1e-10  # of links without mass [kg], [kg m^2]
 _SMALLEST_MOMENT, _RAISED = 1e-6, 1e-2  # of the largest moment of inertia of a link
+_WEIGHTLESS = 1e-9  # of a geom of mass 0 [kg]: UsdPhysics reads 0 as not authored
+_MUJOCO_DENSITY = 1000.0  # which the converter writes where the file states none [kg/m^3]
 _THICKNESS = "calm:flexible:wallThickness"
 
 
@@ -152,7 +154,7 @@ class _Author:
         """Densities of the links that have no inertia, and a milligram for those that have no mass."""
         from pxr import Gf, UsdPhysics
 
-        frames = [prim for prim in self._bodies if named(prim) in self._options.massless]
+        frames = [prim for prim in self._bodies if named(prim) in self._options.massless or self._weighs_nothing(prim)]
         for prim in frames:
             api = UsdPhysics.MassAPI.Apply(prim)
             api.CreateMassAttr(_FRAME_MASS / self._units.mass(1.0))
@@ -181,6 +183,20 @@ class _Author:
             api = UsdPhysics.MassAPI.Apply(prim)
             api.CreateDensityAttr(solid.density / self._units.density(1.0))
         self.notes.append(f"links without inertia have that of their geometry as solid parts: {names}")
+
+    def _weighs_nothing(self, body: Usd.Prim) -> bool:
+        """Whether all geoms of a rigid link of an MJCF are of mass 0; where some are, they are made weightless."""
+        from pxr import UsdPhysics
+
+        geoms = list(_geoms(body))
+        weightless = [prim for prim in geoms if _weight(prim) == 0.0]
+        if not weightless or _weight(body):
+            return False
+        if len(weightless) == len(geoms):  # a flexible one weighs what its material does
+            return not self._is_flexible(body)
+        for prim in weightless:
+            UsdPhysics.MassAPI.Apply(prim).CreateMassAttr(_WEIGHTLESS / self._units.mass(1.0))
+        return False
 
     def _raise_moments(self) -> None:
         """Dummy links often have inertias that no body has, with all products as large as the moments."""
@@ -234,6 +250,7 @@ class _Author:
                         attribute="--flexible", found=given.pattern, remedy="Make one of them narrower",
                     )  # fmt: skip
                 flexible.add(str(prim.GetPath()))
+                self._leave_out_default_density(prim)
                 prim.AddAppliedSchema("CalmFlexibleBodyAPI")
                 UsdShade.MaterialBindingAPI.Apply(prim).Bind(shader, materialPurpose="physics")
                 if given.thickness is not None:
@@ -241,6 +258,13 @@ class _Author:
                         _THICKNESS, Sdf.ValueTypeNames.Float, False, Sdf.VariabilityUniform
                     )
                     thickness.Set(given.thickness / self._units.length(1.0))
+
+    def _leave_out_default_density(self, body: Usd.Prim) -> None:
+        """A density that MuJoCo assumes is not one that the file states: the material has a better one."""
+        for prim in _geoms(body):
+            density = prim.GetAttribute("physics:density")
+            if density and density.HasAuthoredValue() and self._units.density(density.Get()) == _MUJOCO_DENSITY:
+                density.Block()
 
     def targets(self) -> None:
         """Targets at links, or at frames that links carry."""
@@ -289,6 +313,17 @@ def _has_no_mass(body: Usd.Prim) -> bool:
     return not any(attribute.Get() for attribute in authored) and not any(
         is_applied(prim, "PhysicsCollisionAPI") for prim in _below(body)
     )
+
+
+def _geoms(body: Usd.Prim) -> Iterable[Usd.Prim]:
+    """The colliders of a link of an MJCF."""
+    return (prim for prim in _below(body) if is_applied(prim, "MjcCollisionAPI"))
+
+
+def _weight(prim: Usd.Prim) -> float | None:
+    """What is authored of the mass of a prim, else of its density; None where nothing is."""
+    attributes = (prim.GetAttribute(f"physics:{what}") for what in ("mass", "density"))
+    return next((float(a.Get()) for a in attributes if a and a.HasAuthoredValue()), None)
 
 
 def _below(body: Usd.Prim) -> Iterable[Usd.Prim]:

@@ -248,20 +248,18 @@ def _body(reading: Reading, path: str, pose: Pose, joints: list[str], fixed: boo
     if flexible is not None:
         note_unread_shape(reading, shapes)
         flexible = replace(flexible, material=with_parts(reading, prim, flexible.material, shapes))
-    if flexible is not None and not mass.has_authored_mass(prim):
-        properties = None  # the mesh and the density of the material decide
-    else:
-        properties = mass.mass_of(reading, prim, pose, shapes)
-        if properties is None and fixed:
-            properties = MassProperties(1.0, np.zeros(3), np.eye(3))
-            reading.note(f"{path}: it has no mass, and none is needed: a joint fixes it to the world")
-        if properties is None:
+    believed = flexible is None or mass.states_mass(prim, shapes)
+    properties = mass.mass_of(reading, prim, pose, shapes) if believed else None
+    if properties is None and flexible is None:  # otherwise the mesh and the density of the material decide
+        if not fixed:
             raise ShotError(
                 "a body without mass: neither a mass, nor a density with geometry, nor a collider is authored",
                 path=path,
                 attribute="physics:mass",
                 remedy="Apply PhysicsMassAPI and author physics:mass, or physics:density where the body has geometry",
             )
+        properties = MassProperties(1.0, np.zeros(3), np.eye(3))
+        reading.note(f"{path}: it has no mass, and none is needed: a joint fixes it to the world")
     if properties is not None and not (np.isfinite(properties.mass) and np.all(np.isfinite(properties.inertia))):
         raise ShotError(
             "its mass, or the inertia that follows from its geometry, is not finite",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
-from pxr import Gf, Sdf, UsdGeom
+from pxr import Gf, Sdf, UsdGeom, UsdPhysics
 from small_shots import FORE, Scale, make_flexible, set_float, write_arm
 
 
@@ -52,6 +52,30 @@ def test_the_mass_of_a_flexible_body_is_left_to_its_density(tmp_path):
 
     assert fore(tmp_path, edit)[0].mass is None
     assert fore(tmp_path, make_flexible)[0].mass.mass == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("name", "value", "mass"), [("physics:mass", 0.7, 0.7), ("physics:density", 2700.0, 1.728)])
+def test_a_mass_or_density_stated_on_a_collider_is_believed_of_a_flexible_body_too(tmp_path, name, value, mass):
+    def edit(stage):
+        make_flexible(stage)
+        stage.GetPrimAtPath(FORE).RemoveProperty("physics:mass")
+        box = UsdGeom.Cube.Define(stage, f"{FORE}/collider")
+        UsdGeom.XformCommonAPI(box).SetScale(Gf.Vec3f(0.4, 0.04, 0.04))
+        box.CreateSizeAttr(1.0)
+        UsdPhysics.CollisionAPI.Apply(box.GetPrim())
+        UsdPhysics.MassAPI.Apply(box.GetPrim())
+        set_float(stage, f"{FORE}/collider", name, value)
+
+    assert fore(tmp_path, edit)[0].mass.mass == pytest.approx(mass, rel=1e-5)
+
+
+def test_a_site_of_mujoco_is_no_geometry(tmp_path):
+    def edit(stage):
+        make_flexible(stage)
+        UsdGeom.Cube.Define(stage, f"{FORE}/site").GetPrim().AddAppliedSchema("MjcSiteAPI")
+
+    body = fore(tmp_path, edit)[0]
+    assert body.surfaces and not any(surface.path.endswith("site") for surface in body.surfaces)
 
 
 def test_a_mesh_file_is_found_beside_the_layer_that_names_it(tmp_path):

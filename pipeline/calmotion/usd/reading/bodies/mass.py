@@ -66,9 +66,15 @@ def mass_of(reading: Reading, prim: Usd.Prim, pose: Pose, shapes: list[Shape]) -
     )
 
 
-def has_authored_mass(prim: Usd.Prim) -> bool:
-    """Whether a mass is authored on the body itself; refuses one that is negative."""
-    return _authored(prim, "physics:mass", "mass") is not None
+def states_mass(prim: Usd.Prim, shapes: list[Shape]) -> bool:
+    """Whether a mass or density is authored on a body or its solids, materials aside; refuses one that is negative."""
+    stating = (prim, *(shape.prim for shape in _solids(shapes)))
+    return any(_authored(p, f"physics:{what}", what) is not None for p in stating for what in ("mass", "density"))
+
+
+def _solids(shapes: list[Shape]) -> list[Shape]:
+    """The geometry that gives a body its mass: its colliders, else what is visible."""
+    return [s for s in shapes if s.collider] or [s for s in shapes if s.surface.visible]
 
 
 def _authored(prim: Usd.Prim, name: str, what: str) -> float | None:
@@ -158,17 +164,15 @@ def _from_geometry(
     """Mass properties from geometry and densities, scaled to the authored mass of the body where there is one."""
     _note_unread_colliders(reading, prim)
     _note_unread_masses(reading, prim, {shape.prim.GetPath() for shape in shapes})
-    colliders = [s for s in shapes if s.collider]
-    solids = colliders or [s for s in shapes if s.surface.visible]
     density = _authored(prim, "physics:density", "density")
     parts: list[MassProperties] = []
-    for shape in solids:
+    for shape in _solids(shapes):
         separate = shape.prim != prim  # a body may itself be its only geometry
         part_density = _authored(shape.prim, "physics:density", "density") if separate else None
         part_density = part_density or density or _material_density(shape.prim)
         part_mass = _authored(shape.prim, "physics:mass", "mass") if separate else None
         si = None if part_density is None else reading.units.density(part_density)
-        if si is None and (colliders or body_mass is not None or part_mass is not None):
+        if si is None and (shape.collider or body_mass is not None or part_mass is not None):
             si = _DEFAULT_DENSITY
             if body_mass is None and part_mass is None:
                 reading.note(

@@ -139,8 +139,13 @@ def tets_of(reading: Reading, body_prim: Usd.Prim, pose: Pose) -> TetGeometry | 
 
 
 def _is_elsewhere(prim: Usd.Prim) -> bool:
-    """Whether what is below a prim is no geometry of the body above it: another body, or patterns of instances."""
-    return is_rigid_body(prim) or prim.GetParent().GetTypeName() == "PointInstancer"
+    """Whether what is below a prim is no geometry of the body above it: another body, patterns of instances, or a
+    mark (a site of MuJoCo)."""
+    return is_rigid_body(prim) or _is_mark(prim) or prim.GetParent().GetTypeName() == "PointInstancer"
+
+
+def _is_mark(prim: Usd.Prim) -> bool:
+    return is_applied(prim, "MjcSiteAPI")
 
 
 def _refuse_or_note_instances(reading: Reading, prim: Usd.Prim, body_prim: Usd.Prim) -> None:
