@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.sparse.csgraph import maximum_bipartite_matching
 
-from calmotion.linear_algebra.vertex_cover import vertex_cover
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, BoolArray
 
 _LEAF = 48  # largest number of nodes of a piece that is not cut
 _LANDMARKS = 4  # nodes from which distances in the graph are measured
@@ -176,7 +176,7 @@ def _cut(graph: Any, heights: Array) -> tuple[Any, Any, Any] | None:
     cuts.sort(key=lambda cut: cut[0])
     separator, left, least = np.zeros(0, dtype=np.int64), cuts[0][2], np.inf
     for _, weight, side in cuts[:_COVERED]:
-        cover = vertex_cover(graph, side)
+        cover = _cover(graph, side)
         if weight * len(cover) < least:
             separator, left, least = cover, side, weight * len(cover)
     if len(separator) > _DENSE * n:
@@ -184,3 +184,23 @@ def _cut(graph: Any, heights: Array) -> tuple[Any, Any, Any] | None:
     side = left.astype(np.int8)
     side[separator] = 2
     return separator, np.flatnonzero(side == 1), np.flatnonzero(side == 0)
+
+
+def _cover(graph: Any, left: BoolArray) -> Any:
+    """The least set of nodes (indices, of both sides) that touches all edges between the left nodes and the others.
+
+    By the theorem of Koenig: of the left nodes those that no alternating path from a left node without a partner
+    reaches, and of the others those that one reaches. It does not depend on which of the largest matchings is found.
+    """
+    near, far = np.flatnonzero(left), np.flatnonzero(~left)
+    across = graph[near][:, far]
+    across.data = np.ones(across.nnz, dtype=np.int32)
+    partner = maximum_bipartite_matching(across, perm_type="column")
+    matched = np.flatnonzero(partner >= 0)
+    reached, grows = partner < 0, True
+    while grows:
+        beyond = across.T @ reached > 0
+        more = beyond[partner[matched]] & ~reached[matched]
+        reached[matched] |= more
+        grows = bool(more.any())
+    return np.concatenate([near[~reached], far[beyond]])
