@@ -2,7 +2,7 @@
 
 # From the lowest floor to the highest; rooms of one floor do not know each other.
 FLOORS = (
-    ("errors", "version"),
+    ("errors", "public_names", "version"),
     ("support",),
     ("shot",),
     ("geometry", "linear_algebra", "views", "control"),
