@@ -174,3 +174,13 @@ def test_patterns_name_the_joints_that_are_motors(make):
     with pytest.raises(ShotError) as refused:
         make(motors=("elbw",))
     assert refused.value.attribute == "--motors" and "elbow" in refused.value.remedy
+
+
+@pytest.mark.parametrize(("unit", "ref"), [("degree", 30.0), ("radian", np.radians(30.0))])
+def test_limits_of_a_joint_of_mujoco_count_from_the_pose_of_the_file(make, unit, ref):
+    joint = 'def PhysicsRevoluteJoint "elbow"\n        {'
+    authored = f"uniform double mjc:ref = {ref}\nfloat physics:lowerLimit = -20\nfloat physics:upperLimit = 90\n"
+    scene = f'def Scope "Scene"\n{{\nuniform token mjc:compiler:angle = "{unit}"\n}}\n'
+    character, _, _ = make(lambda text: text.replace(joint, joint + "\n" + authored) + scene)
+    elbow = next(joint for joint in character.joints if joint.path == ELBOW)
+    np.testing.assert_allclose(np.degrees([elbow.lower, elbow.upper]), [-50.0, 60.0], rtol=1e-6)

@@ -37,3 +37,36 @@ def test_tendons_and_shifted_joints_are_told(read):
     assert "tendons are not read" in told and "grip" in told
     (told,) = read(robot("hip").replace("axis", 'ref="30" axis')).unread
     assert "hip" in told and "subtract ref" in told
+
+
+def test_springs_of_joints_are_told(read):
+    (told,) = read(robot("hip").replace("axis", 'stiffness="3" axis')).unread
+    assert "springs of joints" in told and "hip" in told
+
+
+def test_a_joint_that_follows_by_a_curve_is_refused(read):
+    follower = '<equality><joint joint1="knee" joint2="hip" polycoef="{}"/></equality>'
+    assert read(robot("hip", extra=follower.format("0.1 1 0 0 0"))).unread == ()
+    with pytest.raises(ShotError, match="by a curve") as refused:
+        read(robot("hip", extra=follower.format("0.1 1 1.5 0 0")))
+    assert refused.value.attribute == "equality joint knee polycoef" and refused.value.found == "0.1 1 1.5 0 0"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "body"),
+    [
+        ("settotalmass", "3", ""),
+        ("inertiafromgeom", "true", '<inertial pos="0 0 0" mass="1"/>'),
+        ("inertiagrouprange", "0 0", '<geom size="1" group="1"/>'),
+    ],
+)
+def test_settings_that_change_masses_are_refused(read, name, value, body):
+    def text(value, body):
+        compiler = f'<compiler {name}="{value}"/>'
+        return robot("hip", extra=compiler).replace("<geom", f"{body}<geom", 1)
+
+    with pytest.raises(ShotError, match="changes masses") as refused:
+        read(text(value, body))
+    assert refused.value.attribute == f"compiler {name}" and f"remove {name}" in refused.value.remedy
+    harmless = {"settotalmass": "-1", "inertiafromgeom": "true", "inertiagrouprange": "0 0"}[name]
+    assert read(text(harmless, "")).unread == (), "it changes nothing"

@@ -16,7 +16,7 @@ from calmotion.shot import MotorTracks
 from calmotion.support.naming import nearest
 from calmotion.usd import stages
 from calmotion.usd.diagnostics import quiet
-from calmotion.usd.importing.robot_motors import author_motors, named
+from calmotion.usd.importing.robot_motors import author_motors, named, shift_limits
 from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.rigging.materials import author_material
 from calmotion.usd.schemas import is_applied
@@ -228,6 +228,7 @@ class _Author:
 
     def motors(self) -> None:
         """Drives, see `robot_motors`."""
+        shift_limits(self._stage)
         options = self._options
         self.notes += author_motors(
             self._stage, self._units, options.motion, self._rate, options.efforts, options.motors

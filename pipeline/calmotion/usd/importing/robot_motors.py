@@ -14,7 +14,7 @@ from calmotion.shot import MotorTracks
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dialects import GEARS
-from calmotion.usd.reading.context import body_on
+from calmotion.usd.reading.context import body_on, prims_of
 from calmotion.usd.reading.generic_joints import freedoms
 from calmotion.usd.reading.joints import joint_prims
 from calmotion.usd.reading.motors.driven_motors import actuated_joints
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from pxr import Usd
 
 ALL = "all"
+_LIMITS = ("physics:lowerLimit", "physics:upperLimit")
 _DRIVES = {"PhysicsRevoluteJoint": "angular", "PhysicsPrismaticJoint": "linear"}
 
 
@@ -80,6 +81,22 @@ def axes_of(prim: Usd.Prim) -> list[Axis]:
         return [Axis(prim, name, len(names) > 1) for name in names]
     drive = _DRIVES.get(str(prim.GetTypeName()))
     return [] if drive is None else [Axis(prim, drive)]
+
+
+def shift_limits(stage: Usd.Stage) -> None:
+    """Count the limits of MuJoCo's joints from the pose of the file, where their value is `ref` and becomes 0."""
+    radians = any(prim.GetAttribute("mjc:compiler:angle").Get() == "radian" for prim in prims_of(stage))
+    for prim in joint_prims(stage):
+        attribute = prim.GetAttribute("mjc:ref")
+        ref = attribute.Get() if attribute else None
+        if not ref or prim.GetTypeName() not in _DRIVES:
+            continue
+        shift = np.degrees(ref) if radians and prim.GetTypeName() == "PhysicsRevoluteJoint" else ref
+        for name in _LIMITS:
+            limit = prim.GetAttribute(name)
+            if limit and limit.HasAuthoredValue():
+                limit.Set(float(limit.Get() - shift))
+        attribute.Set(0.0)
 
 
 def author_motors(
@@ -149,7 +166,7 @@ def _rest(axis: Axis) -> float:
     """The value nearest to 0 within the limits of a joint."""
     names = freedoms.limits_of(axis.drive)
     if axis.prim.GetTypeName() != freedoms.TYPE:
-        names = ("physics:lowerLimit", "physics:upperLimit")
+        names = _LIMITS
     low, high = (attribute.Get() if (attribute := axis.prim.GetAttribute(name)) else None for name in names)
     low, high = (-np.inf if low is None else low), (np.inf if high is None else high)
     return float(min(max(0.0, low), high)) if low <= high else 0.0

@@ -12,7 +12,12 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.support.files import is_special, refuse_special
 from calmotion.support.foreign_files import remedy_for
 from calmotion.support.naming import nearest
-from calmotion.workflow.importing.mjcf import refuse_several_joints, unread
+from calmotion.workflow.importing.mjcf import (
+    refuse_curved_followers,
+    refuse_other_masses,
+    refuse_several_joints,
+    unread,
+)
 from calmotion.workflow.importing.repairs import (
     PACKAGE,
     faults,
@@ -194,12 +199,13 @@ def _meshes(root: xml.Element) -> Iterator[tuple[str, str]]:
 
 def _refuse_wrong_files(root: xml.Element, path: str, seen: frozenset[str] = frozenset()) -> None:
     """Refuse named pipes and the like among the files of an MJCF robot, for which a converter would wait for ever, and
-    bodies with several joints in any of them.
+    what `mjcf` refuses in any of them.
 
     Args:
         seen: Files that include this one.
     """
-    refuse_several_joints(root, path)
+    for refuse in (refuse_several_joints, refuse_curved_followers, refuse_other_masses):
+        refuse(root, path)
     here = os.path.dirname(os.path.abspath(path))
     named = ("meshdir", "texturedir", "assetdir")
     folders = [here, *(os.path.join(here, node.get(name, "")) for node in root.iter("compiler") for name in named)]
