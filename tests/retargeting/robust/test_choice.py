@@ -87,3 +87,11 @@ def test_robots_with_larger_errors_are_added(shot):
     assert len(following) == 2 and NEAR * errors[2:].max() < again.max() <= errors[2:].max()
     far = [scenario_at(parameters, 6.0 * k * axis) for k in (-1, 1)]
     assert worse_robots(shot, OPTIONS, tracks, parameters, largest(far), points)[0] == ()
+
+
+def test_no_robot_is_worse_where_none_is_left_to_try(shot):
+    tracks, parameters = shot.animation.tracks, uncertain_parameters(shot)
+    assert errors_on(shot, OPTIONS, {"": tracks}, ())[""].shape == (0, len(shot.character.targets))
+    none = np.zeros((0, len(parameters)))
+    found, left = worse_robots(shot, OPTIONS, tracks, parameters, 1e-3, none)
+    assert found == () and left.shape == none.shape

@@ -54,7 +54,8 @@ def errors_on(
         return unknown if off is None else largest_of(off)
 
     found = deviations_on(shot, options, curves, scenarios, largest, progress)
-    return {name: np.array([robot[name] for robot in found]) for name in curves}
+    # of no robot at all as well, one row for each
+    return {name: np.array([robot[name] for robot in found]).reshape(len(found), len(unknown)) for name in curves}
 
 
 def largest_of(deviations: Array) -> Array:
