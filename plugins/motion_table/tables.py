@@ -82,6 +82,8 @@ def _csv(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
             )  # fmt: skip
         head = list(names)
     else:
+        if len(names) == len(head) and TIME not in head:  # names of other columns, as the remedy says
+            head = list(names)
         rows, lines = rows[1:], lines[1:]
     if any(name.endswith(_OUTPUTS) for name in head):
         raise ShotError(

@@ -151,3 +151,11 @@ def test_arrays_that_would_fill_the_memory_are_not_made(read, tmp_path, monkeypa
     monkeypatch.setattr(memory, "_free_memory", lambda: 1e6)
     with pytest.raises(ShotError, match="GB are free"):
         read("holds.npz", None, rate=24.0)
+
+
+def test_columns_of_a_table_whose_times_have_another_name_are_named_by_hand(read):
+    """As the remedy for a table without time_s says: a name, or -, for each column of it."""
+    found = read("a.csv", table("time,j1,j2"), rate=2.0, joints="-,pan,lift")
+    assert list(found.values) == ["pan", "lift"]
+    np.testing.assert_allclose(found.times, [0.0, 0.5, 1.0])
+    np.testing.assert_allclose(found.values["lift"], LIFT)
