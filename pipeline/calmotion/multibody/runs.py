@@ -7,7 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
-from calmotion.multibody.analysis.kinematics import rigid_state, target_frames, target_jacobians
+from calmotion.multibody.analysis.kinematics import (
+    of_components,
+    of_targets,
+    rigid_state,
+    target_frames,
+    target_jacobians,
+)
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.integrators.integrate import integrate
@@ -89,22 +95,17 @@ class LinearizedRun:
         self._linearization = linearization
         states = run.states
         self._by_coordinates = target_jacobians(run.model, states.c, states.q, states.u)
-        self._component = run.model.targets.component
 
     def jvp(self, d_values: Array, d_rates: Array) -> Array:
         """Change of the targets' frames, shape [T, K, 6], with a change of the inputs, shape [T, M] each."""
         joints = self.run.model.joint_angles(d_values), self.run.model.joint_angles(d_rates)
         motion, _ = tangent(self._linearization, *joints)
-        return np.asarray(np.einsum("nkia,nka->nki", self._by_coordinates, motion[:, self._component]))
+        return of_targets(self.run.model, self._by_coordinates, motion)
 
     def vjp(self, gradient: Array) -> tuple[Array, Array]:
         """The transpose of `jvp`, by the discrete adjoint: the derivative of a scalar by values and rates, shape [T, M]
         each, from its derivative by the targets' frames, shape [T, K, 6]."""
-        by_target = np.einsum("nkia,nki->nka", self._by_coordinates, gradient)
-        system = self.run.model.system
-        by_component = np.zeros((len(gradient), len(system.parent), system.size))
-        for target, component in enumerate(self._component):
-            by_component[:, component] += by_target[:, target]
+        by_component = of_components(self.run.model, self._by_coordinates, gradient)
         by_value, by_rate = adjoint(self._linearization, by_component)
         return self.run.model.motor_values(by_value), self.run.model.motor_values(by_rate)
 

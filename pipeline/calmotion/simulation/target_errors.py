@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.multibody.analysis.kinematics import target_jacobians
+from calmotion.multibody.analysis.kinematics import of_components, of_targets, target_jacobians
 from calmotion.multibody.kernels.so3 import inverse_right_jacobian, logarithm, matrix_of
 from calmotion.multibody.model.model import Model
 from calmotion.shot import WeightTrack
@@ -101,12 +101,8 @@ class Objective:
 
     def scatter(self, J: Array, residuals: Array) -> Array:
         """J^T residuals, gathered by component, shape [T, B, N]."""
-        out = np.zeros((len(J), len(self.model.system.parent), J.shape[3]))
-        gathered = np.einsum("nkia,nki->nka", J, residuals)
-        for k, component in enumerate(self.model.targets.component):
-            out[:, component] += gathered[:, k]
-        return out
+        return of_components(self.model, J, residuals)
 
     def gather(self, J: Array, motion: Array) -> Array:
         """J times a change of the components' coordinates of shape [T, B, N], shape [T, K, 6]."""
-        return np.asarray(np.einsum("nkia,nka->nki", J, motion[:, self.model.targets.component]))
+        return of_targets(self.model, J, motion)

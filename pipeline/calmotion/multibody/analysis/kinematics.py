@@ -165,3 +165,21 @@ def target_jacobians(model: Model, c: Array, q: Array, u: Array) -> Array:
     J = np.zeros((len(c), len(model.targets.component), 6, model.system.size))
     _target_jacobians(model.system, _target_work(model), c, q, u, J)
     return J
+
+
+def of_targets(model: Model, J: Array, motion: Array) -> Array:
+    """J times a change of the components' coordinates of shape [T, B, N], shape [T, K, 6].
+
+    Args:
+        J: By the coordinates of each target's component, such as `target_jacobians`, shape [T, K, 6, N].
+    """
+    return np.asarray(np.einsum("nkia,nka->nki", J, motion[:, model.targets.component]))
+
+
+def of_components(model: Model, J: Array, by_target: Array) -> Array:
+    """The transpose of `of_targets`: J^T times quantities of shape [T, K, 6], gathered by component, [T, B, N]."""
+    out = np.zeros((len(J), len(model.system.parent), J.shape[3]))
+    gathered = np.einsum("nkia,nki->nka", J, by_target)
+    for k, component in enumerate(model.targets.component):
+        out[:, component] += gathered[:, k]
+    return out
