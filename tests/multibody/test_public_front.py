@@ -37,6 +37,26 @@ def test_a_drive_gives_a_pendulum_the_frequency_of_its_spring():
     assert frequencies[-1] == pytest.approx(expected, rel=1e-9)
 
 
+def test_a_drive_that_damps_the_joint_lags_behind_a_steady_rate_by_the_ratio_of_its_gains():
+    spinning = mb.Mechanism(gravity=(0, 0, 0))
+    disc = spinning.body("disc", 1.0, (0, 0, 0), (1e-3, 1e-3, 1e-3))
+    hinge = spinning.joint("revolute", mb.WORLD, disc, (0, 0, 0))
+    spinning.motor(hinge, "drive", position_gain=50.0, velocity_gain=2.0, damping_on="joint")
+    spinning.target(disc, (1.0, 0, 0))
+    times = np.arange(1001) * 1e-3
+    run = mb.simulate(spinning.compile(), 0.5 * times[:, None], np.full((1001, 1), 0.5), 1e-3)
+    x, y, _ = run.positions[-1, 0]
+    assert 0.5 - np.arctan2(y, x) == pytest.approx(0.5 * 2.0 / 50.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"), [({"damping_on": "joints"}, "Did you mean joint"), ({"model": "drives"}, "Did you mean drive")]
+)
+def test_motors_of_names_that_do_not_exist_are_refused(given, meant):
+    with pytest.raises(ValueError, match=meant):
+        pendulum(**given)
+
+
 def test_a_motor_turns_the_target_about_its_axis_and_holds_its_weight():
     angle = np.full((3, 1), np.pi / 2)
     run = mb.simulate(pendulum(model="prescribed"), angle, np.zeros((3, 1)), STEP)

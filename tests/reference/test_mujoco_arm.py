@@ -3,6 +3,7 @@
 MuJoCo is in the optional extra `bench`; its step goes to zero at first order.
 """
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -13,12 +14,14 @@ from calmotion.benchmarks.motors.lumped import simulate_lumped
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.shot import Animation, Target, Track
+from calmotion.shot import Animation, MassProperties, Target, Track
 from calmotion.shot.motor import Rotor
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.usd.reading import read_shot
+from motor_runs import pitch, run
+from scipy.interpolate import CubicSpline
 
 K, D, ARMATURE, LENGTH, MASS, END = 60.0, 2.0, 0.03, 0.4, 1.0, 0.8
 LINK = f'<inertial pos="{LENGTH} 0 0" mass="{MASS}" diaginertia="1e-9 1e-9 1e-9"/>'
@@ -67,6 +70,58 @@ def test_arm_moves_as_by_position_actuators_of_mujoco():
     start, workspace = rigid_state(model, angles[0]), Workspace.for_system(model.system)
     states = simulate(model.system, start, angles, rates, h, workspace).states
     assert np.abs(states.u[:, :, 0] - expected).max() < 1e-4 * np.ptp(expected)
+
+
+def test_position_actuator_whose_damping_lags_moves_as_in_mujoco_on_the_same_command():
+    """kp 2000, kv 100 on 0.0825 kg m^2: the joint lags by kv/kp = 50 ms, which the command does not make up for."""
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string("""<mujoco><option integrator="implicit" gravity="0 0 0" timestep="2e-5"/>
+      <worldbody><body><joint name="hinge" axis="0 1 0"/>
+      <inertial pos="0.25 0 0" mass="1" diaginertia="1e-3 2e-2 2e-2"/>
+      </body></worldbody><actuator><position joint="hinge" kp="2000" kv="100"/></actuator></mujoco>""")
+    data, h, every = mujoco.MjData(model), 5e-4, 25
+    times = np.arange(0.0, END, h)
+    expected = []
+    for t in times:
+        expected.append(float(data.qpos[0]))
+        for i in range(every):
+            data.ctrl[:] = command(t + (i + 0.5) * h / every)[0][0]
+            mujoco.mj_step(model, data)
+    character = chain(1, driven=(0,))
+    mass = MassProperties(1.0, np.array([0.25, 0.0, 0.0]), np.diag([1e-3, 2e-2, 2e-2]))
+    (motor,), (body,) = character.motors, character.bodies
+    drive = replace(motor, model="drive", position_gain=2000.0, velocity_gain=100.0, damping_on="joint")
+    ours = compiled(replace(character, bodies=(replace(body, mass=mass),), motors=(drive,), gravity=np.zeros(3)))
+    angles, rates = (part[:, :1] for part in command(times))
+    found, loads = run(ours, angles, rates, h)
+    turned = pitch(found.states)
+    assert np.abs(turned - expected).max() < 1e-4 * np.ptp(expected)
+    assert np.abs(turned - angles[:, 0]).max() > 0.1, "it lags"
+    torque = 2000.0 * (angles[:, 0] - turned) - 100.0 * found.states.V[:, 0, 6]
+    assert np.abs(loads.efforts[:, 0] - torque).max() < 1e-6 * np.abs(torque).max()
+
+
+def test_what_inspect_promises_of_an_imported_position_actuator_is_what_mujoco_does_with_the_file(
+    shared_data, calmotion, tmp_path
+):
+    """An arm of 0.5 m on kp 2000, kv 100, and a table of its angles as commands: 87.65 mm."""
+    mujoco = pytest.importorskip("mujoco")
+    folder, shot = shared_data / "field" / "mjcf_position_actuator", tmp_path / "arm.usda"
+    if not folder.is_dir():
+        pytest.skip("the arm is not here")
+    assert calmotion("import", folder / "arm.xml", "--motion", folder / "wave.csv", "-o", shot).returncode == 0
+    (told,) = json.loads(calmotion("inspect", shot, "--json").stdout)["effects_of_gains"]
+    times, angles = np.loadtxt(folder / "wave.csv", delimiter=",", skiprows=1).T
+    model = mujoco.MjModel.from_xml_path(str(folder / "arm.xml"))
+    model.opt.timestep = (times[1] - times[0]) / 100
+    data, curve, off = mujoco.MjData(model), CubicSpline(times, angles), []
+    for time, angle in zip(times, angles, strict=True):
+        off.append(2 * 0.5 * np.sin(0.5 * abs(data.qpos[0] - angle)))
+        for i in range(100):
+            data.ctrl[0] = curve(min(time + (i + 0.5) * model.opt.timestep, times[-1]))
+            mujoco.mj_step(model, data)
+    assert told["max_error_m"] == pytest.approx(max(off), rel=5e-3) == pytest.approx(0.0876, rel=5e-3)
+    assert told["ideal_max_error_m"] < 1e-6
 
 
 @pytest.mark.long

@@ -11,7 +11,7 @@ from calmotion.cli.reports.left_out import print_left_out
 from calmotion.cli.run_report import NOTHING_SHAKES, prim_paths, print_notes
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
-from calmotion.shot.motor import PRESCRIBED
+from calmotion.shot.motor import ON_ERROR, ON_JOINT, PRESCRIBED
 from calmotion.shot.outputs import ERROR, WARNING
 
 if TYPE_CHECKING:
@@ -127,6 +127,11 @@ def _print_gains(console: Console, report: dict[str, Any]) -> None:
     if rows:
         heads = ["motor", "model", "read from", "position gain", "velocity gain"]
         print_table(console, "Gains of motors", heads, rows, texts=3)
+    for kind, what in _DAMPING.items():
+        own = [m for m in report["motors"] if m["gains_from"] and m["damping_on"] == kind and _gains(m)[1]]
+        if own:
+            gains = f"The velocity gain of {counted(len(own), 'motor')}"
+            say(console, f"{gains} acts on {what} (calm:motor:dampingOn: {kind}).")
     servos = [_servo_row(motor) for motor in report["motors"] if motor["rotor"]]
     if servos:
         heads = ["servo", "type", "armature", "gear", "friction", "viscous", "no-load speed", "delay", "backlash"]
@@ -145,11 +150,20 @@ def _print_gains(console: Console, report: dict[str, Any]) -> None:
         )
 
 
-def _gain_row(motor: dict[str, Any]) -> list[str]:
+_DAMPING = {
+    ON_JOINT: "the joint's own speed, so that a command must lead the motion",
+    ON_ERROR: "the difference of the command's speed and the joint's",
+}
+
+
+def _gains(motor: dict[str, Any]) -> tuple[float, float]:
     newtons, unit = ("n", "m") if "min_m" in motor else ("n_m", "rad")
-    shown = "N/m" if unit == "m" else "N m/rad"
-    position, velocity = motor[f"position_gain_{newtons}_{unit}"], motor[f"velocity_gain_{newtons}_s_{unit}"]
-    per = "N s/m" if unit == "m" else "N m s/rad"
+    return motor[f"position_gain_{newtons}_{unit}"], motor[f"velocity_gain_{newtons}_s_{unit}"]
+
+
+def _gain_row(motor: dict[str, Any]) -> list[str]:
+    (position, velocity), linear = _gains(motor), "min_m" in motor
+    shown, per = ("N/m", "N s/m") if linear else ("N m/rad", "N m s/rad")
     return [motor["path"], motor["model"], motor["gains_from"], f"{position:.4g} {shown}", f"{velocity:.4g} {per}"]
 
 

@@ -10,7 +10,8 @@ from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import WORLD, Body, Character, Frame, Joint, MassProperties, Motor, Target
 from calmotion.shot.character import Array
-from calmotion.shot.motor import PRESCRIBED, Rotor
+from calmotion.shot.motor import MODELS, ON_ERROR, ON_JOINT, PRESCRIBED, Rotor
+from calmotion.support.naming import nearest
 
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -95,18 +96,30 @@ class Mechanism:
 
     def motor(
         self, joint: int, model: str = PRESCRIBED, position_gain: float = 0.0, velocity_gain: float = 0.0,
-        rotor: Rotor | None = None,
+        damping_on: str = ON_ERROR, rotor: Rotor | None = None,
     ) -> int:  # fmt: skip
         """Drive a joint; `prescribed` follows its input exactly, `drive` and `servo` by gains (see `Motor`).
 
+        Args:
+            position_gain, velocity_gain: [N m/rad], [N m s/rad]; N/m and N s/m of a slider.
+            damping_on: What the velocity gain multiplies: `error`, the input's rate less the joint's, or `joint`, the
+                joint's own rate, as in position actuators of MuJoCo.
+            rotor: Of a `servo`.
+
         Returns:
             Its index among the inputs of a simulation.
+
+        Raises:
+            ValueError: A model or a `damping_on` that does not exist.
         """
+        for name, given, allowed in (("model", model, MODELS), ("damping_on", damping_on, (ON_JOINT, ON_ERROR))):
+            if given not in allowed:
+                raise ValueError(f"{name} is {given!r}. {nearest(given, allowed)}Use one of {', '.join(allowed)}")
         linear = self._joints[joint].kind == "prismatic"
         self._motors.append(
             Motor(
                 joint, self._joints[joint].path, "", linear=linear, model=model, position_gain=position_gain,
-                velocity_gain=velocity_gain, rotor=rotor or Rotor(),
+                velocity_gain=velocity_gain, damping_on=damping_on, rotor=rotor or Rotor(),
             )
         )  # fmt: skip
         return len(self._motors) - 1

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-PRESCRIBED, DRIVE, SERVO = "prescribed", "drive", "servo"  # models of motors
+PRESCRIBED, DRIVE, SERVO = MODELS = ("prescribed", "drive", "servo")  # models of motors
+ON_JOINT, ON_ERROR = "joint", "error"  # what a velocity gain multiplies
 FRICTION_SPEED = float(np.radians(5.0))  # within which Coulomb friction changes its sign, where none is given [rad/s]
 
 
@@ -70,6 +71,8 @@ class Motor:
             and a damper pull the joint; SERVO: they turn a rotor, which moves the joint through a gear.
         position_gain: Stiffness of the drive [N m/rad].
         velocity_gain: Its damping [N m s/rad].
+        damping_on: What that multiplies: ON_ERROR: the difference of the command's rate and the joint's (the rotor's,
+            of a SERVO), ON_JOINT: the joint's own rate.
         gains_from: Where these were read, also where the model does not use them.
         rotor: Of a SERVO.
         delay: Time after which the command acts [s]; not of a PRESCRIBED motor, which does not use it.
@@ -91,6 +94,7 @@ class Motor:
     model: str = PRESCRIBED
     position_gain: float = 0.0
     velocity_gain: float = 0.0
+    damping_on: str = ON_ERROR
     gains_from: str = ""
     rotor: Rotor = Rotor()
     delay: float = 0.0

@@ -250,6 +250,7 @@ def _motor(motor: Motor, track: Track, character: Character) -> dict[str, Any]:
         f"position_gain_{newtons}_{unit}": motor.position_gain,
         f"velocity_gain_{newtons}_s_{unit}": motor.velocity_gain,
         "gains_from": motor.gains_from,
+        "damping_on": motor.damping_on,
         "type": motor.kind,
         "delay_s": motor.delay,
         f"backlash_{unit}": motor.backlash,

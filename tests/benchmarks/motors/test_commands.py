@@ -17,9 +17,9 @@ from small_shots import ELBOW, SHOULDER, write_arm
 FRAMES = np.arange(25) / 24.0
 
 
-def arm():
+def arm(**more):
     character = chain(2, driven=(0, 1), length=0.3)
-    changes = {"model": "servo", "position_gain": 150.0, "velocity_gain": 6.0, "rotor": Rotor(0.02)}
+    changes = {"model": "servo", "position_gain": 150.0, "velocity_gain": 6.0, "rotor": Rotor(0.02)} | more
     wave = 1.0 - np.cos(2 * np.pi * FRAMES)
     tracks = (Track(FRAMES, 0.3 * wave), Track(FRAMES, -0.5 * wave))
     return replace(character, motors=tuple(replace(m, **changes) for m in character.motors)), Animation(
@@ -27,9 +27,10 @@ def arm():
     )
 
 
-def test_commands_with_the_model_leave_a_tenth_of_the_error_also_in_mujoco():
+@pytest.mark.parametrize("damping_on", ["error", "joint"])
+def test_commands_with_the_model_leave_a_tenth_of_the_error_also_in_mujoco(damping_on):
     pytest.importorskip("mujoco")
-    row = compare("arm", compile_shot(*arm()), step=1 / 240)
+    row = compare("arm", compile_shot(*arm(damping_on=damping_on)), step=1 / 240)
     assert row.ideal_mm > 10.0 and row.mujoco_ideal_mm == pytest.approx(row.ideal_mm, rel=0.02)
     assert row.share < ALLOWED and row.mujoco_share < ALLOWED and row.apart < 2e-3
     assert row.optimised_mm == pytest.approx(row.share * row.ideal_mm) and row.motors == 2

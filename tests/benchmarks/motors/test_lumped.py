@@ -55,9 +55,10 @@ def gantry():
     [
         servos(chain(2, driven=(0, 1), length=0.3)),
         servos(chain(2, driven=(0, 1), length=0.3), model="drive", rotor=Rotor(), delay=0.02),
-        servos(gantry(), position_gain=900.0),
+        servos(chain(2, driven=(0, 1), length=0.3), model="drive", rotor=Rotor(), damping_on="joint"),
+        servos(gantry(), position_gain=900.0, damping_on="joint"),
     ],
-    ids=["servos", "late drives", "slider and weld"],
+    ids=["servos", "late drives", "drives damped on the joint", "slider and weld"],
 )
 def test_both_programs_move_the_targets_alike(character):
     pytest.importorskip("mujoco")

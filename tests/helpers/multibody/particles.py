@@ -140,7 +140,7 @@ def particle_system(
         rows=np.array(rows, dtype=np.int32),
         servos=np.zeros(0, dtype=np.int32),
         rotor=np.full(joints, -1, dtype=np.int32),
-        servo=np.zeros((joints, 7)),
+        servo=np.zeros((joints, 8)),
         sliding=np.isin(np.arange(joints), sliding).astype(np.int32),
         moving=np.array([moving.index(j) if j in moving else -1 for j in range(joints)], dtype=np.int32),
         contact=np.zeros(joints, dtype=np.int32),

@@ -35,6 +35,8 @@ def motor_of(model, gain):
     """A motor of a model with all that it may have: friction, gear, limits of torque and speed."""
     if model == "drive":
         return Motor(0, "", "", model="drive", position_gain=gain, velocity_gain=3.0)
+    if model == "damped drive":
+        return Motor(0, "", "", model="drive", position_gain=gain, velocity_gain=3.0, damping_on="joint")
     rotor = Rotor(0.3, np.inf, 0.0, 0.2, 0.4, 0.5, 40.0, 0.2)
     if model == "servo":
         rotor = replace(rotor, gear_stiffness=5.0 * gain, gear_damping=1.0)
@@ -119,7 +121,7 @@ class Case:
 
 
 DRIVES, LOOPED = dict.fromkeys((0, 1, 3), "drive"), dict.fromkeys((0, 1, 4), "drive")
-SERVOS = {0: "servo", 1: "rigid gear", 3: "drive"}
+SERVOS = {0: "servo", 1: "rigid gear", 3: "damped drive"}
 CASES = {
     "driven": ([6, 6, 6, 6], None),
     "with a free hinge": ([6, 6, 5, 6], None),

@@ -8,9 +8,11 @@ from arms import Z_TO_Y, chain, compiled, frame
 from calmotion.errors import ShotError
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.modes import system_modes
+from calmotion.multibody.analysis.reactions import reactions, transmitted
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import rigid_model
 from calmotion.multibody.motors.drives import GivingMotor, add_motors, giving_motors
+from calmotion.multibody.runs import simulate
 from calmotion.multibody.statics.equilibrium import equilibrium
 from calmotion.shot import Body, Character, Joint, MassProperties, Motor
 from motor_runs import pitch, run, smooth
@@ -20,9 +22,9 @@ from scipy.integrate import solve_ivp
 G = 9.81
 
 
-def driven(character, k, d=0.0, **changes):
+def driven(character, k, d=0.0, on="error", **changes):
     """The character with all motors as drives of these gains."""
-    motors = tuple(replace(m, model="drive", position_gain=k, velocity_gain=d) for m in character.motors)
+    motors = tuple(replace(m, model="drive", position_gain=k, velocity_gain=d, damping_on=on) for m in character.motors)
     return compiled(replace(character, motors=motors, **changes))
 
 
@@ -74,6 +76,30 @@ def test_pendulum_follows_its_command_as_the_ordinary_differential_equation_says
         assert np.abs(loads.efforts[:, 0] - torque).max() < 40 * errors[-1] * k
         assert angle[-1] - found.states.u[-1, 0, 0] == pytest.approx(expected[-1], abs=5 * errors[-1])
     assert errors[1] < 2e-2 and np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.25), errors
+
+
+@pytest.mark.parametrize(("integrator", "allowed"), [("bdf2", 2e-4), ("radau", 1e-8)])
+def test_drive_that_damps_the_joint_lags_behind_a_command_in_motion(integrator, allowed):
+    """A mass on a spring to the command and a damper to the ground, whatever an integrator does between instants."""
+    k, d, mass, length = 60.0, 2.0, 0.5, 0.4
+    model = driven(chain(1, driven=(0,), mass=mass, length=length), k, d, "joint", gravity=np.zeros(3))
+
+    def slope(t, y):
+        return [y[1], (k * (smooth(np.array([t]))[0][0, 0] - y[0]) - d * y[1]) / (mass * length**2)]
+
+    exact = solve_ivp(slope, (0, 0.8), [0.0, 0.0], rtol=1e-12, atol=1e-13, dense_output=True)
+    times = np.arange(0.0, 0.8, 1e-3)
+    curve, rate = smooth(times)
+    found = simulate(model, curve, rate, 1e-3, integrator)
+    angle, speed = exact.sol(times)
+    assert np.abs(pitch(found.states) - angle).max() < allowed
+    assert np.abs(found.efforts[:, 0] - k * (curve[:, 0] - angle) + d * speed).max() < 200 * k * allowed
+    assert np.abs(curve[:, 0] - angle).max() > 0.05
+    # limits of effort are kept by the derivatives of what the joint transmits
+    through = transmitted(
+        model.system, reactions(model.system, found.trajectory, found.joint_values, found.joint_rates)
+    )
+    assert np.abs(found.efforts - through).max() < 1e-6 * np.ptp(found.efforts)
 
 
 def test_drives_of_growing_gain_converge_to_ideal_motors_at_first_order():

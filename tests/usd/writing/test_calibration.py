@@ -67,6 +67,7 @@ def test_the_shot_with_the_layer_is_the_calibrated_robot(shot, tmp_path):
     motor = next(motor for motor in found.motors if motor.path == SHOULDER)
     assert motor.position_gain == pytest.approx(80.0, rel=1e-6) and motor.delay == pytest.approx(0.008)
     assert motor.velocity_gain == pytest.approx(2.0, rel=1e-6)  # read from the same dialect as the new gain
+    assert motor.damping_on == next(own.damping_on for own in character.motors if own.path == SHOULDER) == "joint"
     assert (motor.rotor.armature, motor.rotor.friction) == (pytest.approx(0.012), pytest.approx(0.3))
     assert layer.endswith("robot.usda") and stages.role_of(Sdf.Layer.FindOrOpen(layer)) == stages.CALIBRATION
 

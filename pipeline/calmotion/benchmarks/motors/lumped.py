@@ -2,8 +2,8 @@
 
 Its bodies, joints and motors are written as MJCF from a character, so that it shares no equation with Calmotion: a
 tree of bodies with `armature`, `damping` and `position` actuators (`kp`, `kv`). The damping of an actuator is that of
-the joint's own velocity, so it is commanded theta_c + kv/kp theta_c'. Coulomb friction is applied smoothed, as the
-model of the shot has it.
+the joint's own velocity: a motor whose damping acts on the joint is commanded theta_c as it is, another one
+theta_c + kv/kp theta_c'. Coulomb friction is applied smoothed, as the model of the shot has it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from calmotion.errors import ShotError
 from calmotion.shot.character import WORLD, Array, Character, Frame, Joint
-from calmotion.shot.motor import PRESCRIBED, Motor
+from calmotion.shot.motor import ON_ERROR, PRESCRIBED, Motor
 
 STEP = 1e-4  # of MuJoCo's implicit integrator [s]
 _KINDS = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}
@@ -97,11 +97,12 @@ def simulate_lumped(character: Character, times: Array, commands: Array, step: f
     width = np.array([m.rotor.friction_speed for m in motors])
     curve = CubicSpline(times, commands)
     late = np.array([m.delay for m in motors])
+    lead = np.where([m.damping_on == ON_ERROR for m in motors], velocity / position, 0.0)
 
     def command(t: float) -> Array:
         at = np.clip(t - late, times[0], times[-1])
         rate = np.where(t - late > times[0], np.diag(curve(at, 1)), 0.0)
-        return np.asarray(np.diag(curve(at)) + velocity / position * rate)
+        return np.asarray(np.diag(curve(at)) + lead * rate)
 
     data.qpos[places] = commands[0]
     for _ in range(_STATIC):

@@ -114,7 +114,7 @@ def joint_arrays(
         rest[k] = _rest_value(character, bodies_of, position[k], rotation[k], joint.kind == "prismatic")
     arrays = {
         "side": side, "rows": rows, "servos": np.zeros(0, np.int32), "rotor": np.full(count, -1, np.int32),
-        "servo": np.zeros((count, 7)), "sliding": sliding, "moving": moved, "contact": contact, "position": position,
+        "servo": np.zeros((count, 8)), "sliding": sliding, "moving": moved, "contact": contact, "position": position,
         "rotation": rotation, "Phi": Phi, "Psi": Psi,
     }  # fmt: skip
     return JointArrays(arrays, motor, sign, rest)

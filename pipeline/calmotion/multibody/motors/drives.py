@@ -9,7 +9,8 @@ The multiplier of the motor's row is then the force of the drive,
     tau = k_p psi + k_d psi' = k_p (theta_c - theta) + k_d (theta_c' - theta')
 
 so that elimination, statics, tangent and adjoint know no drives, efforts and their limits act on tau, and psi counts
-turns. The limit k_p -> infinity is the ideal motor.
+turns. The limit k_p -> infinity is the ideal motor. A drive whose damper acts on the joint's own speed, -k_d theta', is
+a servo with a rigid gear and a rotor without inertia, friction and limits.
 
 Servo: the rotor's angle phi with its inertia (the armature) and viscous friction, and the deflection psi of the gear
 without inertia, on the gear's spring and damper; the marker is held at zero, theta - phi + psi = 0. The multiplier is
@@ -27,7 +28,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.multibody.model.system import LINEAR, System
 from calmotion.shot.character import Array, IntArray
-from calmotion.shot.motor import PRESCRIBED, SERVO, Motor
+from calmotion.shot.motor import ON_ERROR, PRESCRIBED, SERVO, Motor, Rotor
 
 
 class GivingMotor(NamedTuple):
@@ -80,8 +81,9 @@ def add_motors(system: System, motors: Sequence[GivingMotor]) -> System:
     rotor, servo = system.rotor.copy(), system.servo.copy()
     for joint, motor in motors:
         b = system.side[joint, 1]
-        if motor.model == SERVO:
-            rotor[joint], servo[joint] = elastic[b], _controller(motor)
+        own = _rotor(motor)
+        if own is not None:
+            rotor[joint], servo[joint] = elastic[b], _controller(motor, own)
         for coordinate in _coordinates(motor):
             placed.append((joint, int(elastic[b]), coordinate))
             elastic[b] += 1
@@ -125,7 +127,7 @@ def joint_values(
         b = system.side[joint, 1]
         own = [u[:, b, placed[b] + k] for k in range(len(_coordinates(item)))]
         placed[b] += len(own)
-        if item.model == SERVO:
+        if _rotor(item) is not None:
             values[:, joint] = own[0] - (own[1] if len(own) > 1 else 0.0)
         else:
             values[:, joint] -= own[0]
@@ -134,19 +136,26 @@ def joint_values(
 
 def _coordinates(motor: Motor) -> list[_Coordinate]:
     """Those of one motor, the rotor first."""
-    if motor.model != SERVO:
+    own = _rotor(motor)
+    if own is None:
         return [_Coordinate(0.0, motor.position_gain, motor.velocity_gain, 1.0)]
-    own = motor.rotor
     found = [_Coordinate(own.armature, 0.0, own.viscous_friction, -1.0)]
     if math.isfinite(own.gear_stiffness):
         found.append(_Coordinate(0.0, own.gear_stiffness, own.gear_damping, 1.0))
     return found
 
 
-def _controller(motor: Motor) -> list[float]:
-    """Row of `System.servo`."""
-    own = motor.rotor
+def _rotor(motor: Motor) -> Rotor | None:
+    """What the motor's controller turns; None for a drive whose damper acts on the difference from the command."""
+    if motor.model == SERVO:
+        return motor.rotor
+    return None if motor.damping_on == ON_ERROR else Rotor()
+
+
+def _controller(motor: Motor, own: Rotor) -> list[float]:
+    """Row of `System.servo`; the effort of a drive has no limit of its own."""
     return [
-        motor.position_gain, motor.velocity_gain, own.friction, own.friction_speed, motor.max_torque,
-        1.0 / own.no_load_speed, own.knee,
+        motor.position_gain, motor.velocity_gain, own.friction, own.friction_speed,
+        motor.max_torque if motor.model == SERVO else math.inf, 1.0 / own.no_load_speed, own.knee,
+        float(motor.damping_on == ON_ERROR),
     ]  # fmt: skip

@@ -3,11 +3,12 @@
 The rotor's angle phi, seen at the joint, is an elastic coordinate of the component on the joint's side 1
 (`drives`), whose inertia, viscous friction and gear are entries of the system. Its row also has
 
-    tau_f tanh(phi' / w_f) - tau_m,     tau_m = sat(k_p (theta_c - phi) + k_d (theta_c' - phi'), phi')
+    tau_f tanh(phi' / w_f) - tau_m,     tau_m = sat(k_p (theta_c - phi) + k_d (r theta_c' - phi'), phi')
 
-where sat keeps the torque between limits that depend on the speed: the largest torque T up to a share (the knee) of the
-no-load speed w_0, from there falling linearly to zero at w_0; against the motion it is T. All of it is smooth: with
-s(x) = x / (1 + x^16)^(1/16), which is x to 1e-6 up to x = 0.5 and never exceeds one,
+where r is 1, or 0 for a velocity gain on the joint's own speed, and sat keeps the torque, e, between limits that depend
+on the speed: the largest torque T up to a share (the knee) of the no-load speed w_0, from there falling linearly to
+zero at w_0; against the motion it is T. All of it is smooth: with s(x) = x / (1 + x^16)^(1/16), which is x to 1e-6 up
+to x = 0.5 and never exceeds one,
 
     upper = T s((1 - phi'/w_0) / (1 - knee)),   lower = -T s((1 + phi'/w_0) / (1 - knee))
     tau_m = middle + half s((e - middle) / half),   middle, half = (upper + lower) / 2, (upper - lower) / 2
@@ -24,6 +25,7 @@ from calmotion.multibody.model.system import (
     KNEE,
     LARGEST_EFFORT,
     POSITION_GAIN,
+    RATE_SHARE,
     VELOCITY_GAIN,
     Blocks,
     State,
@@ -78,7 +80,8 @@ def rotor_effort(system: System, joint: int, angle: float, rate: float, state: S
     """tau_m of a servo at a state and a command."""
     b, k = system.side[joint, 1], system.rotor[joint]
     motor, speed = system.servo[joint], state.V[b, 6 + k]
-    wanted = motor[POSITION_GAIN] * (angle - state.u[b, k]) + motor[VELOCITY_GAIN] * (rate - speed)
+    too_slow = motor[RATE_SHARE] * rate - speed
+    wanted = motor[POSITION_GAIN] * (angle - state.u[b, k]) + motor[VELOCITY_GAIN] * too_slow
     return motor_effort(motor, wanted, speed)[0]
 
 
@@ -96,7 +99,7 @@ def servo_rows(
     motor, a = system.servo[joint], 6 + k
     stiffness, damping = motor[POSITION_GAIN], gamma * motor[VELOCITY_GAIN]
     speed = gamma * state.V[b, a]
-    wanted = stiffness * (angle - state.u[b, k]) + damping * (rate - speed)
+    wanted = stiffness * (angle - state.u[b, k]) + damping * (motor[RATE_SHARE] * rate - speed)
     effort, by_wanted, by_speed = motor_effort(motor, wanted, speed)
     friction, width = motor[FRICTION], motor[FRICTION_SPEED]
     drag = math.tanh(speed / width) if friction > 0.0 else 0.0
@@ -108,4 +111,4 @@ def servo_rows(
     if friction > 0.0:
         blocks.P[b, a, a] += friction / width * (1.0 - drag * drag)
     blocks.on_rotor[joint, 0] = -by_wanted * stiffness
-    blocks.on_rotor[joint, 1] = -by_wanted * damping
+    blocks.on_rotor[joint, 1] = -by_wanted * damping * motor[RATE_SHARE]

@@ -32,6 +32,7 @@ from calmotion.shot.calibration.estimates import (
 )
 from calmotion.usd import gf, stages
 from calmotion.usd.layers import write_layer
+from calmotion.usd.reading.actuators.motor_models import DAMPING_ON
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.units import StageUnits, units_of
 from calmotion.usd.writing.metadata import author_origin, author_stage_metadata
@@ -158,6 +159,8 @@ class _Writer:
         self._apply(path, "PhysicsMassAPI")
 
     def _motor(self, path: str, linear: bool) -> None:
+        from pxr import Sdf
+
         units = self._units
         length = units.length(1.0) if linear else float(np.deg2rad(1.0))
         effort = units.force(1.0) if linear else units.torque(1.0)
@@ -169,7 +172,9 @@ class _Writer:
             self._attribute(path, f"calm:motor:{_MOTOR[item.kind]}", item, unit.get(item.kind, effort / length))
         kinds = {item.kind for item in found}
         motor = next(own for own in self._character.motors if own.path == path)
-        # gains are read from one dialect: both are there, or none
+        # gains are read from one dialect: both are there, or none, and what the second multiplies
+        if kinds & {POSITION_GAIN, VELOCITY_GAIN}:
+            self._spec(path, DAMPING_ON, Sdf.ValueTypeNames.Token).default = motor.damping_on
         for kind, value in ((POSITION_GAIN, motor.position_gain), (VELOCITY_GAIN, motor.velocity_gain)):
             if kinds & {POSITION_GAIN, VELOCITY_GAIN} and kind not in kinds:
                 self._number(path, f"calm:motor:{_MOTOR[kind]}", value / (effort / length))

@@ -1,10 +1,12 @@
 """Models of motors, and the gains of drives in the dialects, in SI."""
 
+import json
+
 import pytest
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
 from pxr import Sdf, UsdPhysics, Vt
-from small_shots import ELBOW, Scale, set_float, write_arm
+from small_shots import ELBOW, SHOULDER, Scale, set_float, write_arm
 
 MODEL = "calm:motor:model"
 
@@ -19,8 +21,8 @@ def model(stage, name):
     prim.CreateAttribute(MODEL, Sdf.ValueTypeNames.Token).Set(name)
 
 
-def physics_gains(stage, stiffness, damping=None, kind=None):
-    drive = UsdPhysics.DriveAPI(stage.GetPrimAtPath(ELBOW), "angular")
+def physics_gains(stage, stiffness, damping=None, kind=None, path=ELBOW):
+    drive = UsdPhysics.DriveAPI(stage.GetPrimAtPath(path), "angular")
     drive.CreateStiffnessAttr(stiffness)
     if damping is not None:
         drive.CreateDampingAttr(damping)
@@ -67,6 +69,77 @@ def test_position_actuators_of_mujoco_give_gains_in_radians_with_their_gear(tmp_
     assert motor.position_gain == 0.0, "a torque motor holds no position"
 
 
+def velocities(stage, value, samples=(), authored=""):
+    """A drive with a target velocity."""
+    physics_gains(stage, 2.0, 0.5)
+    attribute = UsdPhysics.DriveAPI(stage.GetPrimAtPath(ELBOW), "angular").CreateTargetVelocityAttr(value)
+    for time, sample in enumerate(samples):
+        attribute.Set(sample, time)
+    if authored:
+        damping_on(stage, authored)
+
+
+def damping_on(stage, what):
+    prim = stage.GetPrimAtPath(ELBOW)
+    prim.AddAppliedSchema("CalmMotorAPI")
+    prim.CreateAttribute("calm:motor:dampingOn", Sdf.ValueTypeNames.Token).Set(what)
+
+
+def own_gains(stage, authored=""):
+    physics_gains(stage, 2.0, 0.5)
+    model(stage, "drive")
+    set_float(stage, ELBOW, "calm:motor:positionGain", 3.0)
+    set_float(stage, ELBOW, "calm:motor:velocityGain", 1.0)
+    if authored:
+        damping_on(stage, authored)
+
+
+@pytest.mark.parametrize(
+    ("edit", "expected"),
+    [
+        (lambda s: physics_gains(s, 2.0, 0.5), "joint"),
+        (lambda s: velocities(s, 0.0), "joint"),
+        (lambda s: velocities(s, 3.0), "error"),
+        (lambda s: velocities(s, 0.0, (0.0, 5.0)), "error"),
+        (lambda s: velocities(s, 0.0, (0.0, 0.0)), "joint"),
+        (lambda s: velocities(s, 0.0, (0.0, 5.0), "joint"), "joint"),
+        (actuator, "joint"),
+        (lambda s: (actuator(s), damping_on(s, "error")), "error"),
+        (own_gains, "error"),
+        (lambda s: own_gains(s, "joint"), "joint"),
+    ],
+    ids=[
+        "drive",
+        "zero",
+        "velocity",
+        "velocities",
+        "zeros",
+        "authored",
+        "MuJoCo",
+        "known better",
+        "own",
+        "own authored",
+    ],
+)
+def test_velocity_gain_multiplies_what_its_source_says_unless_authored(tmp_path, edit, expected):
+    assert read(tmp_path, edit)[1].damping_on == expected
+
+
+def test_inspect_says_what_the_velocity_gains_act_on(tmp_path, calmotion):
+    def both(stage):
+        actuator(stage)
+        physics_gains(stage, 2.0, 0.5, path=SHOULDER)
+        shoulder = UsdPhysics.DriveAPI(stage.GetPrimAtPath(SHOULDER), "angular")
+        shoulder.CreateTargetVelocityAttr(1.0)
+
+    shot = write_arm(tmp_path / "arm.usda", both)
+    told = " ".join(calmotion("inspect", shot).stdout.split())
+    assert "The velocity gain of 1 motor acts on the joint's own speed" in told and "dampingOn: joint" in told
+    assert "The velocity gain of 1 motor acts on the difference" in told and "dampingOn: error" in told
+    motors = json.loads(calmotion("inspect", shot, "--json").stdout)["motors"]
+    assert {motor["path"]: motor["damping_on"] for motor in motors} == {SHOULDER: "error", ELBOW: "joint"}
+
+
 def servo(stage, **values):
     model(stage, "servo")
     for name, value in ({"positionGain": 1.0} | values).items():
@@ -110,6 +183,7 @@ def test_rotors_of_other_dialects_have_degrees_or_radians_as_these_do(tmp_path):
         (lambda s: servo(s, gearStiffness=0.0), "calm:motor:gearStiffness", "must be positive"),
         (lambda s: servo(s, delay=float("inf")), "calm:motor:delay", "finite"),
         (lambda s: model(s, "drives"), MODEL, "Did you mean drive"),
+        (lambda s: damping_on(s, "joints"), "calm:motor:dampingOn", "Did you mean joint"),
         (lambda s: (model(s, "drive"), physics_gains(s, 2.0, -1.0)), "drive:angular:physics:damping", "not negative"),
         (
             lambda s: (model(s, "drive"), physics_gains(s, 2.0, 1.0, "acceleration")),
@@ -117,7 +191,18 @@ def test_rotors_of_other_dialects_have_degrees_or_radians_as_these_do(tmp_path):
             "accelerations",
         ),
     ],
-    ids=["no gain", "servo", "armature", "knee", "gear", "delay", "misspelt", "negative", "acceleration"],
+    ids=[
+        "no gain",
+        "servo",
+        "armature",
+        "knee",
+        "gear",
+        "delay",
+        "misspelt",
+        "misspelt damping",
+        "negative",
+        "acceleration",
+    ],
 )
 def test_models_and_gains_that_cannot_be_used_are_refused(tmp_path, edit, attribute, what):
     with pytest.raises(ShotError, match=what) as caught:

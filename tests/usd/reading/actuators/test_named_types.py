@@ -28,6 +28,7 @@ def test_a_named_motor_has_what_its_table_says(tmp_path):
     assert (motor.rotor.armature, motor.rotor.friction, motor.rotor.viscous_friction) == (0.045, 0.03, 1.084)
     assert motor.max_torque == 4.1 and motor.max_velocity == pytest.approx(46 * math.pi / 30)
     assert motor.backlash == pytest.approx(math.radians(0.25)) and motor.rotor.gear_stiffness == math.inf
+    assert motor.damping_on == "error"
     assert "xm430-w350" in motor.gains_from and "Haarnoja" in motor.gains_from
 
 

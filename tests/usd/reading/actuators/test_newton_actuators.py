@@ -31,6 +31,7 @@ def read(tmp_path, edit):
 def test_gains_are_per_radian_and_efforts_are_limited(tmp_path):
     motor, _ = read(tmp_path, lambda stage: actuator(stage, "NewtonMaxEffortClampingAPI", maxEffort=8.0))
     assert (motor.position_gain, motor.velocity_gain) == (100.0, 7.0) and motor.max_torque <= 8.0
+    assert motor.damping_on == "joint"
     assert motor.gains_from == "newton:kp and newton:kd of /Actuators/Elbow (Newton)" and motor.delay == 0.0
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from calmotion.control.motor_types import MotorType
 from calmotion.errors import ShotError
-from calmotion.shot.motor import DRIVE, PRESCRIBED, SERVO
+from calmotion.shot.motor import MODELS, ON_ERROR, ON_JOINT, PRESCRIBED
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dialects import GAINS, POSITION_ACTUATOR, Spelling, authored
@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from pxr import Usd
 
 _SCHEMA, MODEL = "CalmMotorAPI", "calm:motor:model"
+DAMPING_ON = "calm:motor:dampingOn"
 AUTO = "auto"
-_MODELS = (AUTO, PRESCRIBED, DRIVE, SERVO)
+_MODELS = (AUTO, *MODELS)
 _POSITION, _VELOCITY = GAINS
 
 
@@ -37,11 +38,13 @@ class Gains:
         position: [N m/rad] or [N/m].
         velocity: [N m s/rad] or [N s/m].
         source: Names of the attributes that they were read from, with their dialect; empty where there are none.
+        damping_on: What the velocity gain multiplies, see `Motor`.
     """
 
     position: float = 0.0
     velocity: float = 0.0
     source: str = ""
+    damping_on: str = ON_ERROR
 
 
 def motor_model(prim: Usd.Prim) -> str:
@@ -50,15 +53,21 @@ def motor_model(prim: Usd.Prim) -> str:
     Raises:
         ShotError: A model that does not exist.
     """
-    model = str(schemas.value(prim, _SCHEMA, MODEL) or AUTO)
-    if model in _MODELS:
-        return PRESCRIBED if model == AUTO else model
+    model = _token(prim, MODEL, _MODELS, AUTO, "names a model of motors that does not exist")
+    return PRESCRIBED if model == AUTO else model
+
+
+def _token(prim: Usd.Prim, name: str, allowed: Sequence[str], fallback: str, what: str) -> str:
+    """The value of an attribute that has one of some names."""
+    found = str(schemas.value(prim, _SCHEMA, name) or fallback)
+    if found in allowed:
+        return found
     raise ShotError(
-        "names a model of motors that does not exist",
+        what,
         path=prim.GetPath(),
-        attribute=MODEL,
-        found=model,
-        remedy=f"{nearest(model, _MODELS)}Use one of {', '.join(_MODELS)}",
+        attribute=name,
+        found=found,
+        remedy=f"{nearest(found, allowed)}Use one of {', '.join(allowed)}",
     )
 
 
@@ -76,7 +85,7 @@ def read_gains(
         kind: The named motor; its velocity gain goes with a position gain of Calmotion's, too.
 
     Raises:
-        ShotError: A gain that is negative or not finite, or a motor that gives without a gain.
+        ShotError: A gain that is negative or not finite, a motor that gives without a gain, or a wrong DAMPING_ON.
     """
     used = model != PRESCRIBED
     own, *others = zip(_POSITION, _VELOCITY, strict=True)
@@ -90,11 +99,12 @@ def read_gains(
     )
     if used:
         _refuse_weightless(joint, found, model)
-    return found
+    wrong = "names nothing that a velocity gain multiplies"
+    return replace(found, damping_on=_token(joint.prim, DAMPING_ON, (ON_JOINT, ON_ERROR), found.damping_on, wrong))
 
 
 def _gains_of(kind: MotorType) -> Gains | None:
-    """Those of a named motor."""
+    """Those of a named motor, whose controller is taken to know the velocity of its command."""
     if "position_gain" not in kind.values:
         return None
     source = f"{TYPE} {kind.name} ({kind.sources['position_gain']})"
@@ -124,7 +134,10 @@ def _dialect_gains(
         accelerations = _sets_accelerations(joint) and position.dialect == "UsdPhysics"
         kind = ", of accelerations" if accelerations else ""
         return Gains(
-            values[0], values[-1] if damping is not None else damping_else, f"{names} ({position.dialect}{kind})"
+            position=values[0],
+            velocity=values[-1] if damping is not None else damping_else,
+            source=f"{names} ({position.dialect}{kind})",
+            damping_on=ON_JOINT if position.dialect == "UsdPhysics" and not _is_given_velocities(joint) else ON_ERROR,
         )
     return None
 
@@ -135,12 +148,18 @@ def _sets_accelerations(joint: JointPrim) -> bool:
     return bool(attribute) and attribute.Get() == "acceleration"
 
 
+def _is_given_velocities(joint: JointPrim) -> bool:
+    """Whether the UsdPhysics drive has a target velocity; its damping acts on the joint's own speed where that is 0."""
+    attribute = joint.prim.GetAttribute(f"drive:{joint.drive}:physics:targetVelocity")
+    return bool(attribute) and any([attribute.Get(), *map(attribute.Get, attribute.GetTimeSamples())])
+
+
 def _newton_gains(joint: JointPrim, newton: NewtonActuator | None, units: StageUnits) -> Gains | None:
     """Gains of an actuator of Newton, in radians."""
     if newton is None or not newton.kp > 0.0:
         return None
     to_si = _per_length(units) if joint.kind == "prismatic" else units.torque
-    return Gains(to_si(newton.kp), to_si(newton.kd), f"newton:kp and newton:kd of {newton.path} (Newton)")
+    return Gains(to_si(newton.kp), to_si(newton.kd), f"newton:kp and newton:kd of {newton.path} (Newton)", ON_JOINT)
 
 
 def _actuator_gains(joint: JointPrim, prim: Usd.Prim | None, units: StageUnits) -> Gains | None:
@@ -155,7 +174,7 @@ def _actuator_gains(joint: JointPrim, prim: Usd.Prim | None, units: StageUnits) 
         return None  # not one that holds positions
     to_si = _per_length(units) if joint.kind == "prismatic" else units.torque
     names = f"{POSITION_ACTUATOR[0]} and {POSITION_ACTUATOR[1]} of {prim.GetPath()} (MuJoCo)"
-    return Gains(to_si(ratio**2 * kp), to_si(ratio**2 * max(-bias[2], 0.0)), names)
+    return Gains(to_si(ratio**2 * kp), to_si(ratio**2 * max(-bias[2], 0.0)), names, ON_JOINT)
 
 
 def _numbers(prim: Usd.Prim, name: str) -> list[float]:

@@ -237,6 +237,7 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
         model=model,
         position_gain=gains.position,
         velocity_gain=gains.velocity,
+        damping_on=gains.damping_on,
         gains_from=gains.source,
         rotor=read_rotor(drive.joint, reading.units, model, kind, newton, reading.notes),
         delay=read_delay(drive.joint, model, kind, newton),
