@@ -27,7 +27,7 @@ class BundledFiles(BuildHookInterface):
         # plugins/blender is an extension of Blender, not of ours, and under another licence
         for manifest in sorted(Path(self.root, "plugins").glob("*/plugin.toml")):
             name = manifest.parent.name
-            included[f"plugins/{name}"] = f"{TARGET}/plugins/{name}"
+            included[f"plugins/{name}"] = f"calmotion_plugins/{name}"
         if kernels := os.environ.get("CALMOTION_WHEEL_KERNELS"):
             included[kernels] = f"{TARGET}/kernels"
             build_data["pure_python"] = False

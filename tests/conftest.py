@@ -98,7 +98,9 @@ def make_plugin(tmp_path: Path) -> Callable[..., Path]:
 
 
 def toml(value: object) -> str:
-    """A text, number or list of texts as TOML."""
+    """A text, number, list or table as TOML."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {toml(item)}" for key, item in value.items()) + "}"
     return "[" + ", ".join(toml(item) for item in value) + "]" if isinstance(value, list) else repr(value)
 
 

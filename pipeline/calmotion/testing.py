@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from calmotion.host import Host, Plugin, PluginError, PluginState, Settings
-from calmotion.host.discovery import Location
+from calmotion.host.discovery import Location, PluginCommand
 from calmotion.host.manifest import FILE_NAME
 from calmotion.shot import (
     WORLD,
@@ -86,7 +86,7 @@ def check_plugin(folder: str | Path) -> list[str]:
     """Check a plugin against the rules.
 
     Its manifest is valid, what it requires is installed, it registers well-formed operators under names of
-    its own, `unregister` removes exactly those, and both can be called again.
+    its own, `unregister` removes exactly those, and both can be called again; its commands can be called.
 
     Returns:
         What is wrong, one sentence each; empty when nothing is.
@@ -102,8 +102,8 @@ def check_plugin(folder: str | Path) -> list[str]:
         host.load(plugin)
         if _has_failed(plugin):
             return [*problems, f"register fails{attempt}: {type(plugin.error).__name__}: {plugin.error}"]
-        if not plugin.operators:
-            problems.append(f"register adds no operator{attempt}")
+        if not plugin.operators and not (plugin.manifest and plugin.manifest.commands):
+            problems.append(f"register adds no operator{attempt}, and the manifest names no command")
         names.append([cls.idname for cls in plugin.operators])
         if not attempt:
             problems += _undocumented(plugin)
@@ -114,6 +114,19 @@ def check_plugin(folder: str | Path) -> list[str]:
             problems.append(f"unregister forgets{attempt}: {', '.join(cls.idname for cls in forgotten)}")
     if names[0] != names[-1]:
         problems.append("register adds other operators when it is called a second time")
+    return problems + _faults_of_commands(plugin)
+
+
+def _faults_of_commands(plugin: Plugin) -> list[str]:
+    """What keeps the commands of a plugin from being called."""
+    if plugin.manifest is None:
+        return []
+    problems = []
+    for entry in plugin.manifest.commands:
+        try:
+            PluginCommand(entry, plugin.manifest, plugin.location).load()
+        except PluginError as error:
+            problems.append(str(error))
     return problems
 
 

@@ -11,7 +11,7 @@ from one_hinge import ONE_HINGE
 WIDTH = 80
 HELP = [
     ("--help",), ("inspect", "--help"), ("simulate", "--help"), ("optimize", "--help"), ("rig", "--help"),
-    ("bench", "--help"), ("plugins", "--help"), ("completion", "--help"), ("cache", "--help"), ("cache", "info"),
+    ("bench", "--help"), ("plugins", "--help"), ("cache", "--help"), ("cache", "info"),
     ("plugins", "list"),
     *[("plugins", action, "--help") for action in ("list", "check", "enable", "disable", "new")],
     *[("cache", action, "--help") for action in ("info", "clear", "prune")],

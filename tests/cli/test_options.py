@@ -1,9 +1,6 @@
-"""Options that commands share, and the completion of shells."""
-
-import subprocess
+"""Options that commands share."""
 
 import pytest
-from calmotion.cli.commands.setup.completion import SHELLS
 from calmotion.cli.main import build_parser, main
 from calmotion.cli.options import KINDS, assignments, progress_display
 from calmotion.host import SettingError
@@ -19,21 +16,6 @@ def test_options_of_the_writer_are_stronger_than_assignments():
     arguments = ["optimize", "a.usda", "-o", "b.usda", "--bake", "--set", "usd.write.bake=simulated", "--splines"]
     args = build_parser().parse_args(arguments)
     assert assignments(args) == {"usd.write": {"bake": "motors", "splines": True}}
-
-
-@pytest.mark.parametrize("shell", SHELLS)
-def test_completion_names_commands_and_options(shell, capfd):
-    assert main(["completion", shell]) == 0
-    script = capfd.readouterr().out
-    assert "optimize" in script and "tolerance" in script
-
-
-def test_bash_takes_the_completion(capfd, tmp_path):
-    main(["completion", "bash"])
-    script = capfd.readouterr().out
-    asked = "COMP_WORDS=(calmotion opt); COMP_CWORD=1; COMPREPLY=(); _shtab_calmotion; echo ${COMPREPLY[@]}"
-    done = subprocess.run(["bash", "-c", f"{script}\n{asked}"], capture_output=True, text=True)
-    assert done.stdout.strip() == "optimize", done.stderr
 
 
 def test_without_arguments_it_prints_help(capsys):

@@ -6,8 +6,10 @@ import shlex
 
 import pytest
 from calmotion.cli import parser as texts
+from calmotion.cli.commands.table import all_commands
 from calmotion.cli.main import build_parser, main
 
+EXAMPLES = {name: getattr(command.load(), "EXAMPLES", ()) for name, command in all_commands().items()}
 COMMANDS = next(action for action in build_parser()._actions if action.choices and "inspect" in action.choices).choices
 
 
@@ -23,9 +25,9 @@ def test_the_overview_is_one_screen_and_names_every_command(capsys):
         assert any(line.startswith(f"  {name} ") for line in lines), name
 
 
-@pytest.mark.parametrize("name", texts.EXAMPLES)
+@pytest.mark.parametrize("name", EXAMPLES)
 def test_examples_are_accepted_and_shown(name):
-    for line, purpose in texts.EXAMPLES[name]:
+    for line, purpose in EXAMPLES[name]:
         program, *arguments = shlex.split(line)
         assert program == "calmotion" and arguments[0] == name
         build_parser().parse_args(arguments)

@@ -1,8 +1,13 @@
+import importlib
+import multiprocessing
+import pickle
 import sys
+from concurrent.futures import ProcessPoolExecutor
 
+import numpy as np
 import pytest
-from calmotion.host import PluginState, SettingError, open_host
-from calmotion.host.discovery import bundled_folder, discover
+from calmotion.host import Host, PluginState, SettingError, open_host
+from calmotion.host.discovery import Location, bundled_folder, discover
 
 EMPTY = "def register(host): ...\ndef unregister(host): ...\n"
 OPERATOR = """
@@ -20,6 +25,23 @@ OPERATOR = """
 
 def test_bundled_plugins_are_those_of_the_checkout(repository):
     assert bundled_folder() == repository / "plugins"
+
+
+def test_other_processes_import_a_bundled_plugin_by_its_name(tmp_path):
+    plugin = open_host([], {}).plugin("table_writer")
+    module = importlib.import_module("calmotion_plugins.table_writer.table")
+    assert plugin.module is importlib.import_module("calmotion_plugins.table_writer")
+    assert pickle.loads(pickle.dumps(plugin.operators[0])) is plugin.operators[0]
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as workers:
+        workers.submit(module.write_table, str(tmp_path / "a.csv"), {"time_s": np.zeros(2)}).result(60)
+    assert (tmp_path / "a.csv").read_text().splitlines()[0] == "time_s"
+
+
+def test_the_same_folder_of_bundled_plugins_is_one_module_wherever_it_is_named(repository):
+    host = Host()
+    plugin = host.add(Location(repository / "plugins" / "table_writer", "test"))
+    host.load(plugin)
+    assert plugin.module.__name__ == "calmotion_plugins.table_writer"
 
 
 def test_folders_are_named_by_the_user_or_the_environment(make_plugin):

@@ -36,6 +36,27 @@ def test_a_wrong_field_is_named(make_plugin, field, value):
     assert refused.value.path == str(folder / "plugin.toml")
 
 
+@pytest.mark.parametrize(
+    ("commands", "attribute", "told"),
+    [
+        (["greet"], "commands", "must be tables"),
+        ({"Greet": {"module": "command", "help": "greet"}}, "commands.Greet", "lower-case"),
+        ({"greet": "command"}, "commands.greet", "module and help"),
+        ({"greet": {"module": "command"}}, "commands.greet", "module and help"),
+        ({"greet": {"module": "command", "help": "greet", "colour": "red"}}, "commands.greet", "module and help"),
+        ({"greet": {"module": "command", "help": ""}}, "commands.greet.help", "line of text"),
+        ({"greet": {"module": "absent", "help": "greet"}}, "commands.greet.module", "no such module"),
+    ],
+)
+def test_a_wrong_command_is_named_with_its_remedy(make_plugin, commands, attribute, told):
+    folder = make_plugin("anvil", EMPTY, commands=commands)
+    (folder / "command.py").write_text("")
+    with pytest.raises(PluginError, match=told) as refused:
+        read_manifest(folder)
+    assert (refused.value.attribute, refused.value.path) == (attribute, str(folder / "plugin.toml"))
+    assert refused.value.remedy
+
+
 def test_a_manifest_that_is_not_toml_is_refused(make_plugin):
     folder = make_plugin("anvil", EMPTY)
     (folder / "plugin.toml").write_text("id = anvil")

@@ -265,5 +265,4 @@ CASES: dict[str, Case] = {
     "a material that is none": words("materials cheese --json", "cheese"),
     "a benchmark that is none": words("bench nothing", "nothing", statuses=USAGE),
     "an inspection of modes into a file": words("inspect shot.usda --modes shot.usda --json", "shot.usda"),
-    "a shell that is none": words("completion cmd", "cmd", statuses=USAGE),
 }

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from calmotion.cli.commands.robots import import_robot, materials, motors, rig
-from calmotion.cli.commands.setup import bench, cache, completion, doctor, plugins, warmup
-from calmotion.cli.commands.shots import calibrate, excite, export, inspect, optimize, refine, simulate
-from calmotion.cli.commands.shows import batch, sequence, submit
+from calmotion.cli.commands.table import BUILT_IN, all_commands
 from calmotion.cli.diagnostics.streams import open_closed_streams
 from calmotion.cli.parser import Parser, add_examples, overview
 from calmotion.cli.signals import as_interrupts, ignore
 from calmotion.errors import ShotError, failure_of_machine
 from calmotion.support.memory import was_short
 from calmotion.version import __version__
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
 ALIASES = {"optimise": "optimize"}
@@ -45,24 +46,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(given: list[str]) -> int:
     if not given:
-        build_parser().print_help(sys.stderr)
+        build_parser("").print_help(sys.stderr)
         return WRONG_USAGE
+    given = [ALIASES.get(given[0], given[0]), *given[1:]]
     try:
-        args = build_parser().parse_args([ALIASES.get(given[0], given[0]), *given[1:]])
+        name = next((text for text in given if not text.startswith("-")), "")
+        args = build_parser(name).parse_args(given)
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else WRONG_USAGE
+    except ShotError as error:
+        from calmotion.cli.output import Output
+
+        return _refused(error, Output(sys.stdout, "--json" in given))
     from calmotion.cli.output import own_messages, print_error, printable, protected_stdout, refuse_missing_folder
 
-    with printable(), protected_stdout(args.json) as output, own_messages():
+    with printable(), protected_stdout(getattr(args, "json", False)) as output, own_messages():
         try:
             refuse_missing_folder()
             status: int = args.command(args, output)
             return status
         except ShotError as error:
-            from calmotion.host import SettingError
-
-            print_error(error, output)
-            return WRONG_USAGE if isinstance(error, SettingError) else FAILED
+            return _refused(error, output)
         except BrokenPipeError:
             return FAILED
         except Exception as error:
@@ -72,42 +76,43 @@ def _run(given: list[str]) -> int:
             return FAILED
 
 
-def build_parser() -> Parser:
-    """The parser of all commands."""
+def _refused(error: ShotError, output: Output) -> int:
+    """Print why nothing was done; the exit status."""
+    from calmotion.cli.output import print_error
+    from calmotion.host.errors import SettingError
+
+    print_error(error, output)
+    return WRONG_USAGE if isinstance(error, SettingError) else FAILED
+
+
+def build_parser(chosen: str | None = None) -> Parser:
+    """The parser of all commands.
+
+    Args:
+        chosen: The command whose options it knows, since its module alone is imported; None: it knows those of all.
+
+    Raises:
+        ShotError: The command is that of a plugin, and cannot be called.
+    """
     parser = Parser(
         prog="calmotion",
         description="Retargets the animation of a flexible robotic character so that it does not shake.",
         epilog="Exit status: 0 done, 1 the shot cannot be processed, 2 wrong usage, 130 interrupted.",
     )
     parser.add_argument("--version", action="version", version=f"calmotion {__version__}")
-    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for command in (
-        inspect,
-        simulate,
-        optimize,
-        calibrate,
-        excite,
-        refine,
-        batch,
-        sequence,
-        submit,
-        export,
-        import_robot,
-        rig,
-        motors,
-        materials,
-        bench,
-        plugins,
-        warmup,
-        cache,
-        doctor,
-        completion,
-    ):
-        command.add_to(commands)
-    for name, command_parser in commands.choices.items():
-        add_examples(name, command_parser)
-    parser.overview = overview({action.dest: action.help or "" for action in commands._choices_actions})
-    parser.set_defaults(parser=parser)  # for `completion`
+    group = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    commands = BUILT_IN if chosen in BUILT_IN else all_commands()
+    for name, command in commands.items():
+        if name == chosen or (chosen is None and not command.disabled):
+            module = command.load()
+            text = command.help
+            command_parser = group.add_parser(name, help=text, description=f"{text[:1].upper()}{text[1:]}.")
+            module.add_arguments(command_parser)
+            command_parser.set_defaults(command=module.run)
+            add_examples(command_parser, getattr(module, "EXAMPLES", ()))
+        elif not command.disabled:
+            group.add_parser(name, help=command.help)
+    parser.overview = overview({action.dest: action.help or "" for action in group._choices_actions})
     return parser
 
 

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from calmotion.cli.parser import SHARED
 
 if TYPE_CHECKING:
-    from calmotion.cli.output import Output
     from calmotion.cli.progress import ProgressDisplay
     from calmotion.workflow.shot import Shot
 
-Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
-Command: TypeAlias = "Callable[[argparse.Namespace, Output], int]"
 # Those of `calmotion.shot.model_choice`, written out since `--help` does not import the engine; a test compares them.
 MEANINGS = {
     "bodies": "rigid bodies in place of flexible ones",
@@ -40,26 +37,17 @@ def report_options(command: argparse.ArgumentParser | argparse._ArgumentGroup) -
     command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
 
 
-def shot_command(commands: Commands, name: str, function: Command, text: str) -> argparse.ArgumentParser:
-    """Add a command on a shot, with the options that all of them have.
-
-    Args:
-        commands: Where it is added.
-        name: Of the command.
-        function: What it calls.
-        text: What it does, for the help.
-    """
-    command = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
-    command.set_defaults(command=function)
-    file_argument(command, "shot", metavar="SHOT", help="USD file of the shot")
+def shot_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options that all commands on a shot have."""
+    command.add_argument("shot", metavar="SHOT", help="USD file of the shot")
     group = command.add_argument_group(SHARED)
     report_options(group)
     group.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
     group.add_argument(
         "--openjd", action="store_true", help="print progress to stdout in the words of Open Job Description"
     )
-    file_argument(
-        group, "--log", metavar="FILE",
+    group.add_argument(
+        "--log", metavar="FILE",
         help="add JSON lines to this file: time, stage, fraction, message and memory of the run",
     )  # fmt: skip
     plugin_option(group)
@@ -70,7 +58,7 @@ def shot_command(commands: Commands, name: str, function: Command, text: str) ->
         default=[],
         help="also run this operator of a plugin, such as speed_watch.report; may be repeated",
     )
-    file_argument(group, "--settings", metavar="FILE", help="TOML file with a table for each operator")
+    group.add_argument("--settings", metavar="FILE", help="TOML file with a table for each operator")
     group.add_argument(
         "--set",
         metavar="NAME=VALUE",
@@ -78,19 +66,12 @@ def shot_command(commands: Commands, name: str, function: Command, text: str) ->
         default=[],
         help="set a property of an operator, such as fe.mesh.element_size=5mm; see `calmotion plugins list`",
     )
-    return command
-
-
-def file_argument(command: argparse.ArgumentParser | argparse._ArgumentGroup, *names: str, **options: object) -> None:
-    """Add an argument that names a file or a folder, which shells complete as such."""
-    argument = command.add_argument(*names, **options)  # type: ignore[arg-type]
-    argument.complete = {"bash": "_shtab_compgen_files", "zsh": "_files", "tcsh": "f"}  # type: ignore[attr-defined]
 
 
 def plugin_option(command: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     """Add `--plugins`."""
-    file_argument(
-        command, "--plugins", metavar="DIR", action="append", default=[],
+    command.add_argument(
+        "--plugins", metavar="DIR", action="append", default=[],
         help="folder with more plugins; may be repeated",
     )  # fmt: skip
 
@@ -116,16 +97,16 @@ def run_options(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="write motor curves as splines with the optimiser's knots, not as samples",
     )
-    file_argument(outputs, "--csv", metavar="FILE", help="write a table of targets and motors, one row for each step")
-    file_argument(outputs, "--rrd", metavar="FILE", help="write a recording for the rerun viewer")
-    file_argument(outputs, "--figures", metavar="DIR", help="draw figures into this folder")
-    file_argument(outputs, "--video", metavar="FILE", help="write a video (.webp, or .mp4 where ffmpeg is installed)")
-    file_argument(
-        outputs, "--manifest", metavar="FILE",
+    outputs.add_argument("--csv", metavar="FILE", help="write a table of targets and motors, one row for each step")
+    outputs.add_argument("--rrd", metavar="FILE", help="write a recording for the rerun viewer")
+    outputs.add_argument("--figures", metavar="DIR", help="draw figures into this folder")
+    outputs.add_argument("--video", metavar="FILE", help="write a video (.webp, or .mp4 where ffmpeg is installed)")
+    outputs.add_argument(
+        "--manifest", metavar="FILE",
         help="write a manifest (JSON): inputs and outputs with hashes, versions, settings, verdict",
     )  # fmt: skip
-    file_argument(
-        command, "--motion", metavar="FILE",
+    command.add_argument(
+        "--motion", metavar="FILE",
         help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
     )  # fmt: skip
     command.add_argument(

@@ -14,71 +14,14 @@ from typing import Any, NoReturn
 
 from calmotion.support.naming import nearest, nearest_name
 
-# Commands that are named nowhere here stand in the last group.
+# Commands that are named nowhere here, of plugins of others, stand in a group of their own.
 TASKS = (
     ("Prepare a shot", ("import", "rig", "motors", "materials", "inspect")),
     ("Remove the shake", ("simulate", "optimize", "watch", "excite", "calibrate", "refine")),
     ("Work on a show", ("batch", "sequence", "submit")),
     ("Play it on the robot", ("export",)),
-    ("Measure, extend, set up", ("bench", "plugins", "warmup", "doctor", "log", "cache", "completion")),
+    ("Measure, extend, set up", ("bench", "plugins", "warmup", "doctor", "cache")),
 )
-EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
-    "inspect": (
-        ("calmotion inspect shot.usda", "bodies, motors, targets, frequencies"),
-        ("calmotion inspect shot.usda --strict", "check before publishing"),
-        ("calmotion inspect shot.usda --modes build/modes", "how the links vibrate"),
-    ),
-    "simulate": (
-        ("calmotion simulate shot.usda", "how much does it shake as animated?"),
-        ("calmotion simulate shot.usda --rrd shake.rrd", "look at it: rerun shake.rrd"),
-        ("calmotion simulate shot.usda --shaper zvd", "what would an input shaper give?"),
-    ),
-    "optimize": (
-        ("calmotion optimize shot.usda -o calm.usda", "the usual case"),
-        ("calmotion optimize shot.usda -o calm.usda --tolerance 0.5mm", "finer"),
-        ("calmotion optimize shot.usda -o calm.usda --video calm.webp", "show others what changed"),
-        ("calmotion optimize shot.usda -o calm.usda --bake simulated", "for viewers without physics"),
-    ),
-    "calibrate": (
-        ("calmotion calibrate shot.usda --recording take.csv -o robot.usda", "markers, encoders"),
-        ("calmotion calibrate shot.usda --recording accel.csv@/Arm/Hand/sensor -o robot.usda", "a printer's log"),
-        ("calmotion calibrate shot.usda --recording a.csv --parameters modulus damping", "these alone"),
-    ),
-    "excite": (
-        ("calmotion excite shot.usda -o test.usda", "accelerometers at the targets, encoders"),
-        ("calmotion excite shot.usda -o test.usda --sensor marker=0.3mm --duration 3s", "markers"),
-    ),
-    "refine": (
-        ("calmotion refine take1_root.usda --recording take1.csv -o take2.usda", "better curves for the second one"),
-        ("calmotion refine take2_root.usda --recording take2.csv -o take3.usda", "and for the third one"),
-    ),
-    "watch": (
-        ("calmotion watch shot.usda", "how much does it shake, after each save?"),
-        ("calmotion watch shot.usda --optimize -o calm.usda", "and its cure"),
-    ),
-    "batch": (
-        ("calmotion batch shots/*.usda -o calm --workers 2", "two shots at a time, on this machine"),
-        ("calmotion batch shots/*.usda -o calm --on dask://host:8786", "on the workers of a Dask scheduler"),
-    ),
-    "sequence": (("calmotion sequence clips.toml -o build/repertoire", "clips and all transitions between them"),),
-    "submit": (("calmotion submit shots/*.usda --openjd job.yaml -o /farm/calm", "a task for each shot"),),
-    "export": (
-        ("calmotion export calm_root.usda --to csv --rate 200Hz", "a table for any controller"),
-        ("calmotion export calm_root.usda --to ros2 -o trajectory.yaml", "a ROS 2 JointTrajectory"),
-    ),
-    "import": (
-        ("calmotion import arm.urdf --motion wave.csv -o shot.usda", "a shot of a robot and a motion"),
-        ("calmotion import arm.urdf -o shot.usda --flexible '*forearm*=abs,3mm'", "with a link that bends"),
-    ),
-    "motors": (("calmotion motors xm430-w350", "one motor, each value with its source"),),
-    "materials": (("calmotion materials abs", "one material, with its source"),),
-    "rig": (("calmotion rig skinned.usda -o robot.usda", "a robot from a UsdSkel character"),),
-    "bench": (("calmotion bench work-precision", "error against run time of every setting"),),
-    "warmup": (("calmotion warmup", "after an installation or an update"),),
-    "doctor": (("calmotion doctor", "is everything in its place?"),),
-    "cache": (("calmotion cache info", "how large are the caches?"),),
-    "completion": (("calmotion completion bash", "source it in your shell"),),
-}
 START = (
     ("calmotion inspect shot.usda", "what is in the shot?"),
     ("calmotion optimize shot.usda -o calm.usda", "remove the shake"),
@@ -105,10 +48,9 @@ def overview(commands: Mapping[str, str]) -> str:
     ]
     column = max(map(len, commands), default=0) + 4
     listed = {name for _, names in TASKS for name in names}
-    for number, (title, names) in enumerate(TASKS):
+    others = tuple(name for name in commands if name not in listed)
+    for title, names in (*TASKS, ("Of further plugins", others)):
         group = [name for name in names if name in commands]
-        if number == len(TASKS) - 1:
-            group += [name for name in commands if name not in listed]
         lines += ["", f"{title}:"] if group else []
         lines += [line for name in group for line in entry(name, commands[name], column)]
     lines += ["", "Start with:", *example_lines(START), ""]
@@ -137,11 +79,10 @@ def example_lines(examples: Sequence[tuple[str, str]]) -> list[str]:
     return lines
 
 
-def add_examples(name: str, command: argparse.ArgumentParser) -> None:
+def add_examples(command: argparse.ArgumentParser, examples: Sequence[tuple[str, str]]) -> None:
     """Put examples below the options of a command, and what it needs at least into its usage."""
     # what a command alone has comes before what all have
     command._action_groups.sort(key=lambda group: group.title == SHARED)
-    examples = EXAMPLES.get(name)
     if examples:
         command.formatter_class = _WithExamples
         command.epilog = _EXAMPLES + "\n".join(example_lines(examples))

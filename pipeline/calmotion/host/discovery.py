@@ -1,4 +1,4 @@
-"""Discovery and import of plugins. Files beside a shot are never read or imported."""
+"""Discovery and import of plugins and of their commands. Files beside a shot are never read or imported."""
 
 from __future__ import annotations
 
@@ -6,14 +6,19 @@ import importlib
 import importlib.util
 import os
 import sys
+import traceback
 import zlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 
+import calmotion_plugins
+
+from calmotion.host.choices import disabled_plugins
 from calmotion.host.errors import PluginError, SettingError
-from calmotion.host.manifest import FILE_NAME
+from calmotion.host.manifest import FILE_NAME, CommandEntry, Manifest, check_requirements, read_manifest
+from calmotion.version import __version__
 
 ENTRY_POINT_GROUP = "calmotion.plugins"
 FOLDERS_VARIABLE = "CALMOTION_PLUGINS"
@@ -34,16 +39,9 @@ class Location:
     module: str = ""
 
 
-def bundled_folder() -> Path | None:
-    """The folder of the bundled plugins: inside the installed package, else the checkout's `plugins/`."""
-    package = Path(__file__).resolve().parents[1]
-    installed = package / "bundled" / "plugins"
-    if installed.is_dir():
-        return installed
-    repository = package.parents[1]
-    if package.parent.name == "pipeline" and (repository / "pyproject.toml").is_file():
-        return repository / "plugins"
-    return None
+def bundled_folder() -> Path:
+    """The folder of the bundled plugins, which are the packages of `calmotion_plugins`."""
+    return Path(calmotion_plugins.__path__[0]).resolve()
 
 
 def find_in_folder(folder: Path, origin: str) -> list[Location]:
@@ -91,8 +89,7 @@ def discover(folders: Iterable[str | Path] = (), environment: Mapping[str, str] 
         SettingError: When a named folder does not exist or holds no plugin.
     """
     variables = os.environ if environment is None else environment
-    bundled = bundled_folder()
-    locations = find_in_folder(bundled, "bundled") if bundled and bundled.is_dir() else []
+    locations = find_in_folder(bundled_folder(), "bundled")
     locations += find_entry_points()
     for text in variables.get(FOLDERS_VARIABLE, "").split(os.pathsep):
         locations += _named(Path(text), FOLDERS_VARIABLE) if text.strip() else []
@@ -117,17 +114,14 @@ def _named(folder: Path, origin: str) -> list[Location]:
 def import_plugin(plugin_id: str, location: Location) -> ModuleType:
     """Import the module of a plugin, as a package, so that it can import its own sub-modules.
 
-    The name in `sys.modules` holds a checksum of the folder, so two folders of the same name never mix.
+    A bundled plugin is `calmotion_plugins.<id>`, which other processes import too: its functions can be sent to them.
+    Any other folder gets a name with a checksum of its path, so two folders of the same name never mix.
 
     Raises:
         PluginError: When the module or its `register`/`unregister` is missing.
         Exception: Whatever the module raises; nothing of it stays imported then.
     """
-    if location.module:
-        module = importlib.import_module(location.module)
-    else:
-        name = f"calmotion_plugin_{plugin_id}_{zlib.crc32(str(location.folder).encode()):08x}"
-        module = sys.modules.get(name) or _import_folder(name, location)
+    module = _import_package(location.module) if location.module else _import_folder(plugin_id, location.folder)
     for function in ("register", "unregister"):
         if not callable(getattr(module, function, None)):
             raise PluginError(
@@ -136,18 +130,130 @@ def import_plugin(plugin_id: str, location: Location) -> ModuleType:
     return module
 
 
-def _import_folder(name: str, location: Location) -> ModuleType:
-    file = location.folder / "__init__.py"
+def _import_package(name: str) -> ModuleType:
+    try:
+        return importlib.import_module(name)
+    except BaseException:
+        _forget(name)
+        raise
+
+
+def _import_folder(plugin_id: str, folder: Path) -> ModuleType:
+    file = folder / "__init__.py"
     if not file.is_file():
-        raise PluginError("the plugin has no module", path=str(location.folder), remedy="Add __init__.py.")
-    spec = importlib.util.spec_from_file_location(name, file, submodule_search_locations=[str(location.folder)])
+        raise PluginError("the plugin has no module", path=str(folder), remedy="Add __init__.py.")
+    if folder.parent == bundled_folder():
+        return _import_package(f"{calmotion_plugins.__name__}.{plugin_id}")
+    name = f"calmotion_plugin_{plugin_id}_{zlib.crc32(str(folder).encode()):08x}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, file, submodule_search_locations=[str(folder)])
     assert spec and spec.loader  # a file that ends in .py always has both
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
     except BaseException:
-        for imported in [key for key in sys.modules if key == name or key.startswith(name + ".")]:
-            del sys.modules[imported]
+        _forget(name)
         raise
     return module
+
+
+def _forget(name: str) -> None:
+    """Take a package and its sub-modules out of those that are imported."""
+    for imported in [key for key in sys.modules if key == name or key.startswith(name + ".")]:
+        del sys.modules[imported]
+
+
+@dataclass(frozen=True)
+class PluginCommand:
+    """A command of a plugin.
+
+    Attributes:
+        entry: Its name, module and help.
+        manifest: Of the plugin.
+        location: Where the plugin is.
+        disabled: Whether the user has disabled the plugin.
+        rival: Another plugin that brings a command of this name, or None.
+    """
+
+    entry: CommandEntry
+    manifest: Manifest
+    location: Location
+    disabled: bool = False
+    rival: PluginCommand | None = None
+
+    @property
+    def help(self) -> str:
+        """What it does, in a line."""
+        return self.entry.help
+
+    def load(self) -> ModuleType:
+        """Its module, with `add_arguments(parser)` and `run(arguments, output)`.
+
+        Raises:
+            SettingError: The plugin is disabled.
+            PluginError: Two plugins bring the command, or the module cannot be imported or lacks one of the functions.
+        """
+        name, plugin = self.entry.name, self.manifest.id
+        if self.disabled:
+            raise SettingError(
+                f"the command {name} is brought by the plugin {plugin}, which is disabled",
+                path=str(self.location.folder),
+                remedy=f"Enable it: calmotion plugins enable {plugin}.",
+            )
+        if self.rival:
+            raise PluginError(
+                f"the plugins {self.manifest.id} and {self.rival.manifest.id} both bring the command {name}",
+                path=str(self.location.folder),
+                found=self.rival.location.folder,
+                remedy=f"Disable one of the two: calmotion plugins disable {self.rival.manifest.id}.",
+            )
+        check_requirements(self.manifest, __version__)
+        try:
+            package = import_plugin(plugin, self.location).__name__
+            module = importlib.import_module(f"{package}.{self.entry.module}")
+        except (Exception, SystemExit) as error:
+            if isinstance(error, PluginError):
+                raise
+            raise PluginError(
+                f"the plugin {plugin}, which brings the command {name}, cannot be imported",
+                path=str(self.location.folder),
+                found="".join(traceback.format_exception_only(error)).strip(),
+                remedy=f"See calmotion plugins check {self.location.folder}.",
+            ) from error
+        for function in ("add_arguments", "run"):
+            if not callable(getattr(module, function, None)):
+                raise PluginError(
+                    f"the module of the command {name} has no function {function}",
+                    path=str(self.location.folder),
+                    attribute=f"{self.entry.module}.{function}",
+                    remedy="Add add_arguments(parser) and run(arguments, output).",
+                )
+        return module
+
+
+def plugin_commands(environment: Mapping[str, str] | None = None) -> dict[str, PluginCommand]:
+    """Name to command, of bundled plugins, installed ones and those in the folders of CALMOTION_PLUGINS.
+
+    A plugin whose manifest cannot be read has none; where an enabled and a disabled plugin bring a command, it is that
+    of the enabled one.
+
+    Raises:
+        SettingError: A named folder holds no plugin, or the file with the user's choices cannot be read.
+    """
+    disabled = disabled_plugins(environment)
+    found: dict[str, PluginCommand] = {}
+    for location in discover((), environment):
+        try:
+            manifest = read_manifest(location.folder)
+        except PluginError:
+            continue
+        for entry in manifest.commands:
+            command = PluginCommand(entry, manifest, location, manifest.id in disabled)
+            other = found.get(entry.name)
+            if other is None or other.disabled:
+                found[entry.name] = command
+            elif not command.disabled:
+                found[entry.name] = replace(other, rival=command)
+    return found

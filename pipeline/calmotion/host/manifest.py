@@ -14,6 +14,23 @@ from calmotion.support.reading import read_toml
 FILE_NAME = "plugin.toml"
 _TEXTS = ("id", "version", "name", "tagline", "maintainer", "license", "calmotion")
 _LISTS = ("tags", "requires")
+_COMMANDS = "commands"
+_COMMAND_FIELDS = ("module", "help")
+
+
+@dataclass(frozen=True)
+class CommandEntry:
+    """A command of the command line, a table `[commands.NAME]` of `plugin.toml`.
+
+    Attributes:
+        name: As it is typed.
+        module: The module inside the plugin that holds it, such as `command`.
+        help: What it does, for the list of commands.
+    """
+
+    name: str
+    module: str
+    help: str
 
 
 @dataclass(frozen=True)
@@ -28,6 +45,7 @@ class Manifest:
         tags: For lists.
         calmotion: Range of Calmotion versions it works with, such as `>=0.1`.
         requires: Python distributions it needs, such as `trimesh>=4`.
+        commands: What it adds to the command line.
     """
 
     id: str
@@ -39,6 +57,7 @@ class Manifest:
     tags: tuple[str, ...]
     calmotion: str
     requires: tuple[str, ...]
+    commands: tuple[CommandEntry, ...] = ()
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -55,16 +74,17 @@ def read_manifest(folder: Path) -> Manifest:
     except ValueError as error:
         raise PluginError("the manifest is not valid TOML", path=str(file), found=error) from error
     _check_fields(fields, file)
-    lists: dict[str, Any] = {key: tuple(fields[key]) for key in _LISTS}
-    manifest = Manifest(**fields | lists)
+    others: dict[str, Any] = {key: tuple(fields[key]) for key in _LISTS}
+    others[_COMMANDS] = _commands(fields.get(_COMMANDS, {}), file)
+    manifest = Manifest(**fields | others)
     _check_values(manifest, file)
     return manifest
 
 
 def _check_fields(fields: dict[str, Any], file: Path) -> None:
     for key in fields:
-        if key not in _TEXTS + _LISTS:
-            known = ", ".join(_TEXTS + _LISTS)
+        if key not in (*_TEXTS, *_LISTS, _COMMANDS):
+            known = ", ".join((*_TEXTS, *_LISTS, _COMMANDS))
             raise PluginError("unknown field", path=str(file), attribute=key, remedy=f"The fields are {known}.")
     for key in _TEXTS + _LISTS:
         if key not in fields:
@@ -74,6 +94,38 @@ def _check_fields(fields: dict[str, Any], file: Path) -> None:
             raise PluginError("must be a text that is not empty", path=str(file), attribute=key, found=repr(value))
         if key in _LISTS and not (isinstance(value, list) and all(isinstance(v, str) for v in value)):
             raise PluginError("must be a list of texts", path=str(file), attribute=key, found=repr(value))
+
+
+def _commands(tables: Any, file: Path) -> tuple[CommandEntry, ...]:
+    """What the tables `[commands.NAME]` hold.
+
+    Raises:
+        PluginError: A name, a field or a module is missing, unknown or wrong.
+    """
+    example = 'Write [commands.NAME] with module = "MODULE" and help = "what it does".'
+    if not isinstance(tables, dict):
+        raise PluginError("must be tables", path=str(file), attribute=_COMMANDS, found=repr(tables), remedy=example)
+    for name, table in tables.items():
+        place = f"{_COMMANDS}.{name}"
+        if not re.fullmatch(r"[a-z][a-z0-9-]*", name):
+            raise PluginError("must be a lower-case name", path=str(file), attribute=place, remedy="Use a-z, 0-9, -.")
+        if not isinstance(table, dict) or set(table) != set(_COMMAND_FIELDS):
+            raise PluginError(
+                "must be a table of module and help", path=str(file), attribute=place, found=repr(table), remedy=example
+            )
+        for key, value in table.items():
+            if not (isinstance(value, str) and value.strip() and "\n" not in value):
+                raise PluginError(
+                    "must be a line of text", path=str(file), attribute=f"{place}.{key}", found=repr(value),
+                    remedy=example,
+                )  # fmt: skip
+        inside = file.parent.joinpath(*table["module"].split("."))
+        if not (inside.with_name(f"{inside.name}.py").is_file() or (inside / "__init__.py").is_file()):
+            raise PluginError(
+                "the plugin has no such module", path=str(file), attribute=f"{place}.module", found=table["module"],
+                remedy=f"Name a module in the folder {file.parent.name}, such as command for command.py.",
+            )  # fmt: skip
+    return tuple(CommandEntry(name, **table) for name, table in tables.items())
 
 
 def _check_values(manifest: Manifest, file: Path) -> None:

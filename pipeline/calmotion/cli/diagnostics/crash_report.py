@@ -121,8 +121,7 @@ def _traceback(error: BaseException, names: Names) -> list[str]:
 def _place(file: str) -> str:
     """A source file relative to its package."""
     path = Path(file)
-    bundled = bundled_folder()
-    roots = [(_PACKAGE, "calmotion"), *([] if bundled is None else [(bundled, "calmotion/plugins")])]
+    roots = [(_PACKAGE, "calmotion"), (bundled_folder(), "calmotion_plugins")]
     roots += [(Path(sysconfig.get_path(name)), "site-packages") for name in ("purelib", "platlib")]
     roots += [(Path(sysconfig.get_path("stdlib")), "python")]
     for root, name in roots:

@@ -5,21 +5,23 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.options import Commands, file_argument, plugin_option, report_options
+from calmotion.cli.options import plugin_option, report_options
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
+EXAMPLES = (
+    ("calmotion import arm.urdf --motion wave.csv -o shot.usda", "a shot of a robot and a motion"),
+    ("calmotion import arm.urdf -o shot.usda --flexible '*forearm*=abs,3mm'", "with a link that bends"),
+)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    text = "make a shot from a URDF, MJCF or USD robot, with a motion, flexible links and targets"
-    command = commands.add_parser("import", help=text, description=text[0].upper() + text[1:] + ".")
-    command.set_defaults(command=_run)
-    file_argument(command, "robot", metavar="ROBOT", help=".urdf file, .xml file of MuJoCo, or USD file")
-    file_argument(command, "-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
-    file_argument(
-        command, "--motion", metavar="FILE",
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    command.add_argument("robot", metavar="ROBOT", help=".urdf file, .xml file of MuJoCo, or USD file")
+    command.add_argument("-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
+    command.add_argument(
+        "--motion", metavar="FILE",
         help="motion of the joints: CSV (time_s, and a column for each joint in rad or m), NPZ, or BVH",
     )  # fmt: skip
     for flag, metavar, help_text in (
@@ -32,12 +34,12 @@ def add_to(commands: Commands) -> None:
     command.add_argument(
         "--solid", metavar="MATERIAL", help="material from whose density links without inertia get their mass"
     )
-    file_argument(
-        command, "--materials", metavar="FILE", action="append", default=[],
+    command.add_argument(
+        "--materials", metavar="FILE", action="append", default=[],
         help="TOML file with more materials; may be repeated",
     )  # fmt: skip
-    file_argument(
-        command, "--converters", metavar="DIR",
+    command.add_argument(
+        "--converters", metavar="DIR",
         help="environment with urdf-usd-converter and mujoco-usd-converter (default: one that is made once)",
     )  # fmt: skip
     plugin_option(command)
@@ -48,7 +50,7 @@ def add_to(commands: Commands) -> None:
     report_options(command)
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.options import assignments
     from calmotion.cli.output import conclude, notice
     from calmotion.host import SettingError

@@ -6,27 +6,26 @@ import argparse
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import Commands, file_argument, json_option
+from calmotion.cli.options import json_option
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
+EXAMPLES = (("calmotion materials abs", "one material, with its source"),)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    text = "list materials for flexible links, with their sources"
-    command = commands.add_parser("materials", help=text, description=text[0].upper() + text[1:] + ".")
-    command.set_defaults(command=_run)
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     command.add_argument("name", nargs="?", metavar="NAME", help="show only this material, with its source")
-    file_argument(
-        command, "--materials", metavar="FILE", action="append", default=[],
+    command.add_argument(
+        "--materials", metavar="FILE", action="append", default=[],
         help="TOML file with more materials; may be repeated",
     )  # fmt: skip
     json_option(command)
     command.add_argument("--toml", action="store_true", help="print TOML, to be changed and used with --materials")
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.rigging.materials import material_named
     from calmotion.workflow.materials import known_materials
 

@@ -7,28 +7,27 @@ import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import Commands, file_argument, json_option
+from calmotion.cli.options import json_option
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
     from calmotion.control.motor_types import MotorType
 
+EXAMPLES = (("calmotion motors xm430-w350", "one motor, each value with its source"),)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    text = "list real motors that a joint can name, with their sources"
-    command = commands.add_parser("motors", help=text, description=text[0].upper() + text[1:] + ".")
-    command.set_defaults(command=_run)
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     command.add_argument("name", nargs="?", metavar="NAME", help="show only this motor, each value with its source")
-    file_argument(
-        command, "--motors", metavar="FILE", action="append", default=[],
+    command.add_argument(
+        "--motors", metavar="FILE", action="append", default=[],
         help="TOML file with more motors, to check it; shots use those of motors.toml in the configuration folder",
     )  # fmt: skip
     json_option(command)
     command.add_argument("--toml", action="store_true", help="print TOML, to be changed and saved as motors.toml")
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.control.motor_types import likely_motor_types, motor_type_named, motor_types
     from calmotion.errors import ShotError
 

@@ -6,19 +6,18 @@ import argparse
 import shlex
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.options import Commands, file_argument, opened_shot, progress_display, run_arguments, shot_command
+from calmotion.cli.options import opened_shot, progress_display, run_arguments, shot_arguments
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
+EXAMPLES = (("calmotion rig skinned.usda -o robot.usda", "a robot from a UsdSkel character"),)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    command = shot_command(
-        commands, "rig", _run, "make a robot from a skinned character: bodies, joints, motors, targets"
-    )
-    file_argument(
-        command,
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    shot_arguments(command)
+    command.add_argument(
         "-o",
         "--output",
         metavar="LAYER",
@@ -27,7 +26,7 @@ def add_to(commands: Commands) -> None:
     )
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import conclude
     from calmotion.workflow.commands import rig
     from calmotion.workflow.report import rig_report

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from calmotion.cli.options import Commands
 from calmotion.cli.parser import entry
 
 if TYPE_CHECKING:
@@ -43,23 +42,19 @@ WHAT = {
 }  # fmt: skip
 BENCHMARKS = {name: module for name, (module, _) in WHAT.items()}
 
+EXAMPLES = (("calmotion bench work-precision", "error against run time of every setting"),)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    command = commands.add_parser(
-        "bench",
-        help="measure errors, estimates and run times",
-        description="Measure errors, estimates and run times. `calmotion bench NAME --help` lists the arguments of a "
-        "benchmark.",
-    )
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    command.description = f"{command.description} `calmotion bench NAME --help` lists the arguments of one."
     command.add_argument("name", metavar="NAME", choices=tuple(BENCHMARKS), help="a benchmark, see below")
     lines = [line for name, (_, text) in WHAT.items() for line in entry(name, text, max(map(len, WHAT)) + 4)]
     command.add_argument_group("benchmarks", "\n".join(lines))
     command.add_argument("arguments", nargs=argparse.REMAINDER, help="arguments of the benchmark")
-    command.set_defaults(command=_run, json=False)
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from importlib import import_module
 
     status: int = import_module(f"calmotion.benchmarks.{BENCHMARKS[args.name]}").main(args.arguments)

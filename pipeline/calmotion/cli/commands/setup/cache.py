@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import Commands, json_option
+from calmotion.cli.options import json_option
 from calmotion.support.caching.cache_folder import CACHES, cache_folder
 
 if TYPE_CHECKING:
@@ -15,15 +15,12 @@ if TYPE_CHECKING:
 ALL = "all"
 _UNITS = {"B": 1, "kB": 10**3, "MB": 10**6, "GB": 10**9}
 
+EXAMPLES = (("calmotion cache info", "how large are the caches?"),)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    text = "show, clear or prune the caches of kernels, meshes and reduced bodies"
-    command = commands.add_parser(
-        "cache",
-        help=text,
-        description=f"{text.capitalize()}. All that is in them is made again when it is needed.",
-    )
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    command.description = f"{command.description} All that is in them is made again when it is needed."
     actions = command.add_subparsers(title="commands", required=True, metavar="COMMAND")
     info = actions.add_parser("info", help="print the folder, the number of entries and the size of each cache")
     clear = actions.add_parser("clear", help="remove everything in a cache")
@@ -38,7 +35,13 @@ def add_to(commands: Commands) -> None:
         )  # fmt: skip
     for action, act in ((info, _info), (clear, _clear), (prune, _prune)):
         json_option(action)
-        action.set_defaults(command=act)
+        action.set_defaults(action=act)
+
+
+def run(args: argparse.Namespace, output: Output) -> int:
+    """Do what is asked for."""
+    status: int = args.action(args, output)
+    return status
 
 
 def size(text: str) -> int:

@@ -5,23 +5,21 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from calmotion.cli.options import Commands, json_option
+from calmotion.cli.options import json_option
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
+EXAMPLES = (("calmotion doctor", "is everything in its place?"),)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    text = "check the installation and the machine, and say what to do"
-    command = commands.add_parser(
-        "doctor", help=text, description=f"{text[0].upper()}{text[1:]}. Exit status 1 if something is wrong."
-    )
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    command.description = f"{command.description} Exit status 1 if something is wrong."
     json_option(command)
-    command.set_defaults(command=_run)
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from dataclasses import asdict
 
     from calmotion.cli.diagnostics.machine import NOTE, OK, WRONG, examine

@@ -5,22 +5,22 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from calmotion.cli.options import Commands, json_option
+from calmotion.cli.options import json_option
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
+EXAMPLES = (("calmotion warmup", "after an installation or an update"),)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    text = "compile the kernels ahead of the first shot"
-    command = commands.add_parser("warmup", help=text, description=f"{text[0].upper()}{text[1:]}. Takes half a minute.")
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    command.description = f"{command.description} Takes half a minute."
     json_option(command)
     command.add_argument("--quiet", action="store_true", help="print no progress and no report")
-    command.set_defaults(command=_run)
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from dataclasses import asdict
 
     from calmotion.cli.progress import ProgressDisplay

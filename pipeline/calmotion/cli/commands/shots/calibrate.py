@@ -6,13 +6,11 @@ import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.options import (
-    Commands,
     assignments,
-    file_argument,
     opened_shot,
     progress_display,
     quantity,
-    shot_command,
+    shot_arguments,
 )
 
 if TYPE_CHECKING:
@@ -22,16 +20,22 @@ if TYPE_CHECKING:
 
     from calmotion.cli.output import Output
 
+EXAMPLES = (
+    ("calmotion calibrate shot.usda --recording take.csv -o robot.usda", "markers, encoders"),
+    ("calmotion calibrate shot.usda --recording accel.csv@/Arm/Hand/sensor -o robot.usda", "a printer's log"),
+    ("calmotion calibrate shot.usda --recording a.csv --parameters modulus damping", "these alone"),
+)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    command = shot_command(commands, "calibrate", _run, "estimate parameters of the robot from recordings")
-    file_argument(
-        command, "--recording", metavar="FILE", action="append", required=True,
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    shot_arguments(command)
+    command.add_argument(
+        "--recording", metavar="FILE", action="append", required=True,
         help="what was recorded: a table with columns named after prims or with a TOML map beside it, or an "
         "accelerometer log of a 3D printer as FILE@/PRIM; may be repeated",
     )  # fmt: skip
-    file_argument(command, "-o", "--output", metavar="LAYER", help="USD layer to write")
+    command.add_argument("-o", "--output", metavar="LAYER", help="USD layer to write")
     command.add_argument(
         "--parameters", metavar="KIND", nargs="+",
         help="what to estimate: modulus, damping, density, mass, centre, position_gain, velocity_gain, gear_stiffness, "
@@ -53,9 +57,9 @@ def add_to(commands: Commands) -> None:
     command.add_argument(
         "--integrator", metavar="NAME", help="bdf2, newmark or generalized-alpha (default: the last one)"
     )
-    file_argument(command, "--figures", metavar="DIR", help="draw measured and simulated signals into this folder")
-    file_argument(
-        command, "--motion", metavar="FILE",
+    command.add_argument("--figures", metavar="DIR", help="draw measured and simulated signals into this folder")
+    command.add_argument(
+        "--motion", metavar="FILE",
         help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
     )  # fmt: skip
 
@@ -90,7 +94,7 @@ def parameter_arguments(args: argparse.Namespace) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import conclude
     from calmotion.workflow.calibration.calibrate import calibrate
     from calmotion.workflow.exporting.export import with_shot

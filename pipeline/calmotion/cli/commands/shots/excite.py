@@ -7,25 +7,28 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.commands.shots.calibrate import parameter_arguments, prior_option
 from calmotion.cli.options import (
-    Commands,
     assignments,
     count_of,
-    file_argument,
     opened_shot,
     progress_display,
     quantity,
-    shot_command,
+    shot_arguments,
 )
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
+EXAMPLES = (
+    ("calmotion excite shot.usda -o test.usda", "accelerometers at the targets, encoders"),
+    ("calmotion excite shot.usda -o test.usda --sensor marker=0.3mm --duration 3s", "markers"),
+)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    command = shot_command(commands, "excite", _run, "design a test motion whose recording suits calibrate")
-    file_argument(
-        command, "-o", "--output", metavar="LAYER", required=True,
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    shot_arguments(command)
+    command.add_argument(
+        "-o", "--output", metavar="LAYER", required=True,
         help="USD layer to write; it opens the shot with the motion",
     )  # fmt: skip
     command.add_argument(
@@ -57,7 +60,7 @@ def add_to(commands: Commands) -> None:
     )
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import conclude
     from calmotion.workflow.calibration.excite import SENSORS, excite
 

@@ -6,24 +6,25 @@ import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.options import (
-    Commands,
     assignments,
-    file_argument,
     opened_shot,
     progress_display,
     quantity,
-    shot_command,
+    shot_arguments,
 )
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
+EXAMPLES = (
+    ("calmotion export calm_root.usda --to csv --rate 200Hz", "a table for any controller"),
+    ("calmotion export calm_root.usda --to ros2 -o trajectory.yaml", "a ROS 2 JointTrajectory"),
+)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    command = shot_command(
-        commands, "export", _run, "write the motor curves for a controller, and measure what playing them costs"
-    )
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    shot_arguments(command)
     command.add_argument(
         "--to",
         metavar="FORMAT",
@@ -31,8 +32,7 @@ def add_to(commands: Commands) -> None:
         help="format: ros2, mcap, csv, ticks (servos), ur, bottango, keyframes, bvh, gltf, or that of a plugin",
     )
     command.add_argument("--rate", metavar="HZ", type=_rate, default=100.0, help="commands a second (default: 100)")
-    file_argument(
-        command,
+    command.add_argument(
         "-o",
         "--output",
         metavar="FILE",
@@ -49,8 +49,8 @@ def add_to(commands: Commands) -> None:
     command.add_argument(
         "--no-search", action="store_true", help="do not look for the lowest rate that keeps the tolerance"
     )
-    file_argument(
-        command, "--motion", metavar="FILE",
+    command.add_argument(
+        "--motion", metavar="FILE",
         help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
     )  # fmt: skip
     command.add_argument(
@@ -67,7 +67,7 @@ def _rate(text: str) -> float:
     return value
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import FAILED, conclude
     from calmotion.workflow.exporting.export import export, with_shot
 

@@ -6,12 +6,10 @@ import argparse
 from typing import TYPE_CHECKING
 
 from calmotion.cli.options import (
-    Commands,
-    file_argument,
     opened_shot,
     progress_display,
     run_arguments,
-    shot_command,
+    shot_arguments,
     simulation_arguments,
     simulation_options,
 )
@@ -19,12 +17,18 @@ from calmotion.cli.options import (
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
+EXAMPLES = (
+    ("calmotion inspect shot.usda", "bodies, motors, targets, frequencies"),
+    ("calmotion inspect shot.usda --strict", "check before publishing"),
+    ("calmotion inspect shot.usda --modes build/modes", "how the links vibrate"),
+)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    command = shot_command(commands, "inspect", _run, "show the content of the shot and the model simplifications")
-    file_argument(
-        command, "--modes", metavar="DIR",
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    shot_arguments(command)
+    command.add_argument(
+        "--modes", metavar="DIR",
         help="folder for the mode shapes of the flexible bodies (.vtu, .png) and their table",
     )  # fmt: skip
     command.add_argument(
@@ -36,7 +40,7 @@ def add_to(commands: Commands) -> None:
     simulation_options(command, "bdf2, newmark, generalized-alpha, rk4 or radau (default: automatic)")
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.inspect_tables import print_inspection
     from calmotion.cli.output import FAILED, INTERRUPTED, conclude
     from calmotion.workflow.commands import inspect

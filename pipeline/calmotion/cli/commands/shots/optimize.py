@@ -5,16 +5,23 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from calmotion.cli.options import Commands, file_argument, quantity, run_options, shot_command, simulation_options
+from calmotion.cli.options import quantity, run_options, shot_arguments, simulation_options
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
+EXAMPLES = (
+    ("calmotion optimize shot.usda -o calm.usda", "the usual case"),
+    ("calmotion optimize shot.usda -o calm.usda --tolerance 0.5mm", "finer"),
+    ("calmotion optimize shot.usda -o calm.usda --video calm.webp", "show others what changed"),
+    ("calmotion optimize shot.usda -o calm.usda --bake simulated", "for viewers without physics"),
+)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    command = shot_command(commands, "optimize", _run, "change the motor curves so that the robot does not shake")
-    file_argument(command, "-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    shot_arguments(command)
+    command.add_argument("-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
     run_options(command)
     simulation_options(command, "optimize supports only bdf2")
     command.add_argument(
@@ -55,7 +62,7 @@ def _count(text: str) -> int:
     return count
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.run import run_shot
     from calmotion.host import SettingError
     from calmotion.workflow.commands import optimize

@@ -7,28 +7,31 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.commands.shots.calibrate import parameter_arguments, prior_option
 from calmotion.cli.options import (
-    Commands,
     assignments,
-    file_argument,
     opened_shot,
     progress_display,
     quantity,
-    shot_command,
+    shot_arguments,
 )
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
+EXAMPLES = (
+    ("calmotion refine take1_root.usda --recording take1.csv -o take2.usda", "better curves for the second one"),
+    ("calmotion refine take2_root.usda --recording take2.csv -o take3.usda", "and for the third one"),
+)
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    command = shot_command(commands, "refine", _run, "improve model and curves from a recording of the current curves")
-    file_argument(
-        command, "--recording", metavar="FILE", action="append", required=True,
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    shot_arguments(command)
+    command.add_argument(
+        "--recording", metavar="FILE", action="append", required=True,
         help="recording of this take, as of calmotion calibrate; may be repeated",
     )  # fmt: skip
-    file_argument(
-        command, "-o", "--output", metavar="LAYER", required=True,
+    command.add_argument(
+        "-o", "--output", metavar="LAYER", required=True,
         help="USD layer with the curves of the next take; the model goes beside it as <stem>_model.usda",
     )  # fmt: skip
     command.add_argument("--parameters", metavar="KIND", nargs="+", help="what is estimated, as of calmotion calibrate")
@@ -42,7 +45,7 @@ def add_to(commands: Commands) -> None:
     )
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import conclude
     from calmotion.workflow.calibration.refine import refine
     from calmotion.workflow.exporting.export import with_shot

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.commands.shows.forwarding import command_of, extras_of, forwarded, forwarded_options
-from calmotion.cli.options import Commands, file_argument, report_options
+from calmotion.cli.options import report_options
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -16,14 +16,17 @@ if TYPE_CHECKING:
 SAID = {"kept": "done before, nothing has changed"}
 
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    text = "optimise or simulate many shots, also on a cluster"
-    command = commands.add_parser("batch", help=text, description=text[0].upper() + text[1:] + ".")
-    command.set_defaults(command=_run)
-    file_argument(command, "shots", metavar="SHOTS", nargs="+", help="USD files")
-    file_argument(
-        command, "-o", "--output", metavar="DIR", required=True,
+EXAMPLES = (
+    ("calmotion batch shots/*.usda -o calm --workers 2", "two shots at a time, on this machine"),
+    ("calmotion batch shots/*.usda -o calm --on dask://host:8786", "on the workers of a Dask scheduler"),
+)
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    command.add_argument("shots", metavar="SHOTS", nargs="+", help="USD files")
+    command.add_argument(
+        "-o", "--output", metavar="DIR", required=True,
         help="folder for layers, manifests, logs and the report; the same command goes on after an interruption",
     )  # fmt: skip
     report_options(command)
@@ -45,7 +48,7 @@ def worker_count(text: str) -> int:
     return int(text)
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import FAILED, INTERRUPTED, conclude
     from calmotion.cli.progress import ProgressDisplay
     from calmotion.workflow.batch.run import batch

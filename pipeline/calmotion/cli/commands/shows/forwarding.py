@@ -6,7 +6,7 @@ import argparse
 import os
 from collections.abc import Iterator
 
-from calmotion.cli.options import file_argument, plugin_option, simulation_options
+from calmotion.cli.options import plugin_option, simulation_options
 
 EXTRAS = {
     "csv": "a table for each shot",
@@ -49,7 +49,7 @@ def forwarded_options(command: argparse.ArgumentParser) -> None:
     group.add_argument("--samples-per-second", metavar="HZ", help="more samples than the frames")
     group.add_argument("--splines", action="store_true", help="curves as splines")
     group.add_argument("--run", metavar="OPERATOR", action="append", default=[], help="operator of a plugin to run")
-    file_argument(group, "--settings", metavar="FILE", help="TOML file with a table for each operator")
+    group.add_argument("--settings", metavar="FILE", help="TOML file with a table for each operator")
     group.add_argument("--set", metavar="NAME=VALUE", action="append", default=[], help="property of an operator")
     plugin_option(command)
     simulation_options(command, "as of simulate or optimize")

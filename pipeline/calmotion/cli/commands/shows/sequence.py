@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.commands.shows.batch import worker_count
 from calmotion.cli.commands.shows.forwarding import forwarded, forwarded_options
-from calmotion.cli.options import Commands, file_argument, report_options
+from calmotion.cli.options import report_options
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    text = "retarget clips and all transitions between them"
-    command = commands.add_parser("sequence", help=text, description=text[0].upper() + text[1:] + ".")
-    command.set_defaults(command=_run)
-    file_argument(command, "clips", metavar="CLIPS", help='TOML file: [clips] with NAME = "SHOT.usda" for each')
-    file_argument(
-        command, "-o", "--output", metavar="DIR", required=True,
+EXAMPLES = (("calmotion sequence clips.toml -o build/repertoire", "clips and all transitions between them"),)
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    command.add_argument("clips", metavar="CLIPS", help='TOML file: [clips] with NAME = "SHOT.usda" for each')
+    command.add_argument(
+        "-o", "--output", metavar="DIR", required=True,
         help="folder for layers, manifests and the table of what each transition costs",
     )  # fmt: skip
     report_options(command)
@@ -31,7 +31,7 @@ def add_to(commands: Commands) -> None:
     forwarded_options(command)
 
 
-def _run(args: argparse.Namespace, output: Output) -> int:
+def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import FAILED, INTERRUPTED, conclude
     from calmotion.cli.progress import ProgressDisplay
     from calmotion.host import SettingError

@@ -1,0 +1,116 @@
+"""The commands: those of the engine, and those that plugins bring. Each is imported when it is called."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from types import ModuleType
+from typing import Protocol
+
+
+class Command(Protocol):
+    """A command; its module has `add_arguments(parser)` and `run(arguments, output)`, and may have `EXAMPLES`."""
+
+    @property
+    def help(self) -> str:
+        """What it does, in a line."""
+
+    @property
+    def disabled(self) -> bool:
+        """Whether it cannot be called, and is not listed."""
+
+    def load(self) -> ModuleType:
+        """Its module.
+
+        Raises:
+            ShotError: It cannot be imported, or must not be.
+        """
+
+
+@dataclass(frozen=True)
+class BuiltIn:
+    """A command of the engine.
+
+    Attributes:
+        module: Its module in `calmotion.cli.commands`.
+        help: What it does, in a line.
+    """
+
+    module: str
+    help: str
+    disabled: bool = False
+
+    def load(self) -> ModuleType:
+        """Its module."""
+        return import_module(f"calmotion.cli.commands.{self.module}")
+
+
+BUILT_IN = {
+    "inspect": BuiltIn("shots.inspect", "show the content of the shot and the model simplifications"),
+    "simulate": BuiltIn("shots.simulate", "simulate the shot as animated"),
+    "watch": BuiltIn("shots.watch", "simulate or optimise a shot again whenever it is saved"),
+    "optimize": BuiltIn("shots.optimize", "change the motor curves so that the robot does not shake"),
+    "calibrate": BuiltIn("shots.calibrate", "estimate parameters of the robot from recordings"),
+    "excite": BuiltIn("shots.excite", "design a test motion whose recording suits calibrate"),
+    "refine": BuiltIn("shots.refine", "improve model and curves from a recording of the current curves"),
+    "batch": BuiltIn("shows.batch", "optimise or simulate many shots, also on a cluster"),
+    "sequence": BuiltIn("shows.sequence", "retarget clips and all transitions between them"),
+    "submit": BuiltIn("shows.submit", "write a job template for a render farm (OpenJD)"),
+    "export": BuiltIn("shots.export", "write the motor curves for a controller, and measure what playing them costs"),
+    "import": BuiltIn(
+        "robots.import_robot", "make a shot from a URDF, MJCF or USD robot, with a motion, flexible links and targets"
+    ),
+    "rig": BuiltIn("robots.rig", "make a robot from a skinned character: bodies, joints, motors, targets"),
+    "motors": BuiltIn("robots.motors", "list real motors that a joint can name, with their sources"),
+    "materials": BuiltIn("robots.materials", "list materials for flexible links, with their sources"),
+    "bench": BuiltIn("setup.bench", "measure errors, estimates and run times"),
+    "plugins": BuiltIn("setup.plugins", "list, check, disable and create plugins"),
+    "warmup": BuiltIn("setup.warmup", "compile the kernels ahead of the first shot"),
+    "cache": BuiltIn("setup.cache", "show, clear or prune the caches of kernels, meshes and reduced bodies"),
+    "doctor": BuiltIn("setup.doctor", "check the installation and the machine, and say what to do"),
+}
+# The bundled plugins that bring commands: whoever deletes one is told where its command went.
+BROUGHT_BY: dict[str, str] = {}
+
+
+@dataclass(frozen=True)
+class Absent:
+    """A command of a bundled plugin that was deleted.
+
+    Attributes:
+        name: Of the command.
+        plugin: Its plugin.
+    """
+
+    name: str
+    plugin: str
+    help: str = ""
+    disabled: bool = True
+
+    def load(self) -> ModuleType:
+        """Nothing.
+
+        Raises:
+            SettingError: Always.
+        """
+        from calmotion.host.discovery import bundled_folder
+        from calmotion.host.errors import SettingError
+
+        raise SettingError(
+            f"the command {self.name} is brought by the plugin {self.plugin}, which is not there",
+            path=str(bundled_folder() / self.plugin),
+            remedy="Put its folder back, or install Calmotion again.",
+        )
+
+
+def all_commands() -> Mapping[str, Command]:
+    """Name to command, in the order in which they are listed; one of a plugin never takes the place of a built-in one.
+
+    Raises:
+        SettingError: A folder of CALMOTION_PLUGINS holds no plugin, or the file with the user's choices cannot be read.
+    """
+    from calmotion.host.discovery import plugin_commands
+
+    absent = {name: Absent(name, plugin) for name, plugin in BROUGHT_BY.items()}
+    return {**BUILT_IN, **absent, **plugin_commands(), **BUILT_IN}
