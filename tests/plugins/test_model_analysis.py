@@ -3,7 +3,6 @@
 import sys
 
 import pytest
-from calmotion.benchmarks.scenes.simplification_shots import clevis_arm, mixed_arm
 from calmotion.host import NotAsked
 from calmotion.shot import Character, FEMeshes, ModelChoices, Result, Simplification
 from calmotion.shot.model_choice import ON
@@ -11,6 +10,7 @@ from calmotion.shot.outputs import PlannedStep
 from calmotion.shot.run import OutputPaths, RunSettings, Source
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.testing import host_with, run_operator, small_shot
+from simplification_shots import clevis_arm, mixed_arm
 
 
 @pytest.fixture(scope="module")

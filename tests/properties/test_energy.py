@@ -6,7 +6,6 @@ energy that moves about in the shot.
 
 import numpy as np
 from calmotion import ShotError
-from calmotion.benchmarks.integrators.audits import energy, work
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.integrate import integrate
@@ -18,6 +17,7 @@ from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.prepare import prepare
+from energies import energy, work
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from likenesses import reach

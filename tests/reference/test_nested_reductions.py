@@ -10,11 +10,11 @@ import pytest
 from calmotion.accuracy.simulate_to_tolerance import intended_positions
 from calmotion.accuracy.step_error import simulate_at
 from calmotion.benchmarks.accuracy.estimates import drawn
-from calmotion.benchmarks.common.shots import load
 from calmotion.shot import Animation, Track
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
+from made_shots import soft_linkage_shot
 
 
 def test_sag_converges_from_above():
@@ -43,6 +43,6 @@ def test_stiff_modes_that_bending_moves_do_not_hide_the_derivatives_of_bending()
     of the length are off by 230.1 mm; by rules of eleven points in place of four these are, too, and the coarse ones by
     226.8 mm.
     """
-    shot, options = load("soft-linkage").compiled, RunSettings(step=1.0 / 480.0)
+    shot, options = soft_linkage_shot(), RunSettings(step=1.0 / 480.0)
     off = simulate_at(shot, options, options.step).positions - intended_positions(shot, options)
     assert np.linalg.norm(off, axis=2).max() == pytest.approx(0.2288, abs=2e-3)

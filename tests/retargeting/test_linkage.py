@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.common.shots import load
 from calmotion.benchmarks.optimizer.optimizer import make_problem
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.solver.damping_homotopy import FAR, damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.prepare import modes_of, prepare
+from made_shots import soft_linkage_shot
 from posed import ignore_progress
 
 OPTIONS = RunSettings(step=1 / 120)
@@ -16,7 +16,7 @@ OPTIONS = RunSettings(step=1 / 120)
 
 @pytest.fixture(scope="module")
 def shot():
-    return load("soft-linkage")
+    return soft_linkage_shot()
 
 
 def largest(simulation):
@@ -25,7 +25,7 @@ def largest(simulation):
 
 @pytest.fixture(scope="module")
 def result(shot):
-    return optimize_shot(shot.compiled, OPTIONS, ignore_progress)
+    return optimize_shot(shot, OPTIONS, ignore_progress)
 
 
 @pytest.mark.long
@@ -39,7 +39,7 @@ def test_the_hand_that_was_off_by_a_quarter_of_a_metre_follows_to_a_few_millimet
 
 @pytest.mark.long
 def test_the_way_through_damped_problems_is_shorter(shot):
-    prepared = prepare(shot.compiled, OPTIONS)
+    prepared = prepare(shot, OPTIONS)
     problem = make_problem(shot, prepared, 0.05)
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
     problem.value(zero)
@@ -54,7 +54,7 @@ def test_the_way_through_damped_problems_is_shorter(shot):
 
 
 def test_a_problem_with_more_damping_differs_in_nothing_else(shot):
-    prepared = prepare(shot.compiled, OPTIONS)
+    prepared = prepare(shot, OPTIONS)
     problem = make_problem(shot, prepared, 0.2)
     x = np.zeros(problem.size)
     value = problem.value(x)

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 from arms import chain, compiled
-from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot.motor import Rotor
@@ -15,6 +14,7 @@ from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.prepare import prepare
 from calmotion.simulation.simulator import Simulator
+from linkage_arm import linkage_arm, performance
 from posed import looped, make_problem
 
 

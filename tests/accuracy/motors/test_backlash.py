@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from arms import chain
 from calmotion.accuracy.motors.backlash import sides, transmitted_efforts, with_lost_motion
-from calmotion.benchmarks.scenes.linkage_arm import FORE, linkage_arm, performance
 from calmotion.shot import Animation, MassProperties, Track
 from calmotion.shot.motor import Rotor
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
+from linkage_arm import FORE, linkage_arm, performance
 
 FRAMES = np.arange(61) / 30.0
 OPTIONS = RunSettings(step=1 / 240)

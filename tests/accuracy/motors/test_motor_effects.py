@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from arms import chain
 from calmotion.accuracy.motors.motor_effects import effects_of_gains, with_error_shares
-from calmotion.benchmarks.common.shots import load
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.shot import Animation, Track
 from calmotion.shot.character import motors_give, with_ideal_motors
@@ -14,6 +13,7 @@ from calmotion.shot.motor import Rotor
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
+from made_shots import plastic_shot
 
 K, D = 400.0, 8.0
 FRAMES = np.arange(31) / 30.0
@@ -39,7 +39,7 @@ def shot(character, cyclic=False):
 
 @pytest.fixture(scope="module")
 def flexible_arm():
-    return load("arm").compiled
+    return plastic_shot()
 
 
 def errors(simulation):

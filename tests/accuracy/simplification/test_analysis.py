@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from calmotion.accuracy.simplification.analysis import analyse
 from calmotion.accuracy.step_error import distance, simulate_at
-from calmotion.benchmarks.scenes.simplification_shots import (
-    arm_with_head,
-    clevis_arm,
-    gantry,
-    mixed_arm,
-    plastic_arm,
-)
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot.model_choice import KINDS, OFF, ON
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.body_reduction import load_envelopes
 from calmotion.simulation.compiled_shot import compile_shot
+from simplification_shots import (
+    arm_with_head,
+    clevis_arm,
+    gantry,
+    mixed_arm,
+    plastic_arm,
+)
 
 FAST = RunSettings(step=1 / 120)
 

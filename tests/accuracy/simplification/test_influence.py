@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.accuracy.simplification.influence import influence
-from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
-from calmotion.benchmarks.scenes.simplification_shots import SimplificationShot, arm_with_head
 from calmotion.multibody.analysis.kinematics import rigid_poses, target_frames
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import Follows
@@ -15,6 +13,8 @@ from calmotion.simulation import rigid_run
 from calmotion.simulation.inputs.gearing import leaders
 from calmotion.simulation.prepare import grid_of
 from calmotion.simulation.rigid_run import rigid_bodies
+from linkage_arm import linkage_arm, performance
+from simplification_shots import SimplificationShot, arm_with_head
 
 
 def _rigid(shot):

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 from calmotion.accuracy.simplification.redundant_constraints import Closures, closures_of
-from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
-from calmotion.benchmarks.scenes.simplification_shots import SimplificationShot, clevis_arm, plastic_arm
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import Motor
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.prepare import grid_of
 from calmotion.simulation.rigid_run import rigid_bodies, rigid_poses
+from linkage_arm import linkage_arm, performance
+from simplification_shots import SimplificationShot, clevis_arm, plastic_arm
 
 
 def _of(shot):

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 from calmotion.accuracy.simplification.rotating_bodies import turning_of
-from calmotion.benchmarks.scenes.simplification_shots import arm_with_head, gantry, plastic_arm
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import MovingFrame, Track
+from simplification_shots import arm_with_head, gantry, plastic_arm
 
 
 def _found(shot, changes=True):

@@ -8,12 +8,7 @@ from calmotion.accuracy.step_error import distance
 from calmotion.benchmarks.accuracy import reference_bench, work_precision, work_precision_points
 from calmotion.benchmarks.accuracy.reference_bench import Bench
 from calmotion.benchmarks.accuracy.work_precision_points import chosen_points, forward_points
-from calmotion.benchmarks.common import shots
 from calmotion.benchmarks.common.shots import Unreduced
-from calmotion.benchmarks.integrators import gradient_error
-from calmotion.benchmarks.integrators.gradient_error import GradientError
-from calmotion.benchmarks.optimizer import optimizer
-from calmotion.benchmarks.optimizer.optimizer import Convergence
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 
 
@@ -103,26 +98,3 @@ def test_the_command_writes_a_table_a_picture_and_one_object(bench, reference, p
         assert [float(row["error_m"]) for row in csv.DictReader(file)] == [point.error_m for point in points]
     (figure,) = report["figures"]
     assert (tmp_path / "work_precision_arm.png").samefile(figure)
-
-
-def test_adjoints_and_optimisers_are_reported_on_request(bench, reference, points, monkeypatch, capsys, tmp_path):
-    rows = [
-        GradientError("arm", name, 0.1 / k, 1.0, 0.4, 1e-9, error / k, 1e-10)
-        for name, error in (("discrete", 1e-2), ("continuous", 2e-2))
-        for k in (1, 2)
-    ]
-    found = Convergence("arm", "Gauss-Newton", 0.1, 1.0, 1.0, 30.0, 1.0, 9, 60, 1.2, 12.0)
-    monkeypatch.setattr(work_precision, "load_unreduced", lambda path: bench.shot)
-    monkeypatch.setattr(Bench, "reference", lambda self: reference)
-    monkeypatch.setattr(work_precision_points, "forward_points", lambda bench, reference: points)
-    monkeypatch.setattr(work_precision_points, "chosen_points", lambda bench, reference: [])
-    monkeypatch.setattr(shots, "load", lambda name: bench.shot)
-    monkeypatch.setattr(gradient_error, "errors", lambda shot: rows)
-    monkeypatch.setattr(optimizer, "compare", lambda shot, most: [found])
-    assert work_precision.main(["arm.usda", "--optimizer", "--json", "--figures", str(tmp_path)]) == 0
-    report = json.loads(capsys.readouterr().out)
-    assert [row["fine"] for row in report["gradients"]] == [row.fine for row in rows]
-    assert report["optimizers"][0]["simulations"] == 12.0 and len(report["figures"]) == 2
-    assert work_precision.main(["arm.usda", "--optimizer"]) == 0
-    shown = capsys.readouterr().out
-    assert "gradients against central differences" in shown and "Gauss-Newton" in shown

@@ -65,16 +65,16 @@ def test_a_boundary_is_the_largest_step_below_which_all_run():
     assert largest_steps(cells) == {1.0: 1 / 120, 2.0: None}
 
 
-def test_the_command_writes_cells_table_and_pictures(capsys, monkeypatch, tmp_path):
+def test_the_command_writes_cells_and_a_table(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr(stability_map, "MAPS", {"load": rows_of("load", 1e-6)})
     monkeypatch.setattr(stability_map, "STEPS", {"bdf2": (1 / 48,), "rk4": (1 / 24,)})
-    table, pictures = tmp_path / "cells.csv", tmp_path / "new"
-    assert stability.main(["--json", "--only", "map load", "--csv", str(table), "--figures", str(pictures)]) == 0
+    table = tmp_path / "cells.csv"
+    assert stability.main(["--json", "--only", "map load", "--csv", str(table)]) == 0
     report = json.loads(capsys.readouterr().out)
     stable, refused = report["cells"]
     assert stable["outcome"] == RUNS and stable["map"] == "load" and stable["step_s"] == 1 / 48 and stable["wall_s"] > 0
     assert refused["outcome"] == REFUSED and refused["why"].startswith("/Arm/") and refused["error_m"] is None
-    assert report["cases"] == [] and report["figures"] == [str(pictures / "stability_load.png")]
+    assert report["cases"] == []
     assert [row["integrator"] for row in csv.DictReader(table.open())] == ["bdf2", "rk4"]
     monkeypatch.setattr(outcomes, "REACH", 0.1)
     assert stability.main(["--only", "map load"]) == 1

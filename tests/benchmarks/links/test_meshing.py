@@ -35,7 +35,7 @@ def test_links_are_named_by_path_or_name_or_taken_all(shot):
 @pytest.mark.long
 def test_the_table_shows_errors_that_decrease_towards_the_finest_mesh(shot, tmp_path, capsys):
     file = tmp_path / "table.csv"
-    assert meshing.main([f"{shot}:fore", "--sizes", "40mm", "16mm", "auto", "-o", str(file)]) == 0
+    assert meshing.main([f"{shot}:fore", "--sizes", "40mm", "16mm", "auto", "--csv", str(file)]) == 0
     with open(file, newline="") as text:
         auto, coarse, fine = csv.DictReader(text)
     assert np.isnan(float(auto["size"])) and float(auto["f1"]) == pytest.approx(float(fine["f1"]), rel=0.02)
@@ -75,7 +75,7 @@ def test_links_that_cannot_be_meshed_are_reported_and_the_others_are_measured(sh
 
 def test_a_refined_row_is_named_and_judges_the_automatic_mesh(shot, tmp_path):
     (fore,) = read_links(f"{shot}:fore")
-    auto, refined = meshing.study(fore, ["auto"], 60.0, print, refine=6_000)
+    auto, refined = meshing.study(fore, ["auto"], 60.0, refine=6_000)
     assert np.isnan(auto.size) and refined.size == 0.0 and np.isnan(refined.reduce_time)
     assert refined.nodes > auto.nodes and 0.0 < auto.error < 2.0 and refined.estimate < auto.estimate
     assert "| fore | refined |" in meshing.table([auto, refined])

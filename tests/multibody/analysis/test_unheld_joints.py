@@ -6,8 +6,8 @@ import calmotion as cm
 import numpy as np
 import pytest
 from arms import chain, compiled
-from calmotion.benchmarks.scenes.neutral_hinges import push_rod, turning
 from calmotion.multibody.analysis.unheld_joints import unheld_joints
+from neutral_hinges import push_rod, turning
 from pxr import UsdPhysics
 from small_shots import ELBOW, FORE, TARGET_POSITION, write_arm
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from arms import chain, compiled
-from calmotion.benchmarks.scenes.neutral_hinges import push_rod, turning
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
@@ -19,6 +18,7 @@ from calmotion.multibody.statics.regularized_statics import (
 )
 from calmotion.shot import WORLD, Body, Character, Frame, Joint, MassProperties, Motor, Target
 from dense import dense_matrix, free_sliders, join, multipliers, split
+from neutral_hinges import push_rod, turning
 from scipy.spatial.transform import Rotation
 
 

@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies, with_elasticity
 from calmotion.simulation.body_reduction import load_envelopes
+from linkage_arm import linkage_arm, performance
 from posed import looped, make_problem
 
 

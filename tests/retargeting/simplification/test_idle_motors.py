@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.accuracy.simplification.analysis import analyse
-from calmotion.benchmarks.scenes.simplification_shots import arm_with_head
 from calmotion.multibody.model.topology import span_tree
 from calmotion.retargeting import to_tolerance
 from calmotion.retargeting.optimize import optimize_shot
@@ -17,6 +16,7 @@ from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.body_reduction import load_envelopes
 from calmotion.simulation.compiled_shot import compile_shot
 from posed import ignore_progress
+from simplification_shots import arm_with_head
 
 FAST = RunSettings(step=1 / 120)
 

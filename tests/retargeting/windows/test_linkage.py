@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.common.shots import load
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.windows.optimize import optimize_windows
 from calmotion.shot.run import RunSettings
+from made_shots import soft_linkage_shot
 from posed import ignore_progress
 
 OPTIONS = RunSettings(step=1 / 120, knot_spacing=1 / 12)
@@ -13,7 +13,7 @@ OPTIONS = RunSettings(step=1 / 120, knot_spacing=1 / 12)
 
 @pytest.mark.long
 def test_a_linkage_that_shakes_by_a_quarter_of_a_metre_is_calmed_in_windows():
-    shot = load("soft-linkage").compiled
+    shot = soft_linkage_shot()
     length = 0.5 * float(shot.animation.frame_times[-1])
     result = optimize_windows(shot, OPTIONS, length, ignore_progress)
     one = optimize_shot(shot, OPTIONS, ignore_progress)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.speed.reading import LOADS, REFUSED, RIGGED, study
-from calmotion.benchmarks.speed.robot_files import shots_in
 from calmotion.usd.reading import read_shot
 from calmotion.usd.rigging import RigOptions, rig_shot
 from performing import followed
+from real_shots import LOADS, REFUSED, RIGGED, shots_in, tried
 
 LOADED = {
     "converted/g1_dual_arm/g1_dual_arm.usda": (LOADS, 14),
@@ -28,7 +27,7 @@ LOADED = {
 
 @pytest.fixture(scope="module")
 def rows(shared_data):
-    return {row.file: row for row in study(shared_data)}
+    return {row.file: row for row in tried(shared_data)}
 
 
 def test_every_shot_loads_or_is_refused_with_a_place_and_a_remedy(rows, shared_data):

@@ -8,31 +8,25 @@ the modes. A marker, an accelerometer and the encoders record it, each with its 
 outliers. The table has, for each kind of parameter, how often the 95% interval covers the truth, the median and the
 largest error, the median standard deviation, and in how many trials it was identifiable, and how often it was
 recovered to `GOALS` where its 95% interval is that narrow. Trial number K is the same on every machine. `--resume`
-goes on with the trials that the CSV file does not have: 100 trials may take several days. With `--workers`, also on
-other machines (`--on`), trials are independent jobs.
+goes on with the trials that the CSV file does not have: 100 trials may take several days.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
-from calmotion.benchmarks.common.tables import markdown, resumed_rows, write_rows
+from calmotion.benchmarks.common.tables import finish, resumed_rows, say, write_rows
 from calmotion.benchmarks.scenes.recorded_arm import recorded_arm
 from calmotion.errors import ShotError
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion.shot.calibration.estimates import HIGHER_MODES
 from calmotion.shot.run import RunSettings
-from calmotion.workflow.batch.backends import LOCAL, backend_for
-from calmotion.workflow.batch.calls import results_on
 
 WITHIN = 1.96  # standard deviations of a 95% interval
 GRADED = 5e-4  # prior of `higher_modes`: what the mesh of `recorded_arm` has of it, 2e-4 to 6e-4 over 5 bending modes
@@ -111,25 +105,6 @@ def tried(number: int, finer: bool = False) -> list[Recovered]:
     return rows
 
 
-def outcomes(numbers: Sequence[int], finer: bool, on: str, workers: int) -> Iterator[tuple[int, Any]]:
-    """Trials in the order in which they are done, each with its number: its rows, or why there are none.
-
-    Args:
-        on: Where they run, as of `calmotion batch`; on this machine one worker is this process.
-        workers: Most trials at once.
-    """
-    if on == LOCAL and workers == 1:
-        for number in numbers:
-            try:
-                yield number, tried(number, finer)
-            except ShotError as error:
-                yield number, error
-        return
-    work = [(number, finer) for number in numbers]
-    for index, found in results_on(backend_for(on, workers), tried, work):
-        yield numbers[index], found
-
-
 def table_of(rows: Sequence[Recovered]) -> list[list[str]]:
     """Rows of the table."""
     out = []
@@ -185,39 +160,30 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first trial (default: 0)")
     parser.add_argument("--finer-mesh", action="store_true", help="the real arm has a finer mesh and more modes")
     parser.add_argument("--resume", action="store_true", help="keep the trials that the file of --csv has")
-    parser.add_argument("--on", default=LOCAL, help="where trials run, as of `calmotion batch` (default: local)")
-    parser.add_argument("--workers", type=int, default=1, help="most trials at once (default: 1)")
     output_options(parser, csv="a row for each parameter of each trial", markdown=True)
     options = parser.parse_args(arguments)
     rows = _resumed(parser, options)
     known = {row.trial for row in rows}
-    numbers = [number for number in range(options.first, options.first + options.trials) if number not in known]
-    for number, own in outcomes(numbers, options.finer_mesh, options.on, max(1, options.workers)):
-        if not isinstance(own, list):
-            why = f"is refused: {own.problem}" if isinstance(own, ShotError) else f"has no result: {own.reason}"
-            print(f"trial {number} {why}", file=sys.stderr, flush=True)
+    for number in range(options.first, options.first + options.trials):
+        if number in known:
+            continue
+        try:
+            own = tried(number, options.finer_mesh)
+        except ShotError as error:
+            say(f"trial {number} is refused: {error.problem}")
             continue
         rows = sorted([*rows, *own], key=lambda row: row.trial)
-        print(
+        say(
             f"trial {number}, {own[0].wall_s:.1f} s: "
-            + ", ".join(f"{row.kind} {100.0 * row.error:+.2g}% ({row.pull:+.1f} sd)" for row in own),
-            file=sys.stderr, flush=True,
-        )  # fmt: skip
+            + ", ".join(f"{row.kind} {100.0 * row.error:+.2g}% ({row.pull:+.1f} sd)" for row in own)
+        )
         if options.csv:  # the next trial may take long
             write_rows(options.csv, Recovered, rows)
     if not rows:
         return 1
-    table = table_of(rows)
-    if options.markdown:
-        Path(options.markdown).write_text(markdown(HEADS, table), encoding="utf-8")
-    if options.json:
-        print(json.dumps({"rows": [asdict(row) for row in rows]}))
-    else:
-        from calmotion.cli.tables import console_on, print_table
-
-        print_table(console_on(sys.stdout), "Parameters of random arms, recovered from recordings", HEADS, table)
-    inside = np.mean([abs(row.pull) <= WITHIN for row in rows])
-    return int(inside < 0.85)
+    title, found = "Parameters of random arms, recovered from recordings", {"rows": [asdict(row) for row in rows]}
+    finish(options, title, HEADS, table_of(rows), found)
+    return int(np.mean([abs(row.pull) <= WITHIN for row in rows]) < 0.85)
 
 
 if __name__ == "__main__":

@@ -14,11 +14,9 @@ both.
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -27,9 +25,9 @@ from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.pod_subspace import ReferenceRun, project_to_subspace, reference_run
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.accuracy.step_error import StepRun, distance, frames_of, simulate_at
-from calmotion.benchmarks.accuracy.estimates_figure import HONEST, LIMIT, draw_estimates
+from calmotion.benchmarks.accuracy.figures import HONEST, LIMIT, draw_estimates
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
-from calmotion.benchmarks.common.tables import markdown, resumed_rows, write_rows
+from calmotion.benchmarks.common.tables import finish, resumed_rows, say, write_rows
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, beam_mesh, quintic, shot_of
 from calmotion.errors import ShotError
 from calmotion.reduction.elements.assembly import quadratic_nodes
@@ -256,28 +254,21 @@ def main(arguments: list[str] | None = None) -> int:
         try:
             row = judged(number)
         except ShotError as problem:
-            print(f"shot {number} is refused: {problem.problem}", file=sys.stderr, flush=True)
+            say(f"shot {number} is refused: {problem.problem}")
             continue
         rows = sorted([*rows, row], key=lambda row: row.shot)
-        print(
+        say(
             f"shot {number}, {1e3 * row.tolerance_m:.2g} mm: {1e3 * row.error_m:.2g} mm off, "
-            f"{1e3 * row.estimated_m:.2g} mm estimated", file=sys.stderr, flush=True,
-        )  # fmt: skip
+            f"{1e3 * row.estimated_m:.2g} mm estimated"
+        )
         if options.csv:
             write_rows(options.csv, Judged, rows)
     if not rows:
         return 1
-    table = counts(rows)
-    if options.markdown:
-        Path(options.markdown).write_text(markdown(HEADS, table), encoding="utf-8")
     if options.figures:
         draw_estimates(options.figures, [row.ratio for row in rows], [row.decides for row in rows])
-    if options.json:
-        print(json.dumps({"rows": [asdict(row) | {"ratio": row.ratio, "decides": row.decides} for row in rows]}))
-    else:
-        from calmotion.cli.tables import console_on, print_table
-
-        print_table(console_on(sys.stdout), "Random shots by error over estimate", HEADS, table)
+    found = {"rows": [asdict(row) | {"ratio": row.ratio, "decides": row.decides} for row in rows]}
+    finish(options, "Random shots by error over estimate", HEADS, counts(rows), found)
     return int(any(row.decides and row.ratio > LIMIT for row in rows))
 
 

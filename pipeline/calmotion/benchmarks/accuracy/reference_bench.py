@@ -1,8 +1,7 @@
-"""A shot, its reference, and the points that are measured against it."""
+"""A shot, its reference, the points that are measured against it, and how these compare."""
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, referen
 from calmotion.accuracy.step_error import StepRun, distance, simulate_at
 from calmotion.benchmarks.common.finer_meshes import with_more_nodes
 from calmotion.benchmarks.common.shots import Unreduced
+from calmotion.benchmarks.common.tables import say
 from calmotion.benchmarks.common.timing import median_time
 from calmotion.errors import ShotError
 from calmotion.reduction.reduced_body import ReducedBody
@@ -165,7 +165,32 @@ class Bench:
             again = partial(self.run, bodies, step, integrator)
             took = median_time(again, self.repeats, warm=True, enough=ENOUGH_TIME)
         point = named(took, error)
-        print(
-            f"{point.shot}, {series}, {setting}: {1e3 * error:.2g} mm off in {took:.3g} s", file=sys.stderr, flush=True
-        )
+        say(f"{point.shot}, {series}, {setting}: {1e3 * error:.2g} mm off in {took:.3g} s")
         return point
+
+
+def front(points: Sequence[Point]) -> list[Point]:
+    """Those than which none is both faster and better, by run time."""
+    front: list[Point] = []
+    for point in sorted(points, key=lambda p: (p.wall_s, p.error_m)):
+        if np.isfinite(point.error_m) and (not front or point.error_m < front[-1].error_m):
+            front.append(point)
+    return front
+
+
+def over_fastest(points: Sequence[Point], tolerances: Sequence[float]) -> dict[float, tuple[float, Point]]:
+    """How much longer the choice for each tolerance [m] takes than the fastest setting that keeps it, and that."""
+    ratios = {}
+    chosen = {p.setting: p for p in points if p.series == "tolerance"}
+    for tolerance in tolerances:
+        choice = chosen.get(setting_of(tolerance))
+        if choice is not None:
+            keeping = [p for p in points if p.series != "elements" and p.error_m <= tolerance]
+            fastest = min(keeping, key=lambda p: p.wall_s, default=choice)
+            ratios[tolerance] = choice.wall_s / fastest.wall_s, fastest
+    return ratios
+
+
+def setting_of(tolerance: float) -> str:
+    """Name of what is chosen for a tolerance [m]."""
+    return f"{1e3 * tolerance:g} mm"

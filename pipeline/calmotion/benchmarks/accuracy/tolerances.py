@@ -9,24 +9,22 @@ the rows that the CSV file has; meshes and reductions of references stay in the 
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 
 from calmotion.accuracy.converged_reduction import converged_reduction
 from calmotion.accuracy.simplification.analysis import analyse
 from calmotion.accuracy.simulate_to_tolerance import found_tracks, simulate_to_tolerance
 from calmotion.accuracy.step_error import distance, frames_of
 from calmotion.benchmarks.accuracy.reference_bench import FINEST, Bench, Reference
-from calmotion.benchmarks.accuracy.work_precision import SAMPLES, machine
 from calmotion.benchmarks.common.finer_meshes import TIMES
 from calmotion.benchmarks.common.fresh_cache import fresh_cache
-from calmotion.benchmarks.common.parsers import table_parser
-from calmotion.benchmarks.common.shots import Unreduced, load_unreduced
-from calmotion.benchmarks.common.tables import markdown, resumed_rows, write_rows
+from calmotion.benchmarks.common.parsers import bench_parser, output_options, shots_argument, tolerances_argument
+from calmotion.benchmarks.common.shots import SAMPLES, Unreduced, load_unreduced
+from calmotion.benchmarks.common.tables import finish, resumed_rows, say, write_rows
+from calmotion.benchmarks.common.timing import machine
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.shot import Result
 from calmotion.shot.run import RunSettings
@@ -159,17 +157,12 @@ def cells(rows: Sequence[Kept]) -> list[list[str]]:
     ]  # fmt: skip
 
 
-def print_rows(rows: Sequence[Kept]) -> None:
-    """The same on the screen."""
-    from calmotion.cli.tables import console_on, print_table
-
-    title = {"simulate": "Simulated", "optimize": "Optimised"}[rows[0].command]
-    print_table(console_on(sys.stdout), f"{title} to a tolerance, against a far finer simulation", HEADS, cells(rows))
-
-
 def main(arguments: list[str] | None = None) -> int:
     """The command: exit status 1 when a tolerance is not kept."""
-    parser = table_parser("tolerances", __doc__, SAMPLES, TOLERANCES)
+    parser = bench_parser("tolerances", __doc__)
+    shots_argument(parser, SAMPLES)
+    tolerances_argument(parser, TOLERANCES)
+    output_options(parser, csv="a table", markdown=True)
     parser.add_argument(
         "--nodes", type=float, default=TIMES, metavar="N",
         help=f"nodes of the reference's meshes over those of the shot's (default: {TIMES:g})",
@@ -180,24 +173,20 @@ def main(arguments: list[str] | None = None) -> int:
     known: list[Kept] = resumed_rows(parser, options, Kept)
     rows: list[Kept] = []
     share = FINER_MESHED if options.nodes > 1.0 else FINER
+    command = "optimize" if options.optimize else "simulate"
     for path in options.shots:
         shot = Tolerances(load_unreduced(path), share * min(options.tolerances), options.nodes)
-        own, command = [], "optimize" if options.optimize else "simulate"
         before = {row.tolerance_m: row for row in known if (row.shot, row.command) == (shot.shot.name, command)}
         if not before.keys() >= set(options.tolerances):
             shot.warm(max(options.tolerances), command)
         for tolerance in options.tolerances:
-            own.append(before.get(tolerance) or shot.kept(tolerance, command))
-            print(told(own[-1]), file=sys.stderr, flush=True)  # the next may take long
+            rows.append(before.get(tolerance) or shot.kept(tolerance, command))
+            say(told(rows[-1]))  # the next may take long
             if options.csv:
-                write_rows(options.csv, Kept, [*rows, *own, *(row for row in known if row not in rows + own)])
-        rows += own
-        if options.markdown:
-            Path(options.markdown).write_text(markdown(HEADS, cells(rows)), encoding="utf-8")
-        if not options.json:
-            print_rows(own)
-    if options.json:
-        print(json.dumps({"machine": machine(), "rows": [asdict(row) | {"kept": row.kept} for row in rows]}))
+                write_rows(options.csv, Kept, [*rows, *(row for row in known if row not in rows)])
+    title = {"simulate": "Simulated", "optimize": "Optimised"}[command]
+    found = {"machine": machine(), "rows": [asdict(row) | {"kept": row.kept} for row in rows]}
+    finish(options, f"{title} to a tolerance, against a far finer simulation", HEADS, cells(rows), found)
     return int(not all(row.kept for row in rows))
 
 

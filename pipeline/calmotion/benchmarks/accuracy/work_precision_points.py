@@ -10,8 +10,7 @@ from calmotion.accuracy.converged_reduction import converged_reduction
 from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.simulate_to_tolerance import project_to_tolerance
 from calmotion.accuracy.step_choice import chosen_step
-from calmotion.benchmarks.accuracy.pareto import setting_of
-from calmotion.benchmarks.accuracy.reference_bench import BASE, TOLERANCES, Bench, Point, Reference
+from calmotion.benchmarks.accuracy.reference_bench import BASE, TOLERANCES, Bench, Point, Reference, setting_of
 from calmotion.benchmarks.common.shots import load_unreduced
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of

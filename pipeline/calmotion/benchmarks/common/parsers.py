@@ -6,7 +6,6 @@ import argparse
 import re
 from collections.abc import Sequence
 
-from calmotion.benchmarks.common.shots import MADE
 from calmotion.cli.options import json_option, quantity
 
 
@@ -38,33 +37,19 @@ def output_options(parser: argparse.ArgumentParser, csv: str | None = None, mark
         parser.add_argument("--markdown", metavar="FILE", help="also write the table as Markdown")
 
 
-def links_parser(name: str, description: str | None) -> argparse.ArgumentParser:
-    """The arguments of a benchmark on links, as `scenes.links.read_links` takes them."""
-    parser = bench_parser(name, description)
-    parser.add_argument("links", nargs="+", metavar="FILE[:PRIM]", help="links; all bodies without a prim")
-    return parser
+def shots_argument(parser: argparse.ArgumentParser, shots: Sequence[str]) -> None:
+    """The shots that a benchmark runs on.
+
+    Args:
+        parser: To which the argument is added.
+        shots: Samples that are taken without it.
+    """
+    names = "the samples" if len(shots) > 2 else " and ".join(shots)
+    parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(shots), help=f"USD file (default: {names})")
 
 
-def shots_parser(name: str, description: str | None) -> argparse.ArgumentParser:
-    """The arguments of a benchmark that runs on shots, or on the synthetic ones of `MADE`."""
-    made = "; ".join(f"{shot}: {text}" for shot, text in MADE.items())
-    parser = bench_parser(name, description)
-    parser.add_argument(
-        "shots", metavar="SHOT", nargs="*", default=["arm", "linkage"],
-        help=f"USD file, or a synthetic shot ({made}); default: arm linkage",
-    )  # fmt: skip
-    output_options(parser)
-    return parser
-
-
-def table_parser(
-    name: str, description: str | None, shots: Sequence[str], tolerances: Sequence[float]
-) -> argparse.ArgumentParser:
-    """The arguments of a benchmark that simulates shots with several tolerances and prints a table."""
-    parser = bench_parser(name, description)
-    parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(shots), help="USD file (default: samples)")
+def tolerances_argument(parser: argparse.ArgumentParser, tolerances: Sequence[float]) -> None:
+    """The tolerances [m] that a benchmark goes through."""
     parser.add_argument(
         "--tolerances", metavar="LENGTH", nargs="+", type=quantity("m", positive=True), default=list(tolerances)
     )
-    output_options(parser, csv="a table", markdown=True)
-    return parser

@@ -1,42 +1,20 @@
-"""The shots of the benchmarks: files, or synthetic characters."""
+"""Shots by the names of their files, as far as a benchmark needs them processed."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.model_choice import ON
-from calmotion.shot.run import RunSettings
-from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.simulation.compiled_shot import CompiledShot
 
-MADE = {
-    "linkage": "an arm with a four-bar linkage",
-    "soft-linkage": "the same with thinner links, with a shake of 0.25 m",
-    "arm": "two plastic links",
-}
-
-
-@dataclass(frozen=True, eq=False)
-class BenchShot:
-    """A shot ready to be prepared."""
-
-    name: str
-    compiled: CompiledShot
-
-    @property
-    def character(self) -> Character:
-        """Its character."""
-        return self.compiled.character
-
-    @property
-    def animation(self) -> Animation:
-        """Its animation."""
-        return self.compiled.animation
+SAMPLES = tuple(f"samples/{name}/{name}.usda" for name in ("bartender", "dancer", "rapper", "drummer", "boxer"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,58 +42,45 @@ def load_unreduced(path: str, element_size: float | None = None) -> Unreduced:
     Raises:
         ShotError: It cannot be read, or nothing is flexible.
     """
-    from calmotion.host import open_host
-    from calmotion.shot.run import Source
-
     # everything is kept, so that what could be left out can be compared with it
     settings: dict[str, dict[str, object]] = {
         "accuracy.analyse": dict.fromkeys(("bodies", "turning", "loops", "motors"), ON)
     }
     if element_size is not None:
         settings["fe.mesh"] = {"element_size": element_size}
-    run = open_host([]).run(
-        [Source(path=path, command="simulate")], [Character, Animation, FEMeshes], settings=settings
-    )
-    for result in run:
-        if result.error is not None:
-            raise result.error
-    character, animation, meshes = run.get(Character), run.get(Animation), run.get(FEMeshes)
+    character, animation, meshes = _processed(path, "simulate", (Character, Animation, FEMeshes), settings)
     if character is None or animation is None or meshes is None:
         raise ShotError("has nothing flexible to reduce", path=path)
     edges = [np.linalg.norm(m.points[m.tets[:, 0]] - m.points[m.tets[:, 1]], axis=1) for m in meshes.meshes]
     return Unreduced(Path(path).stem, path, character, animation, meshes, float(np.mean(np.concatenate(edges))))
 
 
-def load(name: str) -> BenchShot:
-    """A shot by the name of its file, or one of `MADE`.
+def load(path: str, rigid: bool = False) -> CompiledShot:
+    """A shot by its file, ready to be optimised.
+
+    Args:
+        path: Of the file.
+        rigid: Whether it may be without flexible bodies.
 
     Raises:
-        ShotError: It cannot be read.
+        ShotError: It cannot be read, or nothing is flexible.
     """
-    if name in MADE:
-        character, animation, meshes = _made(name)
-        return BenchShot(name, reduced_shot(character, animation, meshes, RunSettings()))
+    (compiled,) = _processed(path, "optimize", (CompiledShot,))
+    if compiled is None or not (rigid or any(body.simulated_flexible for body in compiled.character.bodies)):
+        raise ShotError("has nothing flexible to retarget", path=path)
+    found: CompiledShot = compiled
+    return found
+
+
+def _processed(
+    path: str, command: str, wanted: Sequence[type], settings: dict[str, dict[str, object]] | None = None
+) -> list[Any]:
+    """What the operators of a command make of a shot, None where they do not make it."""
     from calmotion.host import open_host
     from calmotion.shot.run import Source
 
-    run = open_host([]).run([Source(path=name, command="optimize")], [CompiledShot])
+    run = open_host([]).run([Source(path=path, command=command)], list(wanted), settings=settings)
     for result in run:
         if result.error is not None:
             raise result.error
-    compiled = run.get(CompiledShot)
-    if compiled is None or not any(body.simulated_flexible for body in compiled.character.bodies):
-        raise ShotError("has nothing flexible to retarget", path=name)
-    return BenchShot(Path(name).stem, compiled)
-
-
-def _made(name: str) -> tuple[Character, Animation, FEMeshes]:
-    if name.endswith("linkage"):
-        from calmotion.benchmarks.scenes.linkage_arm import SOFT, linkage_arm, performance
-
-        character, meshes = linkage_arm(thickness=SOFT) if name.startswith("soft") else linkage_arm()
-        return character, performance(), meshes
-    from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
-
-    character, meshes = beam_arm(2, length=0.3, thickness=0.014, payload=0.2)
-    move, back = quintic(0.8, 0.4, 0.2), quintic(-1.1, 0.35, 0.9)
-    return character, shot_of(lambda t: move(t) + back(t), 2.0, motors=2), meshes
+    return [run.get(kind) for kind in wanted]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import csv
-from collections.abc import Callable, Iterable, Sequence
+import json
+import sys
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -18,14 +20,6 @@ def write_rows(path: str, kind: type[Any], rows: Iterable[Any]) -> None:
         writer = csv.DictWriter(file, [field.name for field in fields(kind)])
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
-
-
-def write_table(path: str, kind: type[Any], rows: Sequence[Any], shown: Callable[[Sequence[Any]], str]) -> None:
-    """Write the rows by the suffix of the file: as CSV, or as the text that shows them."""
-    if path.lower().endswith(".csv"):
-        write_rows(path, kind, rows)
-    else:
-        Path(path).write_text(shown(rows), encoding="utf-8")
 
 
 def read_rows(path: str, kind: type[Any]) -> list[Any]:
@@ -80,3 +74,41 @@ def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], rule: str = "-
     """A Markdown table; `rule` aligns all columns but the first."""
     lines = [heads, ["---", *[rule] * (len(heads) - 1)], *rows]
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+
+
+def show(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1) -> None:
+    """Print a table for a person.
+
+    Args:
+        title: Above it.
+        heads: Of the columns.
+        rows: Their cells.
+        texts: The first so many columns are text, and the others numbers.
+    """
+    from calmotion.cli.tables import console_on, print_table
+
+    print_table(console_on(sys.stdout), title, heads, rows, texts=texts)
+
+
+def finish(
+    options: argparse.Namespace, title: str, heads: Sequence[str], rows: Sequence[Sequence[str]], found: object,
+    texts: int = 1,
+) -> None:  # fmt: skip
+    """Print what a benchmark found: a table, or one object with --json; write the table with --markdown.
+
+    Args:
+        options: Of `parsers.output_options`.
+        title, heads, rows, texts: Of the table, as of `show`.
+        found: What --json prints.
+    """
+    if getattr(options, "markdown", None):
+        Path(options.markdown).write_text(markdown(heads, rows), encoding="utf-8")
+    if options.json:
+        print(json.dumps(found))
+    else:
+        show(title, heads, rows, texts)
+
+
+def say(text: str) -> None:
+    """Tell the person who waits for the result how far it is, beside the result."""
+    print(text, file=sys.stderr, flush=True)

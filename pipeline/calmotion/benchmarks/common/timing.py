@@ -1,8 +1,9 @@
-"""Timing of an action."""
+"""Time that something takes, and where."""
 
 from __future__ import annotations
 
 import os
+import platform
 import time
 from collections.abc import Callable
 
@@ -32,3 +33,14 @@ def processor_time() -> float:
     """That of this process and of those that it started and that have ended [s]: other work changes it little."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
+
+
+def machine() -> dict[str, object]:
+    """The machine of a measurement."""
+    return {
+        "processor": platform.processor() or platform.machine(),
+        "cores": os.cpu_count(),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }

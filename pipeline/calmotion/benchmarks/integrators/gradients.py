@@ -10,50 +10,121 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
 
-from calmotion.benchmarks.common.parsers import shots_parser
-from calmotion.benchmarks.common.shots import load
-from calmotion.benchmarks.integrators.gradient_error import GradientError, errors
+import numpy as np
 
+from calmotion.benchmarks.common.parsers import bench_parser, output_options, shots_argument
+from calmotion.benchmarks.common.shots import SAMPLES, load
+from calmotion.benchmarks.common.tables import show
+from calmotion.benchmarks.common.timing import median_time
+from calmotion.benchmarks.optimizer.optimizer import make_problem
+from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.shot.character import Array
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.simulation.prepare import prepare
 
-def main(arguments: list[str] | None = None) -> int:
-    """The command."""
-    parser = shots_parser("gradients", __doc__)
-    parser.add_argument("--figures", metavar="DIR", help="also draw error against run time, to this folder")
-    options = parser.parse_args(arguments)
-    measured: list[GradientError] = []
-    for name in options.shots:
-        measured += errors(load(name))
-        if not options.json:
-            print_gradients(measured, measured[-1].shot)
-    figures = []
-    if options.figures:
-        from calmotion.benchmarks.integrators.gradient_figure import draw
-
-        figures.append(draw(options.figures, measured))
-    if options.json:
-        print(json.dumps({"gradients": [asdict(row) for row in measured], "figures": figures}))
-        return 0
-    for figure in figures:
-        print(figure)
-    return 0
+STEPS = (1, 2, 4, 8)  # in a 240th of a second
+FINER = 4
+COARSEST = 1.0 / 240.0
+DIRECTIONS = 3
+SIZE = 5e-4  # of an unknown in a difference [rad]
+REPEATS = 3
+HEADS = ("adjoint", "step", "simulation", "gradient", "error, same step", "floor", "error, finest step")
 
 
-def print_gradients(measured: Sequence[GradientError], name: str) -> None:
-    """The table of one shot for a person."""
-    from calmotion.cli.tables import console_on, print_table
+@dataclass(frozen=True)
+class GradientError:
+    """One adjoint at one step.
 
-    heads = ["adjoint", "step", "simulation", "gradient", "error, same step", "floor", "error, finest step"]
-    rows = [
+    Attributes:
+        shot, adjoint: Names.
+        step_s: [s].
+        forward_s, gradient_s: Median time of a simulation, and of linearising it and going back [s].
+        same_step, fine: Largest error of a directional derivative over the largest such derivative, against
+            central differences at the same step and at the finest.
+        floor: How far two central differences of the same step, one with half the distance, disagree: below this
+            nothing is told apart.
+    """
+
+    shot: str
+    adjoint: str
+    step_s: float
+    forward_s: float
+    gradient_s: float
+    same_step: float
+    fine: float
+    floor: float
+
+
+def errors(name: str, shot: CompiledShot, steps: tuple[int, ...] = STEPS) -> list[GradientError]:
+    """Both adjoints of one shot at all steps."""
+
+    def problem_at(divided: float) -> RetargetProblem:
+        return make_problem(shot, prepare(shot, RunSettings(step=COARSEST / divided)), 0.1)
+
+    rng = np.random.default_rng(1)
+    finest = problem_at(FINER * steps[-1])
+    directions = rng.normal(size=(DIRECTIONS, finest.size))
+    judge, _ = _differences(finest, directions)
+    scale = float(np.max(np.abs(judge)))
+    rows = []
+    for divided in steps:
+        problem = problem_at(divided)
+        same, floor = _differences(problem, directions)
+        forward = median_time(partial(problem.value, np.zeros(problem.size)), REPEATS)
+        for adjoint, gradient in (("discrete", problem.linearize), ("continuous", problem.continuous_gradient)):
+            found, seconds = directions @ gradient(), median_time(gradient, REPEATS)
+            off, fine = (float(np.max(np.abs(found - values))) / scale for values in (same, judge))
+            rows.append(GradientError(name, adjoint, problem.grid.h, forward, seconds, off, fine, floor))
+    return rows
+
+
+def _differences(problem: RetargetProblem, directions: Array) -> tuple[Array, float]:
+    """Derivatives along directions by central differences, extrapolated (Richardson), and how far two such disagree."""
+    zero = np.zeros(problem.size)
+
+    def central(d: Array, e: float) -> float:
+        return (problem.value(zero + e * d) - problem.value(zero - e * d)) / (2.0 * e)
+
+    found, other = [], []
+    for d in directions:
+        wide, middle, close = (central(d, SIZE / k) for k in (1, 2, 4))
+        found.append((4.0 * middle - wide) / 3.0)
+        other.append((4.0 * close - middle) / 3.0)
+    values = np.array(found)
+    return values, float(np.max(np.abs(values - other)) / np.max(np.abs(values)))
+
+
+def cells(rows: list[GradientError]) -> list[list[str]]:
+    """The table for a person, without its heads."""
+    return [
         [
             row.adjoint, f"1/{1.0 / row.step_s:.0f} s", f"{row.forward_s:.3f} s", f"{row.gradient_s:.3f} s",
             f"{row.same_step:.1e}", f"{row.floor:.1e}", f"{row.fine:.1e}",
         ]
-        for row in measured if row.shot == name
+        for row in rows
     ]  # fmt: skip
-    print_table(console_on(sys.stdout), f"{name}: gradients against central differences", heads, rows)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command."""
+    parser = bench_parser("gradients", __doc__)
+    shots_argument(parser, SAMPLES[:1])
+    output_options(parser)
+    options = parser.parse_args(arguments)
+    measured: list[GradientError] = []
+    for path in options.shots:
+        own = errors(Path(path).stem, load(path))
+        measured += own
+        if not options.json:
+            show(f"{own[0].shot}: gradients against central differences", HEADS, cells(own))
+    if options.json:
+        print(json.dumps({"gradients": [asdict(row) for row in measured]}))
+    return 0
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ import numpy as np
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.benchmarks.scenes.four_bar import four_bar
 from calmotion.shot import Animation, Character, FEMeshes
-from calmotion.shot.character import Array
 
 WORKING_STEP = 1.0 / 240.0
 SHORT = 0.1  # run time [s]
@@ -140,40 +139,29 @@ def order_of(rows: Sequence[Measured], integrator: str, error: str = "position_e
     return float(np.max(np.diff(errors) / np.diff(steps)))
 
 
-def fates(scene: Scene, parts: Sequence[int] = RK4_PARTS) -> tuple[list[Fate], dict[str, tuple[Array, Array]]]:
-    """Outcome of the stiff scene, and the target's height over time by integrator."""
-    from calmotion.multibody.failure import SimulationFailure
+def fates(scene: Scene, parts: Sequence[int] = RK4_PARTS) -> list[Fate]:
+    """Outcome of the stiff scene."""
+    from calmotion.multibody import SimulationFailure
 
     cases: list[tuple[str, float, float | None]] = [(name, WORKING_STEP, None) for name in SECOND_ORDER]
     cases += [("rk4", WORKING_STEP / part, 0.1) for part in parts]
     found: list[Fate] = []
-    heights: dict[str, tuple[Array, Array]] = {}
     for integrator, step, seconds in cases:
         begin, outcome, end = time.perf_counter(), "runs to the end", seconds or float(scene.animation.frame_times[-1])
         try:
             run = scene.run(step, integrator, seconds)
-            heights[integrator] = _height(run, step)
             if run.trajectory.refined:
                 outcome = f"needs {len(run.trajectory.refined)} smaller steps"
         except SimulationFailure as failure:
             outcome, end = failure.reason, failure.time_s
-            if integrator != "rk4":
-                # as far as it came
-                run = scene.run(step, integrator, end - 2.0 * step)
-                heights[integrator] = _height(run, step)
         found.append(Fate(integrator, step, outcome, end, time.perf_counter() - begin))
-    return found, heights
-
-
-def _height(run: Any, step: float) -> tuple[Array, Array]:
-    """Times [s] and heights of the target [m]."""
-    values: Array = run.target_positions[:, 0, 2]
-    return np.linspace(0.0, step * (len(values) - 1), len(values)), values
+    return found
 
 
 def damping(counts: Sequence[int] = (10, 20, 40, 80, 160)) -> list[tuple[int, float, float]]:
     """Damping ratio that BDF2 gives an undamped vibration: (steps in a period, measured, from its root)."""
     from calmotion.multibody.analysis.kinematics import rigid_state
+    from calmotion.multibody.analysis.modes import system_modes
     from calmotion.multibody.integrators.simulation import simulate
     from calmotion.multibody.integrators.workspace import Workspace
     from calmotion.shot.run import RunSettings
@@ -182,8 +170,6 @@ def damping(counts: Sequence[int] = (10, 20, 40, 80, 160)) -> list[tuple[int, fl
     scene = Scene(beam_arm(modes=1, elasticity="linear", damping=0.0, gravity=0.0), shot_of(quintic(0.0, 1.0), 1.0))
     prepared = prepare(scene.compiled, RunSettings(pre_roll=0.0))
     model, periods, found = prepared.model, 10, []
-    from calmotion.multibody.analysis.modes import system_modes
-
     frequency = float(system_modes(model, np.zeros(len(model.motor)))[0][0])
     for count in counts:
         h = 1.0 / (frequency * count)

@@ -1,6 +1,6 @@
 """Comparison of the integrators: orders, a stiff nonlinear scene, and the numerical damping of BDF2.
 
-`calmotion bench integrators [--figures DIR] [--json]` measures
+`calmotion bench integrators [--json]` measures
 
 - errors of positions and velocities against the step, on a flexible arm with a driven joint and on a four-bar with a
   flexible coupler, against Radau IIA at a fine step;
@@ -17,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
+from calmotion.benchmarks.common.tables import show
 from calmotion.benchmarks.integrators.integrator_errors import (
     Fate,
     Measured,
@@ -35,34 +36,17 @@ def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("integrators", __doc__)
     output_options(parser)
-    parser.add_argument("--figures", metavar="DIR", help="also draw figures into this folder")
     options = parser.parse_args(arguments)
     scenes: dict[str, Callable[[], Scene]] = {"flexible arm": arm_scene, "four-bar, flexible coupler": four_bar_scene}
     measured = {name: orders(make()) for name, make in scenes.items()}
-    outcomes, heights = fates(stiff_scene())
-    damped = damping()
-    figures = []
-    if options.figures:
-        from calmotion.benchmarks.integrators.integrator_figure import draw
-
-        figures.append(draw(options.figures, measured, heights, damped))
+    outcomes, damped = fates(stiff_scene()), damping()
     if options.json:
-        report = {name: [asdict(row) for row in rows] for name, rows in measured.items()}
+        report: dict[str, object] = {name: [asdict(row) for row in rows] for name, rows in measured.items()}
         columns = ("steps_in_a_period", "measured", "of_the_root")
-        print(
-            json.dumps(
-                {
-                    "orders": report,
-                    "stiff": [asdict(fate) for fate in outcomes],
-                    "bdf2_damping": [dict(zip(columns, row, strict=True)) for row in damped],
-                    "figures": figures,
-                }
-            )
-        )
-        return 0
-    print_tables(measured, outcomes, damped)
-    for figure in figures:
-        print(f"wrote {figure}")
+        ratios = [dict(zip(columns, row, strict=True)) for row in damped]
+        print(json.dumps({"orders": report, "stiff": [asdict(fate) for fate in outcomes], "bdf2_damping": ratios}))
+    else:
+        print_tables(measured, outcomes, damped)
     return 0
 
 
@@ -70,9 +54,6 @@ def print_tables(
     measured: dict[str, list[Measured]], outcomes: list[Fate], damped: list[tuple[int, float, float]]
 ) -> None:
     """The tables for a person."""
-    from calmotion.cli.tables import console_on, print_table
-
-    console = console_on(sys.stdout)
     for name, rows in measured.items():
         shown = [
             [
@@ -81,21 +62,16 @@ def print_tables(
             ]
             for row in rows
         ]  # fmt: skip
-        print_table(
-            console, f"Errors: {name}", ["integrator", "step [ms]", "position [m]", "velocity", "time [s]"], shown
-        )
+        show(f"Errors: {name}", ["integrator", "step [ms]", "position [m]", "velocity", "time [s]"], shown)
         found = [
-            [
-                integrator,
-                *(f"{order_of(rows, integrator, error):.2f}" for error in ("position_error", "velocity_error")),
-            ]
-            for integrator in dict.fromkeys(row.integrator for row in rows)
+            [one, *(f"{order_of(rows, one, error):.2f}" for error in ("position_error", "velocity_error"))]
+            for one in dict.fromkeys(row.integrator for row in rows)
         ]
-        print_table(console, f"Orders: {name}", ["integrator", "position", "velocity"], found)
+        show(f"Orders: {name}", ["integrator", "position", "velocity"], found)
     fated = [[f.integrator, f"{f.step_s:.2g}", f.outcome, f"{f.ends_s:.4g}", f"{f.wall_s:.2f}"] for f in outcomes]
-    print_table(console, "Two thin steel links", ["integrator", "step [s]", "outcome", "at [s]", "time [s]"], fated)
+    show("Two thin steel links", ["integrator", "step [s]", "outcome", "at [s]", "time [s]"], fated)
     ratios = [[str(count), f"{100 * one:.3g} %", f"{100 * other:.3g} %"] for count, one, other in damped]
-    print_table(console, "Damping of BDF2", ["steps in a period", "measured", "of the root"], ratios, texts=0)
+    show("Damping of BDF2", ["steps in a period", "measured", "of the root"], ratios, texts=0)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.benchmarks.scenes.beam_arm import IDENTITY, beam_arm, quintic, shot_of
-from calmotion.benchmarks.scenes.neutral_hinges import push_rod, truss, turning
 from calmotion.errors import ShotError
 from calmotion.shot import Animation, Body, Character, FEMeshes, Frame, Joint, MassProperties
 from calmotion.shot.character import Array
@@ -105,10 +104,6 @@ def _nearly_massless() -> tuple[tuple[Character, FEMeshes], Animation]:
     return (made, meshes), shot_of(SWING(0.5), 1.0, 2)
 
 
-def _rigid(character: Character) -> Scene:
-    return lambda: ((character, FEMeshes(())), shot_of(quintic(0.8, 0.5, 0.2), 1.0))
-
-
 def _cases() -> tuple[Case, ...]:
     found = [
         Case("Young's modulus", f"1e{power} Pa", _arm(youngs_modulus=10.0**power))
@@ -154,19 +149,6 @@ def _cases() -> tuple[Case, ...]:
             _wave, links=64, length=0.05, thickness=0.02, youngs_modulus=2.1e11, density=7800.0, cells=3
         )),
     ]  # fmt: skip
-    found += [
-        Case("hinge without stiffness", f"{name}, by {integrator}", _rigid(character), None, integrator)
-        for integrator in ("bdf2", "generalized-alpha")
-        for name, character in (
-            ("balanced push rod", push_rod()),
-            ("push rod in a horizontal plane", push_rod((0.0, -9.81, 0.0))),
-            ("push rod without gravity", push_rod((0.0, 0.0, 0.0))),
-            ("truss without freedom", truss()),
-            ("wheel", turning()),
-            ("door", turning((0.0, -9.81, 0.0), 0.1)),
-            ("pendulum without gravity", turning((0.0, 0.0, 0.0), 0.1)),
-        )
-    ]
     return tuple(found)
 
 
@@ -214,8 +196,6 @@ def judged(group: str, name: str, shot: CompiledShot, options: RunSettings, gap:
         wrong = "the target flew away"
     elif simulation.max_joint_gap > allowed:
         wrong = f"a joint came apart by {simulation.max_joint_gap:.1e} m"
-    elif not any(len(body.stiffness) for body in shot.bodies) and simulation.position_errors.max() > allowed:
-        wrong = "a rigid character does not do what it should"
     elif np.abs(np.linalg.norm(motion.rotations, axis=2) - 1.0).max() > NORM:
         wrong = "a quaternion lost its length"
     steps = len(motion.times)

@@ -1,6 +1,6 @@
 """Stiff and extreme scenes: each must run to its end, or be refused with a reason, without NaN.
 
-`calmotion bench stability [--json] [--csv FILE] [--figures DIR] [--only TEXT]` simulates every case of `CASES` like a
+`calmotion bench stability [--json] [--csv FILE] [--only TEXT]` simulates every case of `CASES` like a
 shot, then every cell of the maps over stiffness, speed, load and step by each integrator
 (`stability_map`), and prints the outcomes. It ends with exit status 1 when a case or a cell fails.
 """
@@ -14,21 +14,18 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
-from calmotion.benchmarks.common.tables import write_rows
+from calmotion.benchmarks.common.tables import show, write_rows
 from calmotion.benchmarks.integrators.outcomes import CASES, FAILED, Outcome, run_case
 
 
 def print_outcomes(outcomes: Sequence[Outcome]) -> None:
     """The table for a person."""
-    from calmotion.cli.tables import console_on, print_table
-
     rows = [[o.group, o.name, o.outcome, *_numbers(o)] for o in outcomes]
     heads = ["extreme", "case", "outcome", "steps", "solves/step", "error [mm]", "gap [m]", "time [s]"]
-    console = console_on(sys.stdout)
-    print_table(console, "Stiff and extreme cases", heads, rows, texts=3)
+    show("Stiff and extreme cases", heads, rows, texts=3)
     for outcome in outcomes:
         if outcome.why:
-            console.print(f"{outcome.group}, {outcome.name}: {outcome.why}", soft_wrap=True)
+            print(f"{outcome.group}, {outcome.name}: {outcome.why}")
 
 
 def _numbers(outcome: Outcome) -> list[str]:
@@ -46,37 +43,21 @@ def main(arguments: list[str] | None = None) -> int:
 
     parser = bench_parser("stability", __doc__)
     output_options(parser, csv="the cells of the maps as a table")
-    parser.add_argument("--figures", metavar="DIR", help="also draw the maps, to this folder")
-    parser.add_argument(
-        "--only",
-        metavar="TEXT",
-        default="",
-        help="cases and maps (`map load`) whose name contains a text",
-    )
+    parser.add_argument("--only", metavar="TEXT", default="", help="only cases and maps (`map load`) so named")
     options = parser.parse_args(arguments)
     begin = time.perf_counter()
     only = options.only.lower()
     outcomes = [run_case(case) for case in CASES if only in f"{case.group} {case.name}".lower()]
     maps = {name: rows for name, rows in MAPS.items() if only in f"map {name}"}
     cells = all_cells(maps)
-    figures: list[str] = []
-    if options.figures and cells:
-        from calmotion.benchmarks.integrators.stability_figure import draw_map
-
-        figures = [
-            draw_map(options.figures, name, rows[0], [cell for cell in cells if cell.map == name])
-            for name, rows in maps.items()
-        ]
     if options.csv:
         write_rows(options.csv, Cell, cells)
     if options.json:
         report = {"cases": [asdict(outcome) for outcome in outcomes], "cells": [asdict(cell) for cell in cells]}
-        print(json.dumps(report | {"figures": figures, "total_wall_s": time.perf_counter() - begin}))
+        print(json.dumps(report | {"total_wall_s": time.perf_counter() - begin}))
     else:
         print_outcomes(outcomes)
         print_cells(cells)
-        for path in [*figures, *([options.csv] if options.csv else [])]:
-            print(f"wrote {path}")
     fates = [outcome.outcome for outcome in outcomes] + [cell.outcome for cell in cells]
     return int(FAILED in fates)
 

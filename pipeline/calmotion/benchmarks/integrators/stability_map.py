@@ -7,7 +7,6 @@ can afford (`STEPS`); a cell that takes longer than `PATIENCE` has failed.
 from __future__ import annotations
 
 import signal
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.benchmarks.common.tables import show
 from calmotion.benchmarks.integrators.outcomes import FAILED, REFUSED, RUNS, judged
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 
@@ -169,9 +169,6 @@ def step_name(step: float | None) -> str:
 
 def print_cells(cells: Sequence[Cell]) -> None:
     """The boundary of each integrator, and how many cells there are of which outcome, for a person."""
-    from calmotion.cli.tables import console_on, print_table
-
-    console = console_on(sys.stdout)
     for name in dict.fromkeys(cell.map for cell in cells):
         own = [cell for cell in cells if cell.map == name]
         lines = {
@@ -180,10 +177,10 @@ def print_cells(cells: Sequence[Cell]) -> None:
         }
         values = list(dict.fromkeys(cell.value for cell in own))
         rows = [[f"{value:g}", *(step_name(line[value]) for line in lines.values())] for value in values]
-        print_table(console, f"Largest stable step [s] over {name}", [name, *lines], rows, texts=0)
+        show(f"Largest stable step [s] over {name}", [name, *lines], rows, texts=0)
     for outcome in (RUNS, REFUSED, FAILED):
         count = sum(cell.outcome == outcome for cell in cells)
-        console.print(f"{count} cells {'run' if outcome == RUNS else 'are refused' if outcome == REFUSED else 'fail'}")
+        print(f"{count} cells {'run' if outcome == RUNS else 'are refused' if outcome == REFUSED else 'fail'}")
     for cell in cells:
         if cell.outcome == FAILED:
-            console.print(f"{cell.map} {cell.value:g}, {step_name(cell.step_s)} s, {cell.integrator}: {cell.why}")
+            print(f"{cell.map} {cell.value:g}, {step_name(cell.step_s)} s, {cell.integrator}: {cell.why}")

@@ -1,10 +1,10 @@
 """What becomes of the links of real robots, and the time and error of their meshes against element size.
 
-`calmotion bench meshing ROBOT ... [-o table.md|table.csv]` has a row for each link: what its solid was made of, its
+`calmotion bench meshing ROBOT ... [--csv FILE [--resume]]` has a row for each link: what its solid was made of, its
 volume and mass, interface patches, unknowns, processor time, first frequencies, and why it was refused.
 `--geometry-only` ends before the mesh. `FILE:PRIM` names one link. Each link is meshed in a process of its own
-(`--jobs`): where that crashes or hangs, this is the outcome of the link. `--page` writes a page with pictures. With
-`--resume` links that the CSV file has are not meshed again.
+(`--jobs`): where that crashes or hangs, this is the outcome of the link. With `--resume` links that the CSV file has
+are not meshed again.
 
 With `--sizes 2 1.4 1 0.7` each link is meshed with elements of several sizes, given in metres with a unit (`8mm`) or as
 multiples of the automatic size; `auto` is the mesh that a shot gets, refined for its first frequencies. Errors of
@@ -19,19 +19,19 @@ from __future__ import annotations
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from calmotion.benchmarks.common.messages import say
-from calmotion.benchmarks.common.parsers import links_parser
-from calmotion.benchmarks.common.tables import markdown, write_table
-from calmotion.benchmarks.links.robots import file_of, survey_robots
-from calmotion.benchmarks.links.tables import done, summary, survey_table
-from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, links_of_all
+from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.tables import markdown, resumed_rows, say, write_rows
+from calmotion.benchmarks.links.robots import survey_robots
+from calmotion.benchmarks.links.survey import LinkRow
+from calmotion.benchmarks.links.tables import done, summary, survey_tables
+from calmotion.benchmarks.scenes.links import Link, attachments_of, file_of, frames_of, links_of_all
 from calmotion.benchmarks.scenes.mesher import mesher
 from calmotion.errors import ShotError
 
@@ -70,18 +70,13 @@ class Row:
     held: str
 
 
-def study(
-    link: Link, sizes: Sequence[str], time_limit: float, say: Callable[[str], None], finest_limit: float | None = None,
-    refine: int = 0,
-) -> list[Row]:  # fmt: skip
+def study(link: Link, sizes: Sequence[str], time_limit: float, refine: int = 0) -> list[Row]:
     """One row for each element size, coarse to fine.
 
     Args:
         link: With surfaces.
         sizes: Multiples of the automatic size, lengths with a unit, or `auto` for the automatic mesh.
         time_limit: Processor time of one mesh [s].
-        say: Told what could not be done.
-        finest_limit: The same for meshes of given sizes; None: as of the automatic one.
         refine: Number of nodes to which the automatic mesh is refined as well; 0: it is not.
 
     Raises:
@@ -98,8 +93,7 @@ def study(
         try:
             start = time.perf_counter()
             asked = -1.0 if np.isnan(size) else size
-            limit = time_limit if np.isnan(size) or finest_limit is None else finest_limit
-            options = maker.MeshOptions(element_size=asked, time_limit=limit, cache=False)
+            options = maker.MeshOptions(element_size=asked, time_limit=time_limit, cache=False)
             mesh = maker.mesh_body(0, link.body, options, frames_of(link), attachments_of(link))
             meshed = time.perf_counter() - start
             row, told = _row(link, size, mesh, meshed), mesh.quality.error
@@ -226,40 +220,36 @@ def _cell(value: object) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; exit status 1 when no link could be meshed."""
-    parser = links_parser("meshing", __doc__)
+    parser = bench_parser("meshing", __doc__)
+    parser.add_argument("links", nargs="+", metavar="FILE[:PRIM]", help="links; all bodies without a prim")
     parser.add_argument("--sizes", nargs="+", help="multiples of the automatic element size, lengths (8mm), auto")
     parser.add_argument("--geometry-only", action="store_true", help="make solids, and no meshes")
     parser.add_argument("--time-limit", type=float, default=180.0, help="processor time of the meshes of a link [s]")
     parser.add_argument(
         "--refine", type=int, default=0, metavar="NODES", help="also refine the automatic mesh to these"
     )
-    parser.add_argument("--finest-limit", type=float, help="the same for the meshes of given --sizes; grids get finer")
     parser.add_argument("--jobs", type=int, default=1, help="links at a time, each in a process of its own")
-    parser.add_argument("--pictures", nargs="+", default=[], metavar="LINK", help="draw these links beside the table")
-    parser.add_argument("-o", "--output", help="file of the table, .csv or .md; of several rows at any time")
-    parser.add_argument("--resume", action="store_true", help="keep the links that the .csv file of --output has")
-    parser.add_argument("--page", help="file of a page with the table and the pictures, .md")
+    parser.add_argument("--csv", metavar="FILE", help="also write all columns, after each link")
+    parser.add_argument("--resume", action="store_true", help="keep the links that the file of --csv has")
     options = parser.parse_args(arguments)
-    if options.resume and not str(options.output).lower().endswith(".csv"):
-        parser.error("--resume needs --output FILE.csv, with the links that are kept")
-
+    known: list[LinkRow] = [] if options.sizes else resumed_rows(parser, options, LinkRow)
     found = [(link, Path(file_of(source)).stem) for source, link in links_of_all(options.links, say)]
     if options.sizes:
-        return _study_all([link for link, _ in found], options, say)
-    rows = survey_robots(found, options, say)
-    print(survey_table(rows) + "\n" + summary(rows, options.geometry_only), end="")
+        return _study_all([link for link, _ in found], options)
+    rows = survey_robots(found, options, known)
+    print(survey_tables(rows) + "\n" + summary(rows, options.geometry_only), end="")
     return 0 if done(rows, options.geometry_only) else 1
 
 
-def _study_all(links: Sequence[Link], options: Namespace, say: Callable[[str], None]) -> int:
+def _study_all(links: Sequence[Link], options: Namespace) -> int:
     rows: list[Row] = []
     for link in links:
         try:
-            rows += study(link, options.sizes, options.time_limit, say, options.finest_limit, options.refine)
+            rows += study(link, options.sizes, options.time_limit, options.refine)
         except ShotError as error:
             say(str(error))
-        if options.output and rows:
-            write_table(options.output, Row, rows, table)
+        if options.csv:
+            write_rows(options.csv, Row, rows)
     lines = verdicts(rows)
     print(table(rows) + (f"\n{lines}" if lines else ""), end="")
     return 0 if rows else 1

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from calmotion.benchmarks.common.timing import processor_time
-from calmotion.benchmarks.links.pictures import draw_link
 from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of
+from calmotion.benchmarks.scenes.mesher import mesher
 from calmotion.errors import ShotError
 from calmotion.shot import FEMesh
 from calmotion.support.processes.workers import Fault
@@ -75,13 +74,6 @@ class LinkRow:
         return self.source if not self.note else f"{self.source}: {self.note}"
 
 
-def survey_link(link: Link, robot: str, time_limit: float, geometry_only: bool, picture: str) -> LinkRow:
-    """`survey_row` with the bundled mesher, for a process of its own."""
-    from calmotion.benchmarks.scenes.mesher import mesher
-
-    return survey_row(link, robot, mesher(), time_limit, geometry_only, picture)
-
-
 def faulty_row(link: Link, robot: str, fault: Fault) -> LinkRow:
     """The row of a link whose process failed."""
     note = f"{fault.reason}. Give a TetMesh, or a simpler mesh file, for this link, and report the fault"
@@ -94,20 +86,14 @@ def same_row(row: LinkRow, link: Link, robot: str) -> LinkRow:
     return replace(row, robot=robot, link=link.name, note="; ".join(filter(None, (note, row.note))))
 
 
-def survey_row(
-    link: Link, robot: str, mesher: Any, time_limit: float, geometry_only: bool = False, picture: str = "",
-    envelope_factor: float = 1.0,
-) -> LinkRow:  # fmt: skip
-    """The row of a link; what is wrong with it is in its note.
+def survey_link(link: Link, robot: str, time_limit: float, geometry_only: bool = False) -> LinkRow:
+    """The row of a link, by the bundled mesher; what is wrong with the link is in its note.
 
     Args:
         link: From `read_links`.
         robot: Its name.
-        mesher: The module `body_mesh` of the bundled mesher.
         time_limit: Processor time of its meshes [s].
         geometry_only: Whether its solid is made but not meshed.
-        picture: File of a picture of its mesh and interface patches; empty for none.
-        envelope_factor: Factor of the distance that the mesh may be from its surface.
     """
     from calmotion.reduction.cache import recomputed
 
@@ -120,18 +106,16 @@ def survey_row(
     )  # fmt: skip
     if not body.surfaces and body.tets is None and not frames:
         return replace(row, source="none", note="no geometry and no joints")
-    begin = processor_time()
+    begin, maker = processor_time(), mesher()
     try:
-        options = mesher.MeshOptions(time_limit=time_limit, cache=False, envelope_factor=envelope_factor)
-        geometry = mesher.geometry_of(0, body, options, frames)
+        options = maker.MeshOptions(time_limit=time_limit, cache=False)
+        geometry = maker.geometry_of(0, body, options, frames)
         row = _with_solid(row, geometry, visual, frames)
         if not geometry_only:
             with recomputed():
-                mesh = mesher.mesh_of(0, body, geometry, options, frames, attachments_of(link))
+                mesh = maker.mesh_of(0, body, geometry, options, frames, attachments_of(link))
             row = replace(row, seconds=processor_time() - begin)
             row = _with_mesh(row, mesh, link)
-            if picture:
-                draw_link(Path(picture), f"{robot}, {link.name}", mesh, link)
     except ShotError as problem:
         row = replace(row, note=str(problem), nodes=0)
     return row if row.nodes else replace(row, seconds=processor_time() - begin)

@@ -1,9 +1,8 @@
-"""Tables and a page about what becomes of the links of robots."""
+"""Tables about what becomes of the links of robots."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple
 
 import numpy as np
 
@@ -11,15 +10,6 @@ from calmotion.benchmarks.common.tables import markdown
 from calmotion.benchmarks.links.survey import COPY, LIMIT, LinkRow
 
 _HONEST = 20.0  # estimate from which a link counts as coarse [%]
-
-
-def survey_table(rows: Sequence[LinkRow]) -> str:
-    """The rows as a Markdown table."""
-    heads = [
-        "robot", "link", "source", "triangles", "volume cm^3", "of hull", "mass kg", "kg/m^3", "joints", "off", "mm",
-        "nodes", "volume %", "s", "f1 Hz", "f2 Hz", "f3 Hz", "estimate %", "note",
-    ]  # fmt: skip
-    return markdown(heads, ([_cell(value) for value in astuple(row)] for row in rows))
 
 
 def _cell(value: object) -> str:
@@ -54,34 +44,10 @@ def summary(rows: Sequence[LinkRow], geometry_only: bool = False) -> str:
     return "".join(lines)
 
 
-def page(rows: Sequence[LinkRow], pictures: Sequence[tuple[str, str]], command: str) -> str:
-    """The page of the documentation.
-
-    Args:
-        rows: Of all robots.
-        pictures: Titles and files, relative to the page.
-        command: That makes the page.
-    """
+def survey_tables(rows: Sequence[LinkRow]) -> str:
+    """The numbers of each robot, and a row of each link, as Markdown."""
     links = [row for row in rows if row.source != "none"]
-    parts = [
-        "# Links that were meshed\n\n"
-        "Each link of robots that others made becomes flexible by itself: what its solid was made of, how fine its "
-        "mesh is, and how exact its first frequencies are. None of the robots is part of this repository. "
-        "The material is polyamide for all (1.8 GPa, 1200 kg/m^3), unless the robot states masses; links are held by "
-        "the joint towards the world. `s` is processor time on one core, from the triangles of the file to a mesh with "
-        "an estimated error; `estimate` is that of the first frequencies.\n\n"
-        f"The page is made by\n\n    {command}\n\n",
-        "\n\n".join(summary(rows).strip().splitlines()) + "\n\n",
-        "## Robots\n\n" + _robots(links) + "\n",
-    ]
-    if pictures:
-        parts.append("## Meshes and what joints hold of them\n\n")
-        parts.append(
-            "The parts that joints hold (interface patches) are coloured: orange towards the world, then blue.\n\n"
-        )
-        parts += [f"![{title}]({file})\n\n" for title, file in pictures]
-    parts.append("## Links\n\n" + _links(links))
-    return "".join(parts)
+    return f"## Robots\n\n{_robots(links)}\n## Links\n\n{_links(links)}"
 
 
 def _robots(links: Sequence[LinkRow]) -> str:

@@ -10,17 +10,20 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 
-from calmotion.benchmarks.common.parsers import shots_parser
-from calmotion.benchmarks.common.shots import BenchShot, load
+from calmotion.benchmarks.common.parsers import bench_parser, output_options, shots_argument
+from calmotion.benchmarks.common.shots import SAMPLES, load
+from calmotion.benchmarks.common.tables import show
 from calmotion.benchmarks.optimizer.optimizer import make_problem
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import minimize
 from calmotion.shot.character import Array
 from calmotion.shot.run import SHAPERS, RunSettings
+from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.shapers import best_delay, delay, shaped
 from calmotion.simulation.prepare import modes_of, prepare
@@ -49,9 +52,9 @@ class Row:
     change_deg: float
 
 
-def compare(shot: BenchShot) -> list[Row]:
+def compare(name: str, shot: CompiledShot) -> list[Row]:
     """All methods on one shot."""
-    prepared = prepare(shot.compiled, RunSettings())
+    prepared = prepare(shot, RunSettings())
     problem = make_problem(shot, prepared, 0.05)
     frequencies, damping = modes_of(prepared)
     simulator = Simulator(prepared.model, prepared.grid.h, prepared.world, prepared.grid.cyclic)
@@ -62,65 +65,58 @@ def compare(shot: BenchShot) -> list[Row]:
             curves = shaped(problem.curves, prepared.grid, kind, frequencies, damping)
             late = delay(kind, frequencies, damping)
         run = simulator.run(curves.angles, curves.rates)
-        rows.append(_row(shot, kind.replace("2", ", two modes"), late, problem, curves, run.target_positions))
+        rows.append(_row(name, kind.replace("2", ", two modes"), late, problem, curves, run.target_positions))
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
     problem.value(zero)
     found = minimize(problem, damping_homotopy(problem, zero, free, float(frequencies[0])), free, 5e-6)
     problem.value(found.x)
-    rows.append(_row(shot, "optimised", 0.0, problem, problem.changed_curves, problem.run.target_positions))
+    rows.append(_row(name, "optimised", 0.0, problem, problem.changed_curves, problem.run.target_positions))
     return rows
 
 
-def _row(
-    shot: BenchShot, method: str, late: float, problem: RetargetProblem, curves: Curves, positions: Array
-) -> Row:  # fmt: skip
+def _row(shot: str, method: str, late: float, problem: RetargetProblem, curves: Curves, positions: Array) -> Row:
     grid, intended = problem.grid, problem.objective.intended.target_positions
     judged = np.flatnonzero(grid.judged)
     now = np.linalg.norm(positions[judged] - intended[judged], axis=2)
     best, delayed = best_delay(positions, intended, grid.judged, grid.h)
     change = np.abs(curves.angles - problem.curves.angles)[judged].max()
     return Row(
-        shot.name, method, late, 1e3 * float(now.max()), 1e3 * float(np.sqrt(np.mean(now**2, axis=0)).max()),
+        shot, method, late, 1e3 * float(now.max()), 1e3 * float(np.sqrt(np.mean(now**2, axis=0)).max()),
         best, 1e3 * float(delayed.max()), float(np.degrees(change)),
     )  # fmt: skip
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """The command."""
-    parser = shots_parser("baselines", __doc__)
-    options = parser.parse_args(arguments)
-    found: list[Row] = []
-    for name in options.shots:
-        shot = load(name)
-        found += compare(shot)
-        if not options.json:
-            print_table_of(found, shot.name)
-    if options.json:
-        print(json.dumps([asdict(row) for row in found]))
-    return 0
+HEADS = (
+    "method", "delay", "largest error", "rms error", "least error, animation delayed", "by", "curves change by",
+)  # fmt: skip
 
 
-def print_table_of(rows: list[Row], name: str) -> None:
-    """The table of one shot for a person."""
-    from calmotion.cli.tables import console_on, print_table
-
-    heads = [
-        "method",
-        "delay",
-        "largest error",
-        "rms error",
-        "least error, animation delayed",
-        "by",
-        "curves change by",
-    ]
-    shown = [
+def cells(rows: list[Row]) -> list[list[str]]:
+    """The table for a person, without its heads."""
+    return [
         [
             row.method, f"{1e3 * row.delay_s:.0f} ms", f"{row.largest_mm:.2f} mm", f"{row.rms_mm:.2f} mm",
             f"{row.delayed_largest_mm:.2f} mm", f"{1e3 * row.best_delay_s:.0f} ms", f"{row.change_deg:.1f}°",
         ]
-        for row in rows if row.shot == name
+        for row in rows
     ]  # fmt: skip
-    print_table(console_on(sys.stdout), name, heads, shown)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command."""
+    parser = bench_parser("baselines", __doc__)
+    shots_argument(parser, SAMPLES)
+    output_options(parser)
+    options = parser.parse_args(arguments)
+    found: list[Row] = []
+    for path in options.shots:
+        own = compare(Path(path).stem, load(path))
+        found += own
+        if not options.json:
+            show(own[0].shot, HEADS, cells(own))
+    if options.json:
+        print(json.dumps([asdict(row) for row in found]))
+    return 0
 
 
 if __name__ == "__main__":

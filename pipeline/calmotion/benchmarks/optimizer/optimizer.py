@@ -10,14 +10,17 @@ from __future__ import annotations
 import json
 import sys
 import time
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize as quasi_newton
 
-from calmotion.benchmarks.common.parsers import shots_parser
-from calmotion.benchmarks.common.shots import BenchShot, load
+from calmotion.benchmarks.common.parsers import bench_parser, output_options, shots_argument
+from calmotion.benchmarks.common.shots import SAMPLES, load
+from calmotion.benchmarks.common.tables import show
 from calmotion.benchmarks.common.timing import median_time
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, make_basis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
@@ -27,6 +30,7 @@ from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.shot.character import Array
 from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion
 from calmotion.simulation.prepare import Prepared, lowest_frequency, prepare
@@ -34,6 +38,7 @@ from calmotion.simulation.target_errors import Objective
 
 CLOSE = 1.01  # objectives within this factor of the converged one count as reached
 GAIN = 1e-6  # of the reference solution [m]
+SPACING = 0.05  # of the knots [s]
 UNIT = 0.01  # of the unknowns of L-BFGS, whose first step is of length one [rad]
 FAILED = 1e6  # objective of what cannot be simulated, over that of the input
 
@@ -76,7 +81,7 @@ class Cost:
     product: float
 
 
-def make_problem(shot: BenchShot, prepared: Prepared, spacing: float) -> RetargetProblem:
+def make_problem(shot: CompiledShot, prepared: Prepared, spacing: float) -> RetargetProblem:
     """The problem without limits, knots `spacing` [s] apart."""
     model, grid, world = prepared.model, prepared.grid, prepared.world
     curves = sample_curves(shot.animation.tracks, grid)
@@ -88,92 +93,106 @@ def make_problem(shot: BenchShot, prepared: Prepared, spacing: float) -> Retarge
     return RetargetProblem(model, grid, curves, objective, space, world)
 
 
-def _largest(problem: RetargetProblem) -> float:
-    errors = problem.run.target_positions - problem.objective.intended.target_positions
-    return 1e3 * float(np.linalg.norm(errors, axis=2)[problem.grid.judged].max())
-
-
-def _reference(shot: BenchShot, prepared: Prepared, zero: Array) -> Search:
-    """A solution that is converged further than those that are compared."""
-    problem, free = make_problem(shot, prepared, 0.05), np.zeros(len(zero), bool)
-    problem.value(zero)
-    start = damping_homotopy(problem, zero, free, lowest_frequency(prepared))
-    return minimize(problem, start, free, GAIN, 60, 200)
-
-
-def compare(shot: BenchShot, lbfgs: int) -> list[Convergence]:
-    """Both methods on one shot.
+def compare(name: str, shot: CompiledShot, lbfgs: int) -> list[Convergence]:
+    """Both methods on one shot, against a solution that is converged further.
 
     Args:
+        name: Of the shot.
+        shot: The shot.
         lbfgs: Most evaluations of L-BFGS.
     """
-    prepared = prepare(shot.compiled, RunSettings())
-    problem = make_problem(shot, prepared, 0.05)
-    zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
+    prepared = prepare(shot, RunSettings())
+    problem = make_problem(shot, prepared, SPACING)
+    zero = np.zeros(problem.size)
     forward = median_time(lambda: problem.value(zero))
-    problem.linearize()
+    problem.linearize()  # compiles
     problem.product(np.ones(problem.size))
     problem.value(zero)
     before = _largest(problem)
-    reference = _reference(shot, prepared, zero)
+    reference, _ = _gauss_newton(make_problem(shot, prepared, SPACING), prepared, GAIN, 60, 200)
     converged = problem.value(reference.x)
 
     def row(method: str, trace: list[tuple[float, float]], x: Array, evaluations: int, products: int) -> Convergence:
         reached = next((seconds for seconds, value in trace if value <= CLOSE * converged), None)
         objective = problem.value(x)
         return Convergence(
-            shot.name, method, forward, objective, converged, before, _largest(problem), evaluations, products,
+            name, method, forward, objective, converged, before, _largest(problem), evaluations, products,
             reached, None if reached is None else reached / forward,
         )  # fmt: skip
 
-    trace: list[tuple[float, float]] = []
-    fresh = make_problem(shot, prepared, 0.05)
-    begin = time.perf_counter()
-
-    def on_iterate(search: Search) -> None:
-        trace.append((time.perf_counter() - begin, fresh.merit()))
-
-    fresh.value(zero)
-    start = damping_homotopy(fresh, zero, free, lowest_frequency(prepared))
-    found = minimize(fresh, start, free, 5e-6, on_iterate=on_iterate)
+    found, trace = _gauss_newton(make_problem(shot, prepared, SPACING), prepared, 5e-6)
     rows = [row("Gauss-Newton", trace, found.x, found.evaluations, found.products)]
-
-    class Enough(Exception):
-        pass
-
-    best: list[tuple[float, float]] = []
-    other, at = make_problem(shot, prepared, 0.05), [zero]
-    begin = time.perf_counter()
-
-    initial = problem.value(zero)
-
-    def both(y: Array) -> tuple[float, Array]:
-        x = UNIT * y
-        value = other.value(x)
-        gradient = other.linearize() if np.isfinite(value) else np.zeros_like(x)
-        if not best or value < min(item[1] for item in best):
-            at[0] = x.copy()
-        best.append((time.perf_counter() - begin, value))
-        if len(best) >= lbfgs or value <= CLOSE * converged:
-            raise Enough
-        return min(value, FAILED * initial) / initial, UNIT * gradient / initial
-
-    try:
-        quasi_newton(
-            both, zero, jac=True, method="L-BFGS-B", options={"maxiter": lbfgs, "maxcor": 20, "ftol": 0.0, "gtol": 0.0}
-        )
-    except Enough:
-        pass
-    rows.append(row("L-BFGS", best, at[0], len(best), 0))
+    best, trace = _lbfgs(make_problem(shot, prepared, SPACING), lbfgs, CLOSE * converged)
+    rows.append(row("L-BFGS", trace, best, len(trace), 0))
     if rows[1].seconds is None:
         # the time it was given, as a bound from below
-        rows.append(row("L-BFGS, time spent", [(best[-1][0], 0.0)], at[0], len(best), 0))
+        rows.append(row("L-BFGS, time spent", [(trace[-1][0], 0.0)], best, len(trace), 0))
     return rows
 
 
-def costs(shot: BenchShot) -> list[Cost]:
+def _largest(problem: RetargetProblem) -> float:
+    """Largest error at any target as last simulated [mm]."""
+    errors = problem.run.target_positions - problem.objective.intended.target_positions
+    return 1e3 * float(np.linalg.norm(errors, axis=2)[problem.grid.judged].max())
+
+
+def _gauss_newton(
+    problem: RetargetProblem, prepared: Prepared, gain: float, iterations: int = 30, products: int = 60
+) -> tuple[Search, list[tuple[float, float]]]:
+    """The search from the animation, and the time [s] and objective of each iterate.
+
+    Args:
+        gain: That ends it [m].
+        iterations, products: At most, the latter in each iteration.
+    """
+    zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
+    trace: list[tuple[float, float]] = []
+    begin = time.perf_counter()
+
+    def on_iterate(search: Search) -> None:
+        trace.append((time.perf_counter() - begin, problem.merit()))
+
+    problem.value(zero)
+    start = damping_homotopy(problem, zero, free, lowest_frequency(prepared))
+    return minimize(problem, start, free, gain, iterations, products, on_iterate), trace
+
+
+class _Enough(Exception):
+    """The quasi-Newton method has come as far, or taken as long, as it should."""
+
+
+def _lbfgs(problem: RetargetProblem, most: int, enough: float) -> tuple[Array, list[tuple[float, float]]]:
+    """The best unknowns, and the time [s] and objective of each evaluation.
+
+    Args:
+        most: Evaluations.
+        enough: Objective that ends it.
+    """
+    best = np.zeros(problem.size)
+    trace: list[tuple[float, float]] = []
+    initial = problem.value(best)
+    begin = time.perf_counter()
+
+    def both(y: Array) -> tuple[float, Array]:
+        x = UNIT * y
+        value = problem.value(x)
+        gradient = problem.linearize() if np.isfinite(value) else np.zeros_like(x)
+        if not trace or value < min(item[1] for item in trace):
+            best[:] = x
+        trace.append((time.perf_counter() - begin, value))
+        if len(trace) >= most or value <= enough:
+            raise _Enough
+        return min(value, FAILED * initial) / initial, UNIT * gradient / initial
+
+    options = {"maxiter": most, "maxcor": 20, "ftol": 0.0, "gtol": 0.0}
+    with suppress(_Enough):
+        quasi_newton(both, np.zeros(problem.size), jac=True, method="L-BFGS-B", options=options)
+    return best, trace
+
+
+def costs(name: str, shot: CompiledShot) -> list[Cost]:
     """Gradient and product for 10 to 2000 unknowns: knots closer and closer, on the same simulation."""
-    prepared = prepare(shot.compiled, RunSettings())
+    prepared = prepare(shot, RunSettings())
     end, motors = float(prepared.grid.frame_times[-1]), len(shot.character.motors)
     rows: list[Cost] = []
     # every instant may carry a knot here, so that there can be more unknowns than frames times motors
@@ -187,52 +206,46 @@ def costs(shot: BenchShot) -> list[Cost]:
         forward = median_time(partial(problem.value, zero))
         gradient = median_time(problem.linearize)
         product = median_time(partial(problem.product, np.random.default_rng(0).normal(size=problem.size)))
-        rows.append(Cost(shot.name, problem.size, forward, gradient / forward, product / forward))
+        rows.append(Cost(name, problem.size, forward, gradient / forward, product / forward))
     return rows
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = shots_parser("optimizer", __doc__)
+    parser = bench_parser("optimizer", __doc__)
+    shots_argument(parser, SAMPLES[:1])
+    output_options(parser)
     parser.add_argument("--lbfgs", type=int, default=400, help="most evaluations of L-BFGS")
     options = parser.parse_args(arguments)
     converged: list[Convergence] = []
     timed: list[Cost] = []
-    for name in options.shots:
-        shot = load(name)
-        timed += costs(shot)
-        converged += compare(shot, options.lbfgs)
+    for path in options.shots:
+        name, shot = Path(path).stem, load(path)
+        own_costs, own = costs(name, shot), compare(name, shot, options.lbfgs)
+        timed += own_costs
+        converged += own
         if not options.json:
-            print_tables(converged[-3:], timed[-4:], shot.name)
+            print_tables(own, own_costs)
     if options.json:
         print(json.dumps({"convergence": [asdict(r) for r in converged], "costs": [asdict(r) for r in timed]}))
     return 0
 
 
-def print_tables(converged: list[Convergence], timed: list[Cost], name: str) -> None:
+def print_tables(converged: list[Convergence], timed: list[Cost]) -> None:
     """The tables of one shot for a person."""
-    from calmotion.cli.tables import console_on, print_table
-
-    console = console_on(sys.stdout)
     rows = [
         [
             row.method, f"{row.largest_before_mm:.1f} -> {row.largest_after_mm:.2f} mm",
             f"{row.objective / row.converged:.4g}", str(row.evaluations), str(row.products),
             "-" if row.simulations is None else f"{row.simulations:.1f}",
         ]
-        for row in converged if row.shot == name
+        for row in converged
     ]  # fmt: skip
     heads = ["method", "largest error", "objective / converged", "simulations", "products", "cost to 1% [simulations]"]
-    print_table(console, f"{name}: convergence", heads, rows)
-    if not timed:
-        return
-    rows = [
-        [str(row.unknowns), f"{row.forward_s:.3f} s", f"{row.gradient:.2f}", f"{row.product:.2f}"]
-        for row in timed
-        if row.shot == name
-    ]
+    show(f"{converged[0].shot}: convergence", heads, rows)
+    rows = [[str(row.unknowns), f"{row.forward_s:.3f} s", f"{row.gradient:.2f}", f"{row.product:.2f}"] for row in timed]
     heads = ["unknowns", "simulation", "gradient / simulation", "product / simulation"]
-    print_table(console, f"{name}: cost", heads, rows, texts=0)
+    show(f"{converged[0].shot}: cost", heads, rows, texts=0)
 
 
 if __name__ == "__main__":

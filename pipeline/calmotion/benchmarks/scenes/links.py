@@ -102,6 +102,11 @@ def links_of_all(sources: Iterable[str], say: Callable[[str], None]) -> Iterator
         yield from ((source, link) for link in links)
 
 
+def file_of(source: str) -> str:
+    """The file of FILE or FILE:PRIM."""
+    return _split(source)[0]
+
+
 def _split(source: str) -> tuple[str, str]:
     """File and prim; a drive letter is no prim."""
     file, colon, prim = source.rpartition(":")

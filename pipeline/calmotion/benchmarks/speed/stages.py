@@ -3,12 +3,10 @@
 Each shot is optimised as by `calmotion optimize`, with the caches as they are. Times are processor times of this
 process and those that it started, as other work on the machine changes them least; compiling is counted by itself.
 `single simulations` is the time of the search over that of one simulation by the same step.
-A second table tells what `calmotion watch` takes after one key was moved, over the first run, see `watching.edits`.
 """
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
 from collections import defaultdict
@@ -19,18 +17,17 @@ from pathlib import Path
 from typing import Any
 
 from calmotion.accuracy.step_error import simulate_at
+from calmotion.benchmarks.common.parsers import bench_parser, shots_argument
+from calmotion.benchmarks.common.shots import SAMPLES, load
 from calmotion.benchmarks.common.tables import markdown
 from calmotion.benchmarks.common.timing import processor_time
-from calmotion.benchmarks.watching import edits
 from calmotion.errors import ShotError
-from calmotion.host import OperatorResult, open_host
-from calmotion.shot.run import OutputPaths, RunSettings, Source
-from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.host import OperatorResult
+from calmotion.shot.run import OutputPaths, RunSettings
 from calmotion.workflow.commands import optimize
 
 import_module("calmotion.support")  # sets options of numba that it reads once
 event: Any = import_module("numba.core.event")
-SHOTS = [f"samples/{name}/{name}.usda" for name in ("bartender", "dancer", "rapper", "drummer", "boxer")]
 STAGES = ("read", "analyse", "mesh", "reduce", "search", "write", "compile")
 _TIMES = 3
 # what is named nowhere here is `other`
@@ -95,12 +92,7 @@ def measure(path: str) -> Stages:
 
 def _single_simulation(path: str, step: float) -> float:
     """Processor time of a simulation of a shot as it is searched, the least of three [s]."""
-    run = open_host([]).run([Source(path=path, command="optimize")], [CompiledShot])
-    for result in run:
-        if result.error is not None:
-            raise result.error
-    shot, times = run.get(CompiledShot), []
-    assert shot is not None
+    shot, times = load(path, rigid=True), []
     for _ in range(1 + _TIMES):  # the first one may compile
         begin = time.process_time()
         simulate_at(shot, RunSettings(), step)
@@ -138,18 +130,13 @@ def table(runs: Sequence[Stages]) -> str:
     return markdown(heads, rows, "---:")
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Measure shots and print the table."""
-    parser = argparse.ArgumentParser(prog="calmotion bench speed", description="Where the time of a run goes.")
-    parser.add_argument("shots", nargs="*", default=SHOTS, help="shots that are optimised (default: the samples)")
-    parser.add_argument(
-        "--edit", nargs="*", metavar="SHOT", help="shots that are run again after an edit (default: the first one)"
-    )
-    args = parser.parse_args(argv)
+    parser = bench_parser("speed", __doc__)
+    shots_argument(parser, SAMPLES)
+    options = parser.parse_args(arguments)
     try:
-        print(table([measure(path) for path in args.shots]))
-        for path in args.shots[:1] if args.edit is None else args.edit:
-            print(edits.table([edits.measure_edit(path, command) for command in edits.COMMANDS]))
+        print(table([measure(path) for path in options.shots]))
     except ShotError as error:
         parser.exit(1, f"error: {error}\n")
     return 0

@@ -1,14 +1,14 @@
 """The histogram of estimates counts every shot, those beyond its axis too."""
 
 import numpy as np
-from calmotion.benchmarks.accuracy import estimates_figure
-from calmotion.benchmarks.accuracy.estimates_figure import draw_estimates
+from calmotion.benchmarks.accuracy import figures
+from calmotion.benchmarks.accuracy.figures import draw_estimates
 
 
 def test_every_shot_is_in_the_histogram(monkeypatch, tmp_path):
     drawn = []
     monkeypatch.setattr(
-        estimates_figure, "save", lambda figure, folder, name: drawn.append(figure) or f"{folder}/{name}"
+        figures, "_saved", lambda figure, panel, folder, name: drawn.append(figure) or f"{folder}/{name}"
     )
     path = draw_estimates(str(tmp_path), [1e-4, 0.3, 0.4, 0.9, 1.2, 50.0], [True, True, False, True, True, False])
     assert path == f"{tmp_path}/estimates"

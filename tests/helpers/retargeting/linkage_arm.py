@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
-from scipy.spatial.transform import Rotation
-
 from calmotion.benchmarks.scenes.beam_arm import IDENTITY, LIFTS, beam_mesh
 from calmotion.shot import (
     Animation,
@@ -24,6 +21,8 @@ from calmotion.shot import (
     Track,
 )
 from calmotion.shot.character import WORLD, Array
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation
 
 UPPER, FORE, CRANK = 0.32, 0.28, 0.06  # shoulder to elbow, elbow to hand, shoulder to the rod's pin [m]
 SOFT = 0.0095  # thickness of links that sway at 3 Hz [m]; the usual ones sway at 5

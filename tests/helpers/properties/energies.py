@@ -1,54 +1,19 @@
-"""Audits of a simulation: energy against the work of the motors, momentum against the impulse of forces.
+"""Energy of a simulation and work of its motors.
 
-All quantities follow from inertia integrals, elastic laws and multipliers, none from the equations of a step.
+Both follow from inertia integrals, elastic laws and multipliers, none from the equations of a step.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.kernels import inertia
 from calmotion.multibody.kernels.components import component_of
 from calmotion.multibody.kernels.so3 import matrix_of
 from calmotion.multibody.kernels.work import Work, allocate_work
 from calmotion.multibody.model.system import LINEAR, STVK, State, System
-from calmotion.shot.character import WORLD, Array, IntArray
+from calmotion.shot.character import Array, IntArray
 from calmotion.simulation.forward import ForwardRun
-
-INSTANTS = 200  # at which an audit looks
-
-
-@dataclass(frozen=True)
-class Audit:
-    """Largest errors of a run.
-
-    Attributes:
-        energy: Of energy less work [J], relative to the largest of kinetic energy and the range of the work.
-        gained: The same, for energy that appears; damping and BDF2 only lose some.
-        momentum: Of the linear momentum less the impulse [N s], relative to the largest impulse of the joints alone.
-    """
-
-    energy: float
-    gained: float
-    momentum: float
-
-
-def audit(system: System, run: ForwardRun) -> Audit:
-    """The audit of a run of a system that is not driven by a moving root."""
-    count = len(run.trajectory.states.c)
-    chosen = np.unique(np.linspace(0, count - 1, min(count, INSTANTS)).astype(int))
-    kinetic, total = energy(system, run.trajectory.states, chosen)
-    done = work(system, run)
-    error = total - total[0] - done[chosen]
-    scale = max(float(kinetic.max()), float(np.ptp(done)), np.finfo(float).tiny)
-    momentum = linear_momentum(system, run.trajectory.states, chosen)
-    of_joints, of_gravity = impulses(system, run)
-    size = max(float(np.abs(of_joints).max()), np.finfo(float).tiny)
-    lost = momentum - momentum[0] - (of_joints + of_gravity)[chosen]
-    return Audit(float(np.abs(error).max()) / scale, float(error.max()) / scale, float(np.abs(lost).max()) / size)
 
 
 def energy(system: System, states: State, instants: IntArray | None = None) -> tuple[Array, Array]:
@@ -69,24 +34,6 @@ def energy(system: System, states: State, instants: IntArray | None = None) -> t
                 system.mass[b] * states.c[n, b] + R @ scratch.s
             )
     return kinetic, kinetic + stored
-
-
-def linear_momentum(system: System, states: State, instants: IntArray) -> Array:
-    """Linear momentum of all bodies at some instants [N s], world axes, shape [K, 3]."""
-    momentum, scratch = np.zeros((len(instants), 3)), allocate_work(system)
-    for b in range(len(system.elastic)):
-        for k, n in enumerate(instants):
-            R, D, V = _moving(system, states, b, int(n), scratch)
-            momentum[k] += R @ (D @ V)[:3]
-    return momentum
-
-
-def impulses(system: System, run: ForwardRun) -> tuple[Array, Array]:
-    """Impulses of the joints to the world, and of gravity, since the first instant [N s], shape [T, 3] each."""
-    forces = reactions(system, run.trajectory, run.joint_angles, run.joint_rates).forces
-    grounded = [joint for joint in range(len(system.rows)) if system.side[joint, 0] == WORLD]
-    weight = np.broadcast_to(system.mass.sum() * system.gravity, (len(forces), 3))
-    return _integral(forces[:, grounded].sum(axis=1), run.trajectory.h), _integral(weight, run.trajectory.h)
 
 
 def work(system: System, run: ForwardRun) -> Array:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
 from calmotion.benchmarks.scenes.beam_arm import IDENTITY, LIFTS
 from calmotion.shot import Body, Character, Frame, Joint, MassProperties, Motor, Target
 from calmotion.shot.character import WORLD

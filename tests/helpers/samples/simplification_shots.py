@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
 from calmotion.benchmarks.scenes.beam_arm import IDENTITY, LIFTS, beam_arm, beam_mesh, quintic, shot_of
 from calmotion.shot import (
     Animation,

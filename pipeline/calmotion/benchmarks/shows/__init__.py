@@ -1,1 +1,0 @@
-"""The benchmarks of long performances, batches and repertoires."""

@@ -1,0 +1,66 @@
+"""Reads the robots and characters of a folder as commands do, and tells what became of each."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from calmotion.errors import ShotError, each
+from calmotion.host import open_host
+from calmotion.shot import Character
+from calmotion.shot.outputs import Rig
+from calmotion.shot.run import OutputPaths, Source
+from calmotion.usd import dependencies
+
+LOADS, RIGGED, REFUSED = "loads", "loads as a robot", "refused"
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A file, what became of it, its number of motors, and why it was refused."""
+
+    file: str
+    outcome: str
+    motors: int = 0
+    reason: str = ""
+
+
+def shots_in(folder: Path) -> list[Path]:
+    """The USD files of a folder but for those that one beside or above them opens."""
+    files = sorted(path for path in folder.rglob("*") if path.suffix in (".usd", ".usda", ".usdc", ".usdz"))
+    parts: set[Path] = set()
+    for path in files:
+        named = (Path(name).resolve() for name in dependencies.files_named_by(str(path)))
+        parts |= {file for file in named if file.is_relative_to(path.resolve().parent)}
+    return [path for path in files if path.resolve() not in parts]
+
+
+def tried(folder: Path) -> Iterator[Tried]:
+    """Every shot of a folder, a skinned character without physics after `calmotion rig`."""
+    host = open_host([])
+
+    def carried_out(given, wanted):
+        run = host.run(given, [wanted]).finish()
+        for failure in run.failures():
+            raise failure.error or ShotError(failure.reason)
+        return run.data[wanted]
+
+    def read(path):
+        return carried_out([Source(path=str(path), command="inspect")], Character)
+
+    for path in shots_in(folder):
+        name = path.relative_to(folder).as_posix()
+        try:
+            try:
+                yield Tried(name, LOADS, len(read(path).motors))
+            except ShotError as error:
+                if "calmotion rig" not in error.remedy:
+                    raise
+                with tempfile.TemporaryDirectory() as made:
+                    layer = Path(made) / "rig.usda"
+                    carried_out([Source(path=str(path), command="rig"), OutputPaths(layer=str(layer))], Rig)
+                    yield Tried(name, RIGGED, len(read(layer).motors))
+        except ShotError as error:
+            yield Tried(name, REFUSED, reason="; ".join(one.message() for one in each(error)))
