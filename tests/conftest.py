@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import os
 import subprocess
@@ -14,8 +13,6 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
-from calmotion.support.caching.signing import FILE_NAME, signing_key
-from calmotion.support.files import new_file
 
 pytest_plugins = ["arm_fixtures", "finite_element_fixtures", "flexible_tree_fixture", "recorded"]
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -104,21 +101,10 @@ def toml(value: object) -> str:
     return "[" + ", ".join(toml(item) for item in value) + "]" if isinstance(value, list) else repr(value)
 
 
-def _keep_key(choices):
-    """Sign with the user's key in tests: with another one, tests and commands would remove each other's kernels."""
-    key = signing_key()
-    with contextlib.suppress(OSError):
-        choices.mkdir(parents=True, exist_ok=True)
-        with new_file(choices / FILE_NAME) as file:  # only this user can read it
-            file.write_bytes(key)
-            os.replace(file, choices / FILE_NAME)
-
-
 def pytest_configure(config):
     """Tests that take longer than the rest are marked `long`, and run with `pytest -m long`; what the user of this
     machine has disabled plays no part."""
     choices = Path(tempfile.gettempdir()) / "no-calmotion-config-here"
-    _keep_key(choices)
     os.environ["CALMOTION_CONFIG"] = str(choices)
     config.addinivalue_line("markers", "long: takes half a minute or more; run with -m long")
 

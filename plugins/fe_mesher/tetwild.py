@@ -121,7 +121,7 @@ def tetrahedralize(
                 break
         assert mesh is not None
         if use_cache and not flat_tets(*mesh).any():
-            mesh = cache.store(key, {"points": mesh[0], "tets": mesh[1]}, lambda kept: not flat_tets(*kept).any())
+            cache.store(key, {"points": mesh[0], "tets": mesh[1]})
     return mesh[0], mesh[1]
 
 
@@ -145,7 +145,9 @@ def _refuse_hopeless(key: str, size: str, path: str, time: ProcessorTime) -> Non
 
 def _keep_hopeless(key: str, taken: float) -> None:
     """Store that a mesh takes longer than a time [s]."""
-    cache.store(key, {"seconds": np.array(taken)}, lambda kept: float(kept[0]) >= taken)
+    kept = cache.load(key, ("seconds",))
+    if kept is None or kept[0].shape != () or float(kept[0]) < taken:
+        cache.store(key, {"seconds": np.array(taken)})
 
 
 def _out_of_time(size: str, path: str, time: ProcessorTime) -> OutOfTime:

@@ -15,8 +15,6 @@ from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, Red
 from calmotion.shot import ElasticMaterial, FlexibleSettings, Simplification
 from calmotion.support.caching.cache_folder import CACHES, REDUCTIONS
 
-SIGNATURE = 32 + 12  # bytes of the signature and of the mark that end a file
-
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
@@ -141,15 +139,12 @@ def test_a_file_with_a_changed_byte_is_computed_again_with_a_notice(folder, capl
     cached_reduction("flipped", lambda: body)
     (path,) = folder.glob("*.npz")
     whole = path.read_bytes()
-    places = range(0, len(whole) - SIGNATURE, 97)
+    places = range(0, len(whole), 97)
     calls = []
     for at in places:
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 0x55]) + whole[at + 1 :])
         assert same(cached_reduction("flipped", lambda: calls.append(1) or body), body)
     assert len(calls) == len(places) == len(caplog.messages)
-    path.write_bytes(whole[:-SIGNATURE] + bytes([whole[-SIGNATURE] ^ 0x55]) + whole[1 - SIGNATURE :])
-    assert same(cached_reduction("flipped", lambda: calls.append(1) or body), body)
-    assert len(calls) == len(places) + 1  # of another user, as far as anybody can tell: made again without a word
     assert str(path) in caplog.messages[0] and "made again" in caplog.messages[0]
 
 

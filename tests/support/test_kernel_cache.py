@@ -69,13 +69,11 @@ def test_any_damage_to_any_file_is_seen(make, tmp_path, caplog, name):
     whole = (tmp_path / name).read_bytes()
     damaged = [b"", whole[:10], whole + b"x", b"x" * len(whole)]
     damaged += [whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :] for at in range(0, len(whole), 7)]
-    signature = slice(-32 - len(b"calmotion-2\n"), -len(b"calmotion-2\n"))
     for content in damaged:
         (tmp_path / name).write_bytes(content)
         caplog.clear()
         assert make().load("key") is None
-        by_another = len(content) == len(whole) and content[signature] != whole[signature] and content[:9] == whole[:9]
-        assert len(caplog.messages) == (0 if by_another else 1), "a file of another key is no damage"
+        assert len(caplog.messages) == 1
         make().save("key", list(range(100)))
         assert make().load("key") == list(range(100))
 
@@ -116,7 +114,9 @@ def test_a_kernel_in_the_place_of_another_one_is_compiled_again(tmp_path, run):
     assert run() == (0, "4.0\n") and run() == (1, "4.0\n")
     doubled, tripled = sorted((tmp_path / "cache").rglob("*.nbc"))
     doubled.write_bytes(tripled.read_bytes())
-    assert run() == (0, "4.0\n") and run() == (1, "4.0\n")
+    hits, said = run()
+    assert hits == 0 and str(doubled) in said and said.endswith("4.0\n")
+    assert run() == (1, "4.0\n")
 
 
 def test_a_link_to_itself_in_the_place_of_a_file_stops_nobody(run, tmp_path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import errno
 import hashlib
 import os
@@ -18,27 +17,22 @@ from functools import cache
 from pathlib import Path
 
 PREFIX = ".calmotion-"  # of the names of temporary files
-_LINKS = 40  # that the system follows
-_HERE, _EXCHANGE = -100, 2  # AT_FDCWD of fcntl.h, RENAME_EXCHANGE of stdio.h
-_SYSTEM = ("/proc", "/sys")  # what lies there is the system's, as are the links to it and the devices of /dev
+_SYSTEM = ("proc", "sys")  # folders of the root whose files are the system's, as are those in /dev itself
 _ABANDONED = 3600.0  # a temporary file of another machine of that age [s] was left by a process that was killed
 _NAME = re.compile(re.escape(PREFIX) + r"([0-9a-f]{8})-(\d+)-")
 
 
 @contextlib.contextmanager
-def replaced(path: str | Path, keep_existing: bool = False, flush: bool = True) -> Iterator[Path]:
+def replaced(path: str | Path) -> Iterator[Path]:
     """A temporary file that replaces `path` when the block ends without an exception.
 
     The file is created exclusively, under a random name that starts with `PREFIX`, machine and process and has the
     suffix of `path`, in the folder of `path`, and no symbolic link is followed. What killed processes left there is
-    removed. Its content is flushed to the disk before it is renamed. An
-    exception in the block removes it. Missing folders above `path` are created. The new file has the permissions of
-    the file that it replaces, or of any new file.
+    removed. Its content is flushed to the disk before it is renamed. An exception in the block removes it. Missing
+    folders above `path` are created. The new file has the permissions of the file that it replaces, or of any new file.
 
     Args:
         path: The file to replace; a symbolic link to a file is replaced itself.
-        keep_existing: Keep a file that is already at `path`, and drop the new one.
-        flush: Whether the file must survive a power cut; not for a cache whose files are verified when they are read.
 
     Yields:
         The path of the temporary file, which is empty.
@@ -47,22 +41,16 @@ def replaced(path: str | Path, keep_existing: bool = False, flush: bool = True) 
         OSError: The file cannot be written, or is no file; what was at `path` is still there.
     """
     target = Path(path)
-    refuse_special(target)
-    _refuse_system(target)
+    _refuse_devices(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     remove_abandoned(target.parent)
     with new_file(target) as temporary:
         yield temporary
-        if flush:
-            _flush(temporary)
+        _flush(temporary)
         _permit(temporary, target)
-        if keep_existing:
-            _move_unless_present(temporary, target)
-        else:
-            os.replace(temporary, target)
-    if flush:
-        with contextlib.suppress(OSError):  # the file is in its place; some file systems cannot flush a folder
-            _flush(target.parent)
+        os.replace(temporary, target)
+    with contextlib.suppress(OSError):  # the file is in its place; some file systems cannot flush a folder
+        _flush(target.parent)
 
 
 @contextlib.contextmanager
@@ -101,17 +89,15 @@ def temporary_folder(parent: Path | None = None) -> Iterator[Path]:
 
 
 def system_temporary() -> Path:
-    """The system's folder for temporary files: the first of those that `tempfile` tries which takes a file.
+    """The system's folder for temporary files.
 
-    `tempfile` tries them by files without a name of ours, one of which stays where the process is ended meanwhile.
+    `tempfile` looks for it by writing files without a name of ours, one of which stays where the process is killed.
     """
     if tempfile.tempdir is None:
         # where everybody may write: names are random
         for name in filter(None, (*map(os.environ.get, ("TMPDIR", "TEMP", "TMP")), "/tmp")):  # nosec B108
-            folder = Path(name).absolute()
-            with contextlib.suppress(OSError), new_file(folder / "tried") as tried:
-                tried.write_bytes(b"x")
-                tempfile.tempdir = str(folder)
+            if os.path.isdir(name) and os.access(name, os.W_OK | os.X_OK):
+                tempfile.tempdir = os.path.abspath(name)
                 break
     return Path(tempfile.gettempdir())
 
@@ -124,27 +110,6 @@ def write_text(path: str | Path, text: str) -> None:
     """
     with replaced(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="")
-
-
-def exchange(one: str | Path, other: str | Path) -> bool:
-    """Exchange the names of two folders or files of one file system, at once: no kill can come between.
-
-    Returns:
-        False where the system or the file system cannot do that; nothing is changed then.
-
-    Raises:
-        OSError: One of them is missing, or may not be moved.
-    """
-    try:
-        rename = ctypes.CDLL(None, use_errno=True).renameat2
-    except (AttributeError, OSError, TypeError):  # no Linux
-        return False
-    if rename(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE) == 0:
-        return True
-    number = ctypes.get_errno()
-    if number in (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP):
-        return False
-    raise OSError(number, os.strerror(number), str(one))
 
 
 def try_writing(path: str | Path) -> None:
@@ -161,8 +126,7 @@ def try_writing(path: str | Path) -> None:
     if len(target.parts) > 1 and target.parts[0].startswith("~") and not os.path.isdir(target.parts[0]):
         reason = f"This would be a folder named {target.parts[0]}, not the home folder; write the whole path"
         raise OSError(errno.EINVAL, reason, str(path))
-    refuse_special(target)
-    _refuse_system(target)
+    _refuse_devices(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=target.parent, prefix=PREFIX):
         pass
@@ -188,21 +152,24 @@ def refuse_special(path: str | os.PathLike[str]) -> None:
         raise OSError(errno.EINVAL, "Not a file but a named pipe, a socket or a device", str(path))
 
 
-def _refuse_system(target: Path) -> None:
-    """Refuse to replace what the system has made: `/dev/stdout` is a link, to a file where the output goes to one, and
-    a link that is replaced is gone for all programs.
+def is_own(status: os.stat_result) -> bool:
+    """Whether what has this status is of this user, or of the system, and no other user can write it."""
+    if not hasattr(os, "geteuid"):
+        return True
+    return status.st_uid in (0, os.geteuid()) and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def _refuse_devices(target: Path) -> None:
+    """Refuse to replace what is no file, or is the system's: `/dev/stdout` is a link, to a file where the output goes
+    to one, and would be gone for all programs.
 
     Raises:
-        OSError: It lies in /dev, or a link of it leads to /proc or /sys.
+        OSError: It is a named pipe, a socket or a device, or lies in /dev, /proc or /sys.
     """
-    place, seen = target.absolute(), 0
-    while seen < _LINKS:
-        folder = Path(os.path.realpath(place.parent))
-        if str(folder) == "/dev" or any(folder == Path(top) or Path(top) in folder.parents for top in _SYSTEM):
-            raise OSError(errno.EINVAL, "This is a file of the system, which is never replaced", str(target))
-        if not place.is_symlink():
-            return
-        place, seen = folder / os.readlink(place), seen + 1
+    refuse_special(target)
+    folder = os.path.realpath(target.parent)
+    if folder == "/dev" or folder.split("/")[1:2] in ([top] for top in _SYSTEM):
+        raise OSError(errno.EINVAL, "This is a file of the system, which is never replaced", str(target))
 
 
 def remove_abandoned(folder: Path) -> None:
@@ -246,12 +213,13 @@ def _own_prefix() -> str:
 
 
 def _is_abandoned(path: Path) -> bool:
-    if hasattr(os, "getuid") and path.lstat().st_uid != os.getuid():  # in a folder that several users share
+    state = path.lstat()
+    if hasattr(os, "getuid") and state.st_uid != os.getuid():  # in a folder that several users share
         return False
     name = _NAME.match(path.name)
     if name is not None and name[1] == _machine():
         return not _runs(int(name[2]))
-    return time.time() - path.lstat().st_mtime > _ABANDONED
+    return time.time() - state.st_mtime > _ABANDONED
 
 
 @cache
@@ -273,18 +241,8 @@ def _runs(process: int) -> bool:
     except ProcessLookupError:
         return False
     except (OSError, OverflowError):
-        return True
+        pass
     return True
-
-
-def _move_unless_present(temporary: Path, target: Path) -> None:
-    try:
-        os.link(temporary, target)
-    except FileExistsError:
-        return
-    except OSError:  # a file system without hard links
-        if not os.path.lexists(target):
-            os.replace(temporary, target)
 
 
 def _flush(path: Path) -> None:

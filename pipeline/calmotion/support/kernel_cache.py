@@ -2,13 +2,12 @@
 
 numba believes what lies in its cache: a file that a power cut has emptied or changed ends every later run with an error
 inside numba or LLVM, or in wrong machine code. Here such a file is removed with a notice, and its function compiled
-again. Files are signed with the key of the user and their names, so that those of others are never unpickled, and
-machine code is never taken for that of another function.
+again. A file that another user can write is never unpickled, and machine code is never taken for that of another
+function.
 """
 
 from __future__ import annotations
 
-import contextlib
 import pickle
 from itertools import count, filterfalse
 from pathlib import Path
@@ -18,10 +17,8 @@ from numba.core.caching import IndexDataCacheFile
 from numba.core.serialize import dumps
 
 from calmotion.support.caching.bundled_kernels import FOLDER, BundledKernels, name_of
-from calmotion.support.caching.caches import discard
-from calmotion.support.caching.signing import signing_key
-from calmotion.support.caching.verified_files import DamagedFileError, ForeignFileError, read_verified, sealed
-from calmotion.support.files import locked, replaced
+from calmotion.support.caching.caches import store, stored
+from calmotion.support.files import locked
 from calmotion.support.kernel_compiler import is_called_by_kernel
 
 _FOR_KERNELS = "without an entrance for Python"
@@ -66,7 +63,7 @@ class VerifiedCacheFile(IndexDataCacheFile):  # type: ignore[misc]
         content = _content(Path(self._index_path))
         if content is None:
             return {}
-        version, stamp, overloads = pickle.loads(content)  # nosec B301  # signed
+        version, stamp, overloads = pickle.loads(content)  # nosec B301  # written by this user
         return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
 
     def _save_index(self, overloads: dict[Any, str]) -> None:
@@ -76,7 +73,7 @@ class VerifiedCacheFile(IndexDataCacheFile):  # type: ignore[misc]
         content = _content(Path(self._data_path(name)))
         if content is None:
             raise FileNotFoundError(name)  # numba then compiles the function
-        return pickle.loads(content)  # nosec B301  # signed
+        return pickle.loads(content)  # nosec B301  # written by this user
 
 
 def verified(dispatcher: Any) -> Any:
@@ -92,20 +89,9 @@ def verified(dispatcher: Any) -> Any:
 
 
 def _content(path: Path) -> bytes | None:
-    try:
-        return read_verified(path, signing_key(), name_of(path))
-    except ForeignFileError:  # it is compiled and written again
-        pass
-    except DamagedFileError:
-        discard(path)
-    except OSError:  # there is none, or it cannot be read
-        pass
-    return None
+    return stored(path, name_of(path))
 
 
 def _write(path: Path, value: Any) -> bool:
-    """Write a file; whether it is written. After a full disk, or in a folder of others, it is compiled again."""
-    with contextlib.suppress(OSError), replaced(path, flush=False) as temporary:
-        temporary.write_bytes(sealed(dumps(value), signing_key(), name_of(path)))
-        return True
-    return False
+    """Write a file; whether it is written."""
+    return store(path, dumps(value), name_of(path))

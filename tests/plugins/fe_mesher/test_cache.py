@@ -20,18 +20,6 @@ def test_a_mesh_is_made_once_and_then_read_from_the_cache(host, package, own_cac
     assert [path.suffix for path in own_cache.iterdir()] == [".npz"]
 
 
-def test_two_processes_that_make_the_same_mesh_use_the_first_one(package, own_cache):
-    cache = package("cache")
-    first, second = np.zeros((4, 3)), np.ones((4, 3))
-    tets = np.arange(4)[None]
-    assert np.array_equal(cache.store("key", {"points": first, "tets": tets})[0], first)
-    assert np.array_equal(cache.store("key", {"points": second, "tets": tets})[0], first)
-    next(own_cache.iterdir()).write_bytes(b"torn")
-    assert np.array_equal(cache.store("key", {"points": second, "tets": tets})[0], second)
-    assert np.array_equal(cache.load("key")[0], second)
-    assert [path.name for path in own_cache.iterdir()] == ["key.npz"]
-
-
 def test_the_key_of_a_mesh_contains_everything_that_determines_it(package):
     key = package("cache").cache_key
     points, triangles = np.eye(3), np.array([[0, 1, 2]])

@@ -4,7 +4,6 @@ import numba
 import pytest
 from calmotion.support.caching import bundled_kernels
 from calmotion.support.caching.bundled_kernels import BundledKernels, export, name_of, runs_on
-from calmotion.support.caching.signing import signing_key
 from calmotion.support.caching.verified_files import read_verified, sealed
 from calmotion.support.kernel_cache import _FOR_KERNELS, VerifiedCacheFile
 from calmotion.support.kernel_compiler import called_by_kernel
@@ -34,7 +33,7 @@ def bundle(tmp_path):
     index = {(key, BASELINE, hashes): "name.1.nbc", (((key, BASELINE, hashes)), _FOR_KERNELS): "name.2.nbc"}
     contents = {"name.nbi": (numba.__version__, "stamp", index), "name.1.nbc": "with", "name.2.nbc": "without"}
     for name, content in contents.items():
-        (tmp_path / name).write_bytes(sealed(dumps(content), name=name_of(tmp_path / name)))
+        (tmp_path / name).write_bytes(sealed(dumps(content), name_of(tmp_path / name)))
     return BundledKernels(tmp_path, "name"), lambda processor: (key, processor, hashes)
 
 
@@ -77,7 +76,7 @@ def test_exported_kernels_do_not_depend_on_the_folder_of_the_package_or_the_user
     cached = tmp_path / "key" / _CacheLocator.get_suitable_cache_subpath(str(package / "room" / "module.py"))
     cached.mkdir(parents=True)
     path = cached / "name.1.nbc"
-    path.write_bytes(sealed(b"code", signing_key(), name_of(path)))
+    path.write_bytes(sealed(b"code", name_of(path)))
     assert export(tmp_path / "key", tmp_path / "kernels") == 1
     exported = tmp_path / "kernels" / "key" / "calmotion.room" / "name.1.nbc"
-    assert read_verified(exported, name="key/calmotion.room/name.1.nbc") == b"code"
+    assert read_verified(exported, "key/calmotion.room/name.1.nbc") == b"code"

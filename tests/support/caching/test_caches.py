@@ -1,12 +1,15 @@
 """Caches of the user: verified, limited, cleared."""
 
 import os
+import pickle
 
 import numpy as np
 import pytest
 from calmotion.support.caching import caches
-from calmotion.support.caching.cache_folder import CACHES, FORMER, KERNELS, MESHES, REDUCTIONS, cache_folder
+from calmotion.support.caching.bundled_kernels import name_of
+from calmotion.support.caching.cache_folder import CACHES, KERNELS, MESHES, REDUCTIONS, cache_folder
 from calmotion.support.caching.caches import clear, entries, prune, store_arrays, stored_arrays
+from calmotion.support.caching.verified_files import sealed
 from calmotion.support.files import PREFIX, _machine
 
 
@@ -57,14 +60,6 @@ def test_a_folder_in_place_of_a_file_is_replaced(folder, caplog):
     assert stored_arrays(MESHES, "key") is not None and len(caplog.messages) == 1
 
 
-def test_an_existing_entry_is_kept_when_wanted(folder):
-    store_arrays(MESHES, "key", {"a": np.zeros(1)})
-    store_arrays(MESHES, "key", {"a": np.ones(1)}, keep_existing=True)
-    assert stored_arrays(MESHES, "key")["a"] == 0.0
-    store_arrays(MESHES, "key", {"a": np.ones(1)})
-    assert stored_arrays(MESHES, "key")["a"] == 1.0
-
-
 def test_the_least_recently_used_go_first_and_folders_count_as_one(folder):
     for number in range(4):
         one = folder / KERNELS / f"version{number}"
@@ -106,30 +101,43 @@ def test_a_cache_that_does_not_exist_is_empty():
         assert entries(cache) == prune(cache) == clear(cache) == []
 
 
-@pytest.mark.parametrize("remove", [prune, clear])
-@pytest.mark.parametrize("cache", FORMER)
-def test_folders_of_earlier_versions_go(folder, cache, remove):
-    old = folder / FORMER[cache]
-    (old / "deep").mkdir(parents=True)
-    (old / "one.npz").write_bytes(b"12345")
-    (old / "deep" / "two.npz").write_bytes(b"123")
-    assert sorted(entry.size for entry in remove(cache)) == [3, 5]
-    assert not old.exists() and remove(cache) == []
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners there")
+@pytest.mark.parametrize("foreign", ["writable by a group", "writable by all", "of another user"])
+def test_what_another_user_can_write_is_not_read_and_made_again_without_a_word(folder, caplog, monkeypatch, foreign):
+    store_arrays(MESHES, "key", {"a": np.zeros(1)})
+    path = folder / MESHES / "key.npz"
+    with monkeypatch.context() as patch:
+        if foreign == "of another user":
+            status = os.stat_result([*path.stat()[:4], os.geteuid() + 1, *path.stat()[5:]])
+            patch.setattr(os, "fstat", lambda descriptor: status)
+        else:
+            path.chmod(0o664 if foreign == "writable by a group" else 0o646)
+        assert stored_arrays(MESHES, "key") is None and path.exists() and not caplog.messages
+    store_arrays(MESHES, "key", {"a": np.ones(1)})
+    assert stored_arrays(MESHES, "key")["a"] == 1.0
 
 
-@pytest.mark.parametrize("cache", FORMER)
-def test_storing_removes_the_folder_of_an_earlier_version(folder, cache):
-    (folder / FORMER[cache]).mkdir()
-    store_arrays(cache, "key", {"a": np.zeros(1)})
-    assert sorted(path.name for path in folder.iterdir()) == [cache]
+@pytest.mark.skipif(os.name != "posix", reason="there is no umask")
+def test_files_are_read_whatever_the_umask_is(folder):
+    for mask in (0o002, 0o000, 0o077):
+        former = os.umask(mask)
+        try:
+            store_arrays(MESHES, f"{mask}", {"a": np.zeros(1)})
+        finally:
+            os.umask(former)
+        assert stored_arrays(MESHES, f"{mask}") is not None
 
 
-def test_a_link_in_place_of_a_former_folder_is_not_followed(folder, tmp_path_factory):
-    other = tmp_path_factory.mktemp("other")
-    (other / "mine.npz").write_bytes(b"1")
-    (folder / FORMER[MESHES]).symlink_to(other, target_is_directory=True)
-    prune(MESHES)
-    assert (other / "mine.npz").exists()
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners there")
+def test_a_kernel_that_another_user_can_write_is_never_unpickled(tmp_path):
+    from calmotion.support.kernel_cache import _content
+
+    path = tmp_path / "kernel.nbi"
+    path.write_bytes(sealed(pickle.dumps("of an attacker"), name_of(path)))
+    path.chmod(0o666)
+    assert _content(path) is None and path.exists(), "it is replaced when the kernel is compiled"
+    path.chmod(0o644)
+    assert _content(path) is not None
 
 
 def test_what_a_killed_process_left_is_removed_by_one_that_only_reads(folder):

@@ -136,3 +136,24 @@ def test_imports_that_begin_at_once_make_one_environment(tmp_path, monkeypatch):
     with ThreadPoolExecutor(3) as pool:
         found = list(pool.map(lambda _: converter_python(None, lambda text: None), range(3)))
     assert made == [folder] and len(set(found)) == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners there")
+def test_an_environment_that_another_user_can_write_is_made_anew(tmp_path, monkeypatch):
+    """It would run what that user puts there."""
+    made = []
+
+    def make(place):
+        made.append(place)
+        place.chmod(0o755)
+
+    monkeypatch.delenv(converters.VARIABLE, raising=False)
+    monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path))
+    monkeypatch.setattr(converters, "_make", make)
+    folder = tmp_path / "converters"
+    folder.mkdir()
+    folder.chmod(0o777)
+    (folder / "ready").touch()
+    for _ in range(2):
+        converter_python(None, lambda text: None)
+        assert made == [folder]

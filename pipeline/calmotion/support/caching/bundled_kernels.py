@@ -16,7 +16,6 @@ from typing import Any
 import numba
 from numba.core.caching import _CacheLocator
 
-from calmotion.support.caching.signing import signing_key
 from calmotion.support.caching.verified_files import DamagedFileError, read_verified, sealed
 
 PACKAGE = Path(__file__).parents[2]
@@ -62,7 +61,7 @@ class BundledKernels:
 
 
 def name_of(path: Path) -> str:
-    """The name by which a file of kernels is signed: key of the sources, package and function."""
+    """The name with which a file of kernels is sealed: key of the sources, package and function."""
     return "/".join(path.parts[-3:])
 
 
@@ -88,7 +87,7 @@ def export(source: Path, target: Path) -> int:
         for file in sorted(folder.glob("*.nb?")):
             place = target / source.name / ".".join(("calmotion", *package.relative_to(PACKAGE).parts))
             place.mkdir(parents=True, exist_ok=True)
-            content = read_verified(file, signing_key(), name_of(file))
+            content = read_verified(file, name_of(file), own=True)
             (place / file.name).write_bytes(sealed(content, name=name_of(place / file.name)))
             count += file.suffix == ".nbc"
     return count

@@ -14,8 +14,6 @@ CACHES = {
     MESHES: ("tetrahedral meshes", 10**9),
     REDUCTIONS: ("reduced bodies", 2 * 10**9),
 }
-# Folders of earlier versions, which nothing reads any more; they go when the cache that replaces them is pruned.
-FORMER = {MESHES: "tetrahedra", REDUCTIONS: "reduced"}
 
 CONFIGURATION_VARIABLE = "CALMOTION_CONFIG"
 

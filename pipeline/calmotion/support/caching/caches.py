@@ -1,7 +1,8 @@
 """The user's caches: files that can be made again, verified when they are read, and limited in size.
 
 Each cache is a folder of the user's cache folder. An entry is what is used and removed as one: a file of arrays, or the
-folder of the kernels of one version of the sources. The least recently used entries go first.
+folder of the kernels of one version of the sources. The least recently used entries go first. Only files that no other
+user can write are read, since kernels are unpickled and run.
 """
 
 from __future__ import annotations
@@ -18,12 +19,19 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.support.caching.cache_folder import CACHES, FORMER, cache_folder
-from calmotion.support.caching.signing import signing_key
-from calmotion.support.caching.verified_files import DamagedFileError, ForeignFileError, read_arrays, write_arrays
-from calmotion.support.files import PREFIX, remove_abandoned
+from calmotion.support.caching.cache_folder import CACHES, cache_folder
+from calmotion.support.caching.verified_files import (
+    DamagedFileError,
+    ForeignFileError,
+    packed,
+    read_verified,
+    sealed,
+    unpacked,
+)
+from calmotion.support.files import PREFIX, new_file, remove_abandoned
 
 LOG = logging.getLogger("calmotion")
+_MODE = 0o644  # of files, whatever the umask says: a file that others can write is not read
 
 
 @dataclass(frozen=True)
@@ -41,36 +49,67 @@ class Entry:
     used: int
 
 
+def stored(path: Path, name: str) -> bytes | None:
+    """The content of a file of a cache; None where there is none that may be used.
+
+    A damaged file is removed with a notice. One of another user or of an earlier version is made again without a word.
+
+    Args:
+        name: With which it was stored.
+    """
+    _tidy(path.parent)
+    try:
+        return read_verified(path, name, own=True)
+    except ForeignFileError:
+        pass
+    except DamagedFileError:
+        discard(path)
+    except OSError:  # there is none, or it cannot be read
+        pass
+    return None
+
+
+def store(path: Path, content: bytes, name: str) -> bool:
+    """Replace a file of a cache as a whole; whether that was possible.
+
+    It is verified when it is read, and so not flushed to the disk. After a full disk, or in a folder of others, its
+    content is made again.
+
+    Args:
+        name: What the content is, so that the file is not taken in the place of another one.
+    """
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        remove_abandoned(path.parent)
+        with new_file(path) as temporary:
+            temporary.write_bytes(sealed(content, name))
+            temporary.chmod(_MODE)
+            os.replace(temporary, path)
+        return True
+    return False
+
+
 def stored_arrays(cache: str, key: str) -> dict[str, np.ndarray] | None:
     """The arrays that are stored under a key, by name; None where there are none.
-
-    A damaged file is removed with a notice, one of another key, name or version without.
 
     Args:
         cache: A name in `CACHES`.
         key: Hash of all inputs of the arrays.
     """
     path = _file(cache, key)
-    _tidy(path.parent)
-    arrays = _read(path)
-    if arrays is not None:
-        mark_used(path)
+    content = stored(path, path.name)
+    if content is None:
+        return None
+    try:
+        arrays = unpacked(content)
+    except DamagedFileError:
+        discard(path)
+        return None
+    mark_used(path)
     return arrays
 
 
-def _read(path: Path) -> dict[str, np.ndarray] | None:
-    try:
-        return read_arrays(path, signing_key(), path.name)
-    except ForeignFileError:
-        _remove(path)
-    except DamagedFileError:
-        discard(path)
-    except OSError:
-        pass
-    return None
-
-
-def store_arrays(cache: str, key: str, arrays: Mapping[str, Any], keep_existing: bool = False) -> None:
+def store_arrays(cache: str, key: str, arrays: Mapping[str, Any]) -> None:
     """Store arrays under a key, and remove what exceeds the size of the cache.
 
     Caches are optional: a folder that cannot be written is ignored.
@@ -79,11 +118,9 @@ def store_arrays(cache: str, key: str, arrays: Mapping[str, Any], keep_existing:
         cache: A name in `CACHES`.
         key: Hash of all inputs of the arrays.
         arrays: By name.
-        keep_existing: Keep what another process has stored under the key.
     """
     path = _file(cache, key)
-    with contextlib.suppress(OSError):
-        write_arrays(path, arrays, keep_existing, signing_key(), path.name)
+    if store(path, packed(arrays), path.name):
         prune(cache)
 
 
@@ -105,13 +142,9 @@ def entries(cache: str) -> list[Entry]:
     Args:
         cache: A name in `CACHES`.
     """
-    return _entries_in(cache_folder() / cache)
-
-
-def _entries_in(folder: Path) -> list[Entry]:
     found = []
     with contextlib.suppress(OSError):
-        for path in folder.iterdir():
+        for path in (cache_folder() / cache).iterdir():
             if path.name.startswith(PREFIX):
                 continue
             with contextlib.suppress(OSError):  # another process has removed it
@@ -120,9 +153,7 @@ def _entries_in(folder: Path) -> list[Entry]:
 
 
 def prune(cache: str, limit: int | None = None) -> list[Entry]:
-    """Remove the least recently used entries until the rest keeps a size, and those of earlier versions.
-
-    The newest entry stays.
+    """Remove the least recently used entries until the rest keeps a size; the newest entry stays.
 
     Args:
         cache: A name in `CACHES`.
@@ -132,7 +163,7 @@ def prune(cache: str, limit: int | None = None) -> list[Entry]:
         What was removed.
     """
     limit = CACHES[cache][1] if limit is None else limit
-    total, removed = 0, _remove_former(cache)
+    total, removed = 0, []
     for number, entry in enumerate(entries(cache)):
         total += entry.size
         if number and total > limit and _remove(entry.path):
@@ -142,7 +173,7 @@ def prune(cache: str, limit: int | None = None) -> list[Entry]:
 
 def clear(cache: str) -> list[Entry]:
     """Remove all entries of a cache; what was removed."""
-    return _remove_former(cache) + [entry for entry in entries(cache) if _remove(entry.path)]
+    return [entry for entry in entries(cache) if _remove(entry.path)]
 
 
 @functools.cache
@@ -150,19 +181,6 @@ def _tidy(folder: Path) -> None:
     """Remove what killed processes left in a folder that this one may only read; once in a process."""
     with contextlib.suppress(OSError):
         remove_abandoned(folder)
-
-
-def _remove_former(cache: str) -> list[Entry]:
-    """Remove the folder that an earlier version had for a cache; its entries that are gone."""
-    if cache not in FORMER:
-        return []
-    folder = cache_folder() / FORMER[cache]
-    if folder.is_symlink():  # it leads to what may not be ours
-        return []
-    removed = [entry for entry in _entries_in(folder) if _remove(entry.path)]
-    with contextlib.suppress(OSError):
-        folder.rmdir()
-    return removed
 
 
 def _file(cache: str, key: str) -> Path:

@@ -67,11 +67,11 @@ def converter_python(named: str | None, tell: Callable[[str], None]) -> str:
             )  # fmt: skip
         return str(python)
     folder = environment_folder()
-    if not (folder / _READY).is_file():
+    if not _is_ready(folder):
         tell(f"making an environment for the converters of URDF and MJCF in {folder} (once, about a minute)")
         folder.parent.mkdir(parents=True, exist_ok=True)
         with files.locked(folder.parent):  # the environment is not removed while another import makes it
-            if not (folder / _READY).is_file():
+            if not _is_ready(folder):
                 _make(folder)
     return str(_python_of(folder))
 
@@ -143,6 +143,12 @@ def _make(folder: Path) -> None:
                 remedy=f"Install {' and '.join(PACKAGES)} into an environment of your own; name it with --converters",
             )  # fmt: skip
     (folder / _READY).write_text("\n".join(PACKAGES), encoding="utf-8")
+    folder.chmod(0o755)  # also where the umask lets a group write
+
+
+def _is_ready(folder: Path) -> bool:
+    """Whether an environment is whole, and no other user can have changed what it runs."""
+    return (folder / _READY).is_file() and files.is_own(folder.stat())
 
 
 def _supported_python() -> str | None:

@@ -17,7 +17,7 @@ from calmotion.host import Host, SettingError, has_no_unit, open_host, parse_qua
 from calmotion.rigging.materials import Material, material_named
 from calmotion.shot import Animation, Character, MotorTracks
 from calmotion.shot.run import Source
-from calmotion.support.files import exchange, try_writing
+from calmotion.support.files import try_writing
 from calmotion.usd.importing.robot_layer import FlexibleLinks, RobotOptions, robot_layer
 from calmotion.usd.layers import EXTENSIONS, refuse_input_as_output, write_layer
 from calmotion.usd.reading.shot import read_shot
@@ -243,29 +243,24 @@ class _Import:
             return *convert(description, parts, python), changes
 
     def _move(self, parts: str, draft: str) -> None:
-        former, exchanged = os.path.join(os.path.dirname(draft), "former"), False
+        """Put the converted robot and its layer in their places.
+
+        No system moves a folder over another one: where the program is killed between the first two moves, the folder
+        is missing until the next import.
+        """
+        former = os.path.join(os.path.dirname(draft), "former")
         try:
-            exchanged = self._exchanged(parts)
-            if not exchanged:
-                with suppress(FileNotFoundError):  # the first import, or another one that runs at once has moved it
-                    os.rename(self._folder, former)
-                os.rename(parts, self._folder)
+            with suppress(FileNotFoundError):  # the first import, or another one that runs at once has moved it
+                os.rename(self._folder, former)
+            os.rename(parts, self._folder)
             os.replace(draft, self._layer)
         except OSError as error:
-            if exchanged:
-                exchange(parts, self._folder)
-            elif os.path.isdir(former) and not os.path.isdir(self._folder):
-                os.rename(former, self._folder)
+            for source, target in ((self._folder, parts), (former, self._folder)):
+                with suppress(OSError):  # it was not moved, or another import has made one
+                    os.rename(source, target)
             raise ShotError(
                 "the robot cannot be written", path=self._layer, found=error.strerror, remedy="Choose another output."
             ) from error
-
-    def _exchanged(self, parts: str) -> bool:
-        """Put the converted robot in the place of a former one, so that a kill leaves either of them there."""
-        try:
-            return exchange(parts, self._folder)
-        except FileNotFoundError:  # the first import
-            return False
 
     def _refuse_foreign_folder(self) -> None:
         if os.path.lexists(self._folder) and not os.path.isfile(os.path.join(self._folder, _MARKER)):
