@@ -11,7 +11,7 @@ from calmotion.cli.reports.left_out import print_left_out
 from calmotion.cli.run_report import NOTHING_SHAKES, prim_paths, print_notes
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
-from calmotion.shot.motor import ON_ERROR, ON_JOINT, PRESCRIBED
+from calmotion.shot.motor import DRIVE, ON_ERROR, ON_JOINT, PRESCRIBED, SERVO
 from calmotion.shot.outputs import ERROR, WARNING
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def _print_gains(console: Console, report: dict[str, Any]) -> None:
     if effects:
         ideal = all(motor["model"] == PRESCRIBED for motor in report["motors"])
         lag, rest = (max(effects, key=itemgetter(key)) for key in ("max_error_m", "sag_m"))
-        model = "servo" if any(motor["type"] for motor in report["motors"]) else "drive"
+        model = SERVO if servos else DRIVE
         remedy = f" This shot has ideal motors: set calm:motor:model to {model} to simulate the gains." if ideal else ""
         say(
             console,

@@ -74,7 +74,7 @@ class Motor:
         damping_on: What that multiplies: ON_ERROR: the difference of the command's rate and the joint's (the rotor's,
             of a SERVO), ON_JOINT: the joint's own rate.
         gains_from: Where these were read, also where the model does not use them.
-        rotor: Of a SERVO.
+        rotor: Of a SERVO; of a PRESCRIBED motor the one that it would have as a SERVO.
         delay: Time after which the command acts [s]; not of a PRESCRIBED motor, which does not use it.
         backlash: Play between the motor and the joint, from one end to the other [rad]; it is not simulated.
         kind: Name of the real motor that it is, or empty; its rotor is then known, whatever the model.
@@ -105,6 +105,13 @@ class Motor:
     def prim_path(self) -> str:
         """Path of the joint's prim, without the name of an axis."""
         return self.path.partition(".")[0]
+
+    @property
+    def model_of_gains(self) -> str:
+        """The model that simulates what is known of the motor; its own where it gives, or where no gain is known."""
+        if self.model != PRESCRIBED or not self.position_gain > 0.0:
+            return self.model
+        return SERVO if self.kind or self.rotor != Rotor() else DRIVE
 
 
 class Measure(NamedTuple):

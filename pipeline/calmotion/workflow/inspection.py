@@ -254,7 +254,7 @@ def _motor(motor: Motor, track: Track, character: Character) -> dict[str, Any]:
         "type": motor.kind,
         "delay_s": motor.delay,
         f"backlash_{unit}": motor.backlash,
-        "rotor": _rotor(motor, newtons, unit) if motor.model == SERVO or motor.kind else None,
+        "rotor": _rotor(motor, newtons, unit) if motor.kind or motor.model_of_gains == SERVO else None,
     }
 
 

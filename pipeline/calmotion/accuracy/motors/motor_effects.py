@@ -15,7 +15,7 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, rigid_model, with_drives
 from calmotion.shot import Result
 from calmotion.shot.character import Array, Character, motors_give, with_ideal_motors
-from calmotion.shot.motor import DRIVE, PRESCRIBED, SERVO
+from calmotion.shot.motor import PRESCRIBED
 from calmotion.shot.outputs import MotorEffects
 from calmotion.shot.result import ErrorShares
 from calmotion.shot.run import RunSettings
@@ -28,12 +28,8 @@ from calmotion.simulation.simulate import Progress, intended_motion
 
 
 def with_gains_used(character: Character) -> Character:
-    """The character with every ideal motor that has gains as a drive, or as a servo where its real motor is named."""
-    motors = tuple(
-        replace(m, model=SERVO if m.kind else DRIVE) if m.model == PRESCRIBED and m.position_gain > 0.0 else m
-        for m in character.motors
-    )
-    return replace(character, motors=motors)
+    """The character with every ideal motor that has gains as a drive, or as a servo where its rotor is known."""
+    return replace(character, motors=tuple(replace(m, model=m.model_of_gains) for m in character.motors))
 
 
 def effects_of_gains(shot: CompiledShot, options: RunSettings) -> MotorEffects | None:

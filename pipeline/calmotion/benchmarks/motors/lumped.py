@@ -1,9 +1,10 @@
 """A robot of rigid bodies on position actuators in MuJoCo: another program's model of the same motors.
 
 Its bodies, joints and motors are written as MJCF from a character, so that it shares no equation with Calmotion: a
-tree of bodies with `armature`, `damping` and `position` actuators (`kp`, `kv`). The damping of an actuator is that of
-the joint's own velocity: a motor whose damping acts on the joint is commanded theta_c as it is, another one
-theta_c + kv/kp theta_c'. Coulomb friction is applied smoothed, as the model of the shot has it.
+tree of bodies with `armature`, `damping` and `position` actuators (`kp`, `kv`), which are commanded theta_c as it is.
+The `kv` of such an actuator acts on the joint's own velocity. A motor whose controller is sent velocities has in place
+of it a `velocity` actuator, which is commanded theta_c'. Coulomb friction is applied smoothed, as the model of the shot
+has it.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _KINDS = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}
 
 
 @dataclass(frozen=True, eq=False)
-class LumpedMotion:
+class PlayedMotion:
     """What the robot does in MuJoCo.
 
     Attributes:
@@ -66,14 +67,14 @@ def lumped_mjcf(character: Character, step: float = STEP) -> str:
         waiting = [k for k in waiting if k not in ready]
     actuators = xml.SubElement(root, "actuator")
     for k, motor in enumerate(character.motors):
-        limit = {"forcerange": _text([-motor.max_torque, motor.max_torque]), "forcelimited": "true"}
-        limited = limit if np.isfinite(motor.max_torque) else {}
-        gains = {"kp": repr(float(motor.position_gain)), "kv": repr(float(motor.velocity_gain))}
-        xml.SubElement(actuators, "position", {"joint": f"motor{k}"} | gains | limited)
+        damping = {} if motor.damping_on == ON_ERROR else _damping(motor)
+        xml.SubElement(actuators, "position", {"joint": f"motor{k}", "kp": repr(float(motor.position_gain))} | damping)
+    for k in _sent_velocities(character):
+        xml.SubElement(actuators, "velocity", {"joint": f"motor{k}"} | _damping(character.motors[k]))
     return xml.tostring(root, encoding="unicode")
 
 
-def simulate_lumped(character: Character, times: Array, commands: Array, step: float = STEP) -> LumpedMotion:
+def simulate_lumped(character: Character, times: Array, commands: Array, step: float = STEP) -> PlayedMotion:
     """The robot on commands, from the rest in which its motors hold it at their first ones.
 
     Args:
@@ -84,7 +85,7 @@ def simulate_lumped(character: Character, times: Array, commands: Array, step: f
     Raises:
         ShotError: See `lumped_mjcf`; MuJoCo is not installed.
     """
-    mujoco = _mujoco()
+    mujoco = mujoco_module()
     h = float(times[1] - times[0])
     inner = max(1, int(np.ceil(h / step - 1e-9)))
     model = mujoco.MjModel.from_xml_string(lumped_mjcf(character, h / inner))
@@ -92,17 +93,17 @@ def simulate_lumped(character: Character, times: Array, commands: Array, step: f
     places, dofs = (
         [int(getattr(model.joint(f"motor{k}"), key)[0]) for k in range(len(motors))] for key in ("qposadr", "dofadr")
     )
-    position, velocity = np.array([(m.position_gain, m.velocity_gain) for m in motors]).T
+    position = np.array([m.position_gain for m in motors])
     friction = np.array([m.rotor.friction for m in motors])
     width = np.array([m.rotor.friction_speed for m in motors])
     curve = CubicSpline(times, commands)
     late = np.array([m.delay for m in motors])
-    lead = np.where([m.damping_on == ON_ERROR for m in motors], velocity / position, 0.0)
+    sent = _sent_velocities(character)
 
     def command(t: float) -> Array:
         at = np.clip(t - late, times[0], times[-1])
         rate = np.where(t - late > times[0], np.diag(curve(at, 1)), 0.0)
-        return np.asarray(np.diag(curve(at)) + lead * rate)
+        return np.concatenate([np.diag(curve(at)), rate[sent]])
 
     data.qpos[places] = commands[0]
     for _ in range(_STATIC):
@@ -121,7 +122,16 @@ def simulate_lumped(character: Character, times: Array, commands: Array, step: f
             if friction.any():
                 data.qfrc_applied[dofs] = -friction * np.tanh(data.qvel[dofs] / width)
             mujoco.mj_step(model, data)
-    return LumpedMotion(joints, targets)
+    return PlayedMotion(joints, targets)
+
+
+def _sent_velocities(character: Character) -> list[int]:
+    """The motors whose controllers know the velocity of their command."""
+    return [k for k, motor in enumerate(character.motors) if motor.damping_on == ON_ERROR]
+
+
+def _damping(motor: Motor) -> dict[str, str]:
+    return {"kv": repr(float(motor.velocity_gain))}
 
 
 _STATIC = 200  # iterations of the static start
@@ -144,6 +154,9 @@ def _body(parent: xml.Element, character: Character, number: int, driven: tuple[
         if driven is not None:
             rotor = driven[1].rotor
             more |= {"armature": repr(rotor.armature), "damping": repr(rotor.viscous_friction)}
+            limit = driven[1].max_torque
+            if np.isfinite(limit):
+                more |= {"actuatorfrcrange": _text([-limit, limit]), "actuatorfrclimited": "true"}
         name = f"joint{number}" if driven is None else f"motor{driven[0]}"
         place_of = {"name": name, "type": _KINDS[joint.kind], "pos": _text(joint.frame1.position)}
         xml.SubElement(element, "joint", place_of | more)
@@ -175,7 +188,8 @@ def _unfit(what: str, path: str) -> ShotError:
     )
 
 
-def _mujoco() -> Any:
+def mujoco_module() -> Any:
+    """MuJoCo; raises a ShotError where it is not installed."""
     try:
         import mujoco
     except ImportError as error:

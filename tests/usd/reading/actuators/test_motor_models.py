@@ -2,8 +2,10 @@
 
 import json
 
+import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.shot.motor import Rotor
 from calmotion.usd.reading import read_shot
 from pxr import Sdf, UsdPhysics, Vt
 from small_shots import ELBOW, SHOULDER, Scale, set_float, write_arm
@@ -123,6 +125,50 @@ def own_gains(stage, authored=""):
 )
 def test_velocity_gain_multiplies_what_its_source_says_unless_authored(tmp_path, edit, expected):
     assert read(tmp_path, edit)[1].damping_on == expected
+
+
+def with_a_rotor(stage, name="prescribed"):
+    actuator(stage)
+    model(stage, name)
+    for attribute, value in (("mjc:armature", 0.1), ("mjc:damping", 2.0), ("mjc:frictionloss", 0.5)):
+        set_float(stage, ELBOW, attribute, value)
+
+
+def test_gains_of_a_joint_with_inertia_and_friction_of_its_own_are_those_of_a_servo(tmp_path, calmotion):
+    motor = read(tmp_path, with_a_rotor)[1]
+    assert motor.model == "prescribed" and motor.model_of_gains == "servo"
+    assert (motor.rotor.armature, motor.rotor.viscous_friction, motor.rotor.friction) == pytest.approx((0.1, 2.0, 0.5))
+    told = " ".join(calmotion("inspect", tmp_path / "arm.usda").stdout.split())
+    assert "set calm:motor:model to servo" in told and "0.1 kg m²" in told
+    assert read(tmp_path, actuator)[1].model_of_gains == "drive"
+
+
+def test_a_drive_says_that_it_leaves_inertia_and_friction_out(tmp_path):
+    character = read_shot(str(write_arm(tmp_path / "arm.usda", lambda s: with_a_rotor(s, "drive"))))[0]
+    assert character.motors[1].rotor == Rotor()
+    assert any("without the rotor inertia, friction" in note and ELBOW in note for note in character.notes)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "more", "expected"),
+    [
+        (-4.0, 5.0, {}, 12.0),
+        (-4.0, 5.0, {"to": SHOULDER}, np.inf),
+        (-4.0, 5.0, {"limited": "false"}, np.inf),
+        (0.0, 5.0, {}, np.inf),
+    ],
+    ids=["narrower side", "another joint", "not limited", "one side"],
+)
+def test_the_range_of_forces_of_an_actuator_times_its_gear_limits_the_torque(tmp_path, low, high, more, expected):
+    def edit(stage):
+        actuator(stage, gear=3.0, to=more.get("to", ELBOW))
+        prim = stage.GetPrimAtPath("/Act")
+        for end, value in (("min", low), ("max", high)):
+            prim.CreateAttribute(f"mjc:forceRange:{end}", Sdf.ValueTypeNames.Double).Set(value)
+        if "limited" in more:
+            prim.CreateAttribute("mjc:forceLimited", Sdf.ValueTypeNames.Token).Set(more["limited"])
+
+    assert read(tmp_path, edit)[1].max_torque == expected
 
 
 def test_inspect_says_what_the_velocity_gains_act_on(tmp_path, calmotion):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from calmotion.shot.motor import MODELS, ON_ERROR, ON_JOINT, PRESCRIBED
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dialects import GAINS, POSITION_ACTUATOR, Spelling, authored
+from calmotion.usd.reading.actuators.mujoco_actuators import acts_on, numbers_of
 from calmotion.usd.reading.actuators.named_types import TYPE
 from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
 from calmotion.usd.reading.joints import JointPrim
@@ -165,22 +166,15 @@ def _newton_gains(joint: JointPrim, newton: NewtonActuator | None, units: StageU
 def _actuator_gains(joint: JointPrim, prim: Usd.Prim | None, units: StageUnits) -> Gains | None:
     """Gains of a position actuator of a MuJoCo conversion, which acts on the joint itself: kp (ctrl - g q) - kv g q'
     with the gear ratio g, in radians."""
-    relationship = prim.GetRelationship("mjc:target") if prim else None
-    if prim is None or not relationship or joint.prim.GetPath() not in relationship.GetTargets():
+    if prim is None or not acts_on(prim, joint):
         return None
-    gain, bias, gear = (_numbers(prim, name) for name in POSITION_ACTUATOR)
+    gain, bias, gear = (numbers_of(prim, name) for name in POSITION_ACTUATOR)
     kp, ratio = gain[0] if gain else 0.0, gear[0] if gear else 1.0
     if not kp > 0.0 or len(bias) < 3 or bias[1] != -kp or not math.isfinite(kp * bias[2]):
         return None  # not one that holds positions
     to_si = _per_length(units) if joint.kind == "prismatic" else units.torque
     names = f"{POSITION_ACTUATOR[0]} and {POSITION_ACTUATOR[1]} of {prim.GetPath()} (MuJoCo)"
     return Gains(to_si(ratio**2 * kp), to_si(ratio**2 * max(-bias[2], 0.0)), names, ON_JOINT)
-
-
-def _numbers(prim: Usd.Prim, name: str) -> list[float]:
-    attribute = prim.GetAttribute(name)
-    value: Any = attribute.Get() if attribute else None
-    return [] if value is None else [float(v) for v in value]
 
 
 def _per_degree(units: StageUnits) -> Callable[[float], float]:

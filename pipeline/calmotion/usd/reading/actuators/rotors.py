@@ -97,13 +97,30 @@ def read_backlash(joint: JointPrim, units: StageUnits, kind: MotorType) -> float
 def read_rotor(
     joint: JointPrim, units: StageUnits, model: str, kind: MotorType, newton: NewtonActuator | None, notes: list[str]
 ) -> Rotor:
-    """The rotor of a servo, SI, also of a motor whose type is named; that of other motors is empty.
+    """The rotor of a servo, SI; of an ideal motor the one that it would have as a servo, and of a drive an empty one.
 
     Raises:
-        ShotError: A value out of its range.
+        ShotError: A value out of its range, of a servo or a motor whose type is named.
     """
-    if model != SERVO and not kind.values:
-        return Rotor()
+    if model == SERVO or kind.values:
+        return _rotor(joint, units, model, kind, newton, notes)
+    try:
+        found = _rotor(joint, units, model, kind, newton, [])
+    except ShotError:
+        return Rotor()  # it is not used
+    if model == PRESCRIBED:
+        return found
+    if found != Rotor():
+        notes.append(
+            f"{joint.path}: a drive is simulated without the rotor inertia, friction and limits of speed that the file "
+            f"has; calm:motor:model = {SERVO} has them"
+        )
+    return Rotor()
+
+
+def _rotor(
+    joint: JointPrim, units: StageUnits, model: str, kind: MotorType, newton: NewtonActuator | None, notes: list[str]
+) -> Rotor:
     prim, linear = joint.prim, joint.kind == "prismatic"
     length = units.length if linear else np.deg2rad
     force, inertia = (units.force, units.mass) if linear else (units.torque, units.inertia)

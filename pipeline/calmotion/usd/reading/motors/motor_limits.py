@@ -11,7 +11,8 @@ import numpy as np
 from calmotion.control.motor_types import MotorType
 from calmotion.errors import ShotError
 from calmotion.usd import schemas
-from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, Spelling, authored, first_finite
+from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, Spelling, authored, first_finite, number_of
+from calmotion.usd.reading.actuators.mujoco_actuators import acts_on, numbers_of
 from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.units import StageUnits
@@ -23,13 +24,14 @@ _SCHEMA = "CalmMotorAPI"
 
 
 def effort_limit(
-    joint: JointPrim, units: StageUnits, notes: list[str], kind: MotorType, newton: NewtonActuator | None
-) -> float:
+    joint: JointPrim, units: StageUnits, notes: list[str], kind: MotorType, newton: NewtonActuator | None,
+    mujoco: Usd.Prim | None,
+) -> float:  # fmt: skip
     """Largest torque [N m] or force [N]; the lower of Calmotion's and UsdPhysics' limit, else that of another dialect.
 
     Args:
         kind: The named motor, whose limit stands for one of Calmotion that is not authored.
-        newton: The joint's actuator.
+        newton, mujoco: The joint's actuator, of one or the other.
 
     Raises:
         ShotError: A limit that is not positive.
@@ -41,7 +43,7 @@ def effort_limit(
     if force is not None:
         limit = min(limit, to_si(positive(joint.prim, *force)))
     if not math.isfinite(limit):
-        limit = _dialect_limit(joint, EFFORT_LIMIT[2:], to_si, notes)
+        limit = min(_dialect_limit(joint, EFFORT_LIMIT[2:], to_si, notes), _actuator_limit(joint, mujoco, to_si, notes))
     if not math.isfinite(limit) and newton is not None and 0.0 < newton.effort < math.inf:
         notes.append(f"{joint.path}: its limit is taken from {newton.path} (Newton)")
         limit = to_si(newton.effort)
@@ -75,6 +77,21 @@ def _dialect_limit(
         return math.inf  # in these dialects 0 means no limit
     notes.append(f"{joint.path}: its limit is taken from {name} ({spelling.dialect})")
     return float(to_si(value))
+
+
+def _actuator_limit(
+    joint: JointPrim, actuator: Usd.Prim | None, to_si: Callable[[float], float], notes: list[str]
+) -> float:
+    """What an actuator of MuJoCo gives a joint at most: its range of forces, the narrower side, times its gear."""
+    if actuator is None or not acts_on(actuator, joint):
+        return math.inf
+    low, high = (number_of(actuator, f"mjc:forceRange:{end}") or 0.0 for end in ("min", "max"))
+    ratio = abs((numbers_of(actuator, "mjc:gear") or [1.0])[0])
+    limit = ratio * min(-low, high)
+    if str(actuator.GetAttribute("mjc:forceLimited").Get()) == "false" or not 0.0 < limit < math.inf:
+        return math.inf
+    notes.append(f"{joint.path}: its limit is taken from mjc:forceRange of {actuator.GetPath()} (MuJoCo)")
+    return float(to_si(limit))
 
 
 def calmotion_limit(prim: Usd.Prim, name: str) -> float:
