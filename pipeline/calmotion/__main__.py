@@ -11,14 +11,9 @@ INTERRUPTED = 130
 def main() -> int:
     """Run the command line; an interrupt while it is imported ends as a later one does."""
     try:
-        from calmotion.cli.diagnostics.guard import guarded
+        from calmotion.cli.main import main as run
 
-        ended = guarded(sys.argv[1:])
-        if ended is None:
-            from calmotion.cli.main import main as run
-
-            ended = run()
-        status = ended
+        status = run()
     except KeyboardInterrupt:
         status = INTERRUPTED
         print("error: interrupted", file=sys.stderr)

@@ -17,7 +17,7 @@ COMMANDS = {"simulate": (), "watch": ("--runs", "1")}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize("option", ["--manifest", "--log", "--csv"])
+@pytest.mark.parametrize("option", ["--manifest", "--csv"])
 def test_nothing_is_written_over_the_shot(calmotion, shot, command, option):
     run = calmotion(command, shot, "--step", "10ms", *COMMANDS[command], option, shot)
     assert run.returncode == 2 and option in run.stderr, run.stderr
@@ -31,11 +31,9 @@ def test_options_of_a_layer_that_is_not_written_are_refused(calmotion, shot, com
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_each_run_has_its_log_and_its_progress(calmotion, shot, command):
-    log = shot.parent / "log.jsonl"
-    run = calmotion(command, shot, "--step", "10ms", *COMMANDS[command], "--json", "--progress", "--log", log)
-    events = [json.loads(line)["event"] for line in log.read_text().splitlines()]
-    assert run.returncode == 0 and events[0] == "begin" and events[-1] == "end" and "progress" in events
+def test_each_run_has_its_progress(calmotion, shot, command):
+    run = calmotion(command, shot, "--step", "10ms", *COMMANDS[command], "--json", "--progress")
+    assert run.returncode == 0
     assert "progress\tSimulate the shot\t" in run.stderr
     assert json.loads(run.stdout)["command"] == "simulate"
 

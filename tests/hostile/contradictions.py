@@ -34,19 +34,11 @@ CASES: dict[str, Case] = {
     "a watch whose manifest is the shot": words(
         "watch shot.usda --runs 1 --manifest shot.usda --json", "--manifest", statuses=USAGE
     ),
-    "a watch whose log is the shot": words("watch shot.usda --runs 1 --log shot.usda --json", "--log", statuses=USAGE),
-    "a watch whose log is its table": words(
-        "watch shot.usda --runs 1 --csv a.csv --log a.csv --json", "a.csv", statuses=USAGE
-    ),
     "a watch of splines without a layer": words(
         "watch shot.usda --runs 1 --splines --json", "--splines", statuses=USAGE
     ),
     "a strict watch that misses its tolerance": words(
         "watch shot.usda --runs 1 --strict --step 40ms --tolerance 0.001mm --json", make=SOFT, statuses=(1,)
-    ),
-    "a log on the standard output": words("simulate shot.usda --log /dev/stdout --json", "--log", statuses=USAGE),
-    "a log that is the layer": words(
-        "excite shot.usda -o out.usda --log out.usda --json", "output of -o", make=SOFT, statuses=USAGE
     ),
     "a home folder that no shell has replaced": words(
         "simulate shot.usda --csv ~/out.csv --json", "home folder", statuses=USAGE

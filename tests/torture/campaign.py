@@ -1,6 +1,6 @@
 """A campaign against faults: `make torture`, or `python tests/torture/campaign.py [--runs N] [--seed N] [--only KIND]`.
 
-Every run of the program on a tiny shot is disturbed: killed, short of disk or memory, with damaged caches, among others
+Every run of the program on a tiny shot is disturbed: killed, short of disk, with damaged caches, among others
 or with a clock that jumps. It must end with the same result as an undisturbed run, with a clear refusal, or with exit
 status 130, and the next run must end with the result and leave no file that nothing uses.
 
@@ -33,12 +33,11 @@ from workspace import REPOSITORY, Workspace
 # Kinds of fault, and their share of the runs.
 KINDS = {
     "kills": 1.0, "full disks": 0.15, "folders": 0.1, "damaged files": 0.3, "together": 0.01, "clocks": 0.05,
-    "memory": 0.1,
 }  # fmt: skip
 PIECE = 20  # runs after which the counts are kept
 _CAMPAIGNS = {
     "full disks": storage.full_disks, "folders": storage.folders, "damaged files": storage.damaged_files,
-    "together": machine.together, "clocks": machine.clocks, "memory": machine.memory,
+    "together": machine.together, "clocks": machine.clocks,
 }  # fmt: skip
 
 

@@ -1,10 +1,9 @@
-"""Several processes at once, clocks that jump, and a machine without memory."""
+"""Several processes at once, and clocks that jump."""
 
 from __future__ import annotations
 
 import os
 import random
-import resource
 import time
 from collections.abc import Callable
 
@@ -74,32 +73,3 @@ def jumps(seed: int) -> Callable[[], None]:
         time.time, time.perf_counter, time.monotonic = jumping, stopping, stopping
 
     return install
-
-
-def memory(space: Workspace, rng: random.Random, count: int, tally: verdicts.Tally) -> None:
-    """Address spaces that end a random number of bytes beyond what the program's libraries take."""
-    for number in range(count):
-        space.reset(old_outputs=rng.random() < 0.3)
-        room = int(1.5e9 * rng.random())
-        part, figures = space.cool(rng), rng.random() < 0.2
-        about = f"memory {number}, {room / 1e6:.0f} MB, without {part}"
-
-        def limit(room: int = room) -> None:
-            with open("/proc/self/statm", encoding="ascii") as file:
-                taken = int(file.read().split()[0]) * resource.getpagesize()
-            resource.setrlimit(resource.RLIMIT_AS, (taken + room, taken + room))
-
-        ending = runs.run(space, figures, limit)
-        if ending.status == 0:
-            faults = [*verdicts.result_faults(space, figures), *verdicts.leftovers(space)]
-        else:
-            faults = [*verdicts.refusal_faults(ending), *verdicts.unfinished_faults(space)]
-        tally.add("same result" if ending.status == 0 else "refused", about, faults)
-        again = runs.run(space, figures)
-        after = [f"the next run: exit status {again.status}", *verdicts.refusal_faults(again)]
-        if again.status == 0:
-            after = [*verdicts.result_faults(space, figures), *verdicts.leftovers(space)]
-        tally.runs += 1
-        tally.add("same result by the next run" if not after else "no result by the next run", about, after)
-        if faults or after:
-            print(about, *faults, *after, sep="\n  ", flush=True)

@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from calmotion.cli.commands.table import BUILT_IN, all_commands
-from calmotion.cli.diagnostics.streams import open_closed_streams
 from calmotion.cli.parser import Parser, add_examples, overview
-from calmotion.cli.signals import as_interrupts, ignore
-from calmotion.errors import ShotError, failure_of_machine
-from calmotion.support.memory import was_short
+from calmotion.cli.signals import as_interrupts, ignore, open_closed_streams
+from calmotion.errors import ShotError
 from calmotion.version import __version__
 
 if TYPE_CHECKING:
@@ -58,7 +56,7 @@ def _run(given: list[str]) -> int:
         from calmotion.cli.output import Output
 
         return _refused(error, Output(sys.stdout, "--json" in given))
-    from calmotion.cli.output import own_messages, print_error, printable, protected_stdout, refuse_missing_folder
+    from calmotion.cli.output import own_messages, print_fault, printable, protected_stdout, refuse_missing_folder
 
     with printable(), protected_stdout(getattr(args, "json", False)) as output, own_messages():
         try:
@@ -70,9 +68,7 @@ def _run(given: list[str]) -> int:
         except BrokenPipeError:
             return FAILED
         except Exception as error:
-            from calmotion.cli.diagnostics.crash_report import crash
-
-            print_error(failure_of_machine(error, was_short()) or crash(error, given), output)
+            print_fault(error, output)
             return FAILED
 
 

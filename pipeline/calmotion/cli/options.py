@@ -46,10 +46,6 @@ def shot_arguments(command: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--openjd", action="store_true", help="print progress to stdout in the words of Open Job Description"
     )
-    group.add_argument(
-        "--log", metavar="FILE",
-        help="add JSON lines to this file: time, stage, fraction, message and memory of the run",
-    )  # fmt: skip
     plugin_option(group)
     group.add_argument(
         "--run",
@@ -195,17 +191,11 @@ def progress_display(args: argparse.Namespace, quiet: bool | None = None) -> Pro
     Args:
         args: Of a command that `shot_command` made.
         quiet: Whether nothing is shown to a person; None: as `--quiet` says.
-
-    Raises:
-        SettingError: The log cannot be written, or is another output.
     """
     from calmotion.cli.progress import ProgressDisplay
-    from calmotion.workflow.outputs import refuse_overwriting
 
-    files = {"-o": getattr(args, "output", None), "--figures": getattr(args, "figures", None), "--log": args.log}
-    refuse_overwriting({}, {option: path for option, path in files.items() if path})
     quiet = args.quiet if quiet is None else quiet
-    return ProgressDisplay(quiet, args.progress, args.log, args.openjd, getattr(args, "verbose", False))
+    return ProgressDisplay(quiet, args.progress, args.openjd, getattr(args, "verbose", False))
 
 
 def simulation_arguments(args: argparse.Namespace) -> dict[str, Any]:

@@ -6,14 +6,16 @@ import io
 import json
 import os
 import sys
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, TextIO
 
 from calmotion.cli.sentences import width_of, wrapped
-from calmotion.errors import ShotError, each
+from calmotion.errors import ShotError, each, failure_of_machine
 from calmotion.host import Host
+from calmotion.support.memory import was_short
 from calmotion.workflow.plain import plain
 from calmotion.workflow.problems import Problem, RunError
 
@@ -122,7 +124,21 @@ def _descriptor(stream: TextIO) -> int | None:
 
 def print_error(error: ShotError, output: Output) -> None:
     """Print an error: as the JSON object, or on stderr in lines for a person, also where stdout takes nothing."""
-    problems = error.problems if isinstance(error, RunError) else [Problem(one) for one in each(error)]
+    _print_problems(error.problems if isinstance(error, RunError) else [Problem(one) for one in each(error)], output)
+
+
+def print_fault(error: Exception, output: Output) -> None:
+    """Print an exception that the program did not expect: what the machine lacks, or a fault with its traceback."""
+    known = failure_of_machine(error, was_short())
+    if known is not None:
+        return print_error(known, output)
+    found = "".join(traceback.format_exception_only(error)).strip()
+    remedy = "Report it, with the traceback; where files must not leave the house, read it before"
+    fault = ShotError("the program has a fault", found=found, remedy=remedy)
+    _print_problems([Problem(fault, traceback="".join(traceback.format_exception(error)))], output)
+
+
+def _print_problems(problems: Sequence[Problem], output: Output) -> None:
     try:
         conclude({}, problems, output)
     except OSError:
@@ -159,10 +175,6 @@ def conclude(
         output: Where the report is printed.
         show: Prints the report for a person; None prints nothing.
     """
-    if any(problem.traceback for problem in problems):
-        from calmotion.cli.diagnostics.crash_report import reported
-
-        problems = [reported(problem) for problem in problems]
     if output.json:
         errors = [problem.as_dict() for problem in problems]
         output.object({**report, **({"error": errors[0], "errors": errors} if errors else {})})

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
     from calmotion.cli.bars import Bars
-    from calmotion.cli.diagnostics.run_log import RunLog
 
 
 class ProgressDisplay:
@@ -27,24 +26,13 @@ class ProgressDisplay:
     Args:
         quiet: Show nothing.
         machine: Show lines for a program.
-        log: File of the log; None for none.
         openjd: Print lines of Open Job Description to stdout.
         verbose: Show details as well.
-
-    Raises:
-        SettingError: The log cannot be written.
     """
 
-    def __init__(
-        self, quiet: bool, machine: bool = False, log: str | None = None, openjd: bool = False, verbose: bool = False
-    ):
+    def __init__(self, quiet: bool, machine: bool = False, openjd: bool = False, verbose: bool = False):
         self._quiet, self._machine, self._verbose = quiet, machine, verbose
         self._farm = FarmProgress() if openjd else None
-        self._log: RunLog | None = None
-        if log is not None:
-            from calmotion.cli.diagnostics.run_log import RunLog
-
-            self._log = RunLog(log)
         self._bars: Bars | None = None
         self._tasks: dict[str, TaskID] = {}
 
@@ -63,16 +51,12 @@ class ProgressDisplay:
             self._bars.stop()
         if self._farm:
             self._farm.end(error)
-        if self._log:
-            self._log.end("done" if kind is None else kind.__name__)
 
     def __call__(self, state: Stage) -> None:
         """Show how far a stage is."""
         stage, fraction, message = state.stage, state.fraction, state.message
         if self._farm:
             self._farm.show(state)
-        if self._log:
-            self._log.progress(state)
         if self._machine:
             line = "\t".join(("progress", stage, f"{fraction:.4f}", message)).replace("\n", " ")
             print(line, file=sys.stderr, flush=True)
@@ -86,8 +70,6 @@ class ProgressDisplay:
 
     def done(self, result: OperatorResult) -> None:
         """Show the outcome of an operator, and its messages."""
-        if self._log:
-            self._log.operator(result)
         if self._quiet:
             return
         if self._bars is None and result.outcome in (Outcome.DONE, Outcome.FAILED):

@@ -65,7 +65,7 @@ def _status(result: SimulationResult, report: dict[str, Any], args: argparse.Nam
 
 
 def _refuse_files(shot: Shot, args: argparse.Namespace, paths: OutputPaths) -> None:
-    """Refuse a manifest or a log over what is read or another output, and options of a layer that is not written.
+    """Refuse a manifest over what is read or another output, and options of a layer that is not written.
 
     Raises:
         SettingError: One is.
@@ -73,8 +73,8 @@ def _refuse_files(shot: Shot, args: argparse.Namespace, paths: OutputPaths) -> N
     from calmotion.host import SettingError
     from calmotion.workflow.outputs import files_of, refuse_overwriting
 
-    own = {"--manifest": args.manifest, "--log": args.log}
-    refuse_overwriting(shot.inputs, files_of(paths) | {option: path for option, path in own.items() if path})
+    own = {"--manifest": args.manifest} if args.manifest else {}
+    refuse_overwriting(shot.inputs, files_of(paths) | own)
     if args.manifest and not _may_be_manifest(args.manifest):
         raise SettingError(
             "the file that is there is no manifest, and is never changed", path="--manifest", found=args.manifest,

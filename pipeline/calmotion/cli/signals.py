@@ -1,4 +1,4 @@
-"""Signals that end a run: a farm's SIGTERM and a closed terminal's SIGHUP do what Ctrl-C does."""
+"""Signals that end a run, and streams that are closed: a farm's SIGTERM and a terminal's SIGHUP do what Ctrl-C does."""
 
 from __future__ import annotations
 
@@ -75,3 +75,19 @@ def _leave_terminal() -> None:
             if stat.S_ISCHR(os.fstat(descriptor).st_mode):  # a terminal; a closed one is no tty any more
                 os.dup2(nowhere, descriptor)
     os.close(nowhere)
+
+
+def open_closed_streams() -> None:
+    """Open standard streams that are closed on the null device.
+
+    Python has None for them then, and the next file that is opened gets the number of the stream: what a library prints
+    would go into that file.
+    """
+    for number in (0, 1, 2):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest free number
+    for name, number in (("stdout", 1), ("stderr", 2)):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, "w", encoding="utf-8", errors="replace", closefd=False))

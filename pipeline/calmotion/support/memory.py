@@ -29,16 +29,6 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9
 
 
-def resident_memory() -> int | None:
-    """Memory of this process [bytes]; None where the system does not tell."""
-    pages = _read("/proc/self/statm").split()[1:2]
-    if not pages:
-        return None
-    import resource
-
-    return int(pages[0]) * resource.getpagesize()
-
-
 def available_memory() -> float:
     """Memory that this process can still take without swapping [bytes]: what the machine has free, and what a container
     and the limit of the address space leave; infinite where the system does not tell."""

@@ -22,7 +22,7 @@ def test_each_shot_is_a_task_with_the_line_of_its_job(tmp_path):
     assert shot["range"] == ["/a/one.usda", "/a/two.usda"] and name["range"] == ["one", "two"]
     values = {"Task.Param.Shot": "/a/two.usda", "Task.Param.Name": "two", "Param.OutputFolder": "/out"}
     args = [re.sub(r"\{\{([\w.]+)\}\}", lambda m: values[m[1]], a) for a in step["script"]["actions"]["onRun"]["args"]]
-    line = [text for text in jobs[1].line if text not in ("--json", "--quiet", "--log", jobs[1].progress)]
+    line = [text for text in jobs[1].line if text not in ("--json", "--quiet")]
     assert args == [*line, "--openjd"]
     kinds = [openjd_template(jobs, folder)["parameterDefinitions"][0] for folder in ("/out/farm", "/")]
     assert [(kind["type"], kind["default"]) for kind in kinds] == [("STRING", "/out"), ("PATH", "out")]

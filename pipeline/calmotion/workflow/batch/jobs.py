@@ -65,11 +65,6 @@ class Job:
         return self._beside("log")
 
     @property
-    def progress(self) -> str:
-        """The log of its progress, JSON lines."""
-        return self._beside("jsonl")
-
-    @property
     def report(self) -> str:
         """The JSON object that the command prints."""
         return self._beside("json")
@@ -88,7 +83,7 @@ class Job:
         outputs = [] if self.layer is None else ["-o", self.layer]
         for extra in self.extras:
             outputs += [f"--{extra}", f"{self.stem}.{EXTRAS[extra]}" if EXTRAS[extra] else f"{self.stem}_{extra}"]
-        outputs += ["--manifest", self.manifest, "--log", self.progress]
+        outputs += ["--manifest", self.manifest]
         return [self.command, self.shot, *self.arguments, *outputs, "--json", "--quiet"]
 
     @property
@@ -169,7 +164,7 @@ def is_done(job: Job) -> bool:
 
 def forget(job: Job) -> None:
     """Remove what earlier runs said about a job; its results stay until new ones replace them."""
-    for path in (_mark(job), job.log, job.progress, job.report):
+    for path in (_mark(job), job.log, job.report):
         with contextlib.suppress(OSError):
             os.unlink(path)
 

@@ -130,8 +130,6 @@ def _step(jobs: Sequence[Job], number: int | None) -> dict[str, Any]:
     )  # fmt: skip
     assert pattern.stem.startswith(stem)
     line = [text for text in pattern.line if text not in ("--json", "--quiet")]
-    at = line.index("--log")  # farms keep what tasks print
-    del line[at : at + 2]
     name = first.command.capitalize() if number is None else f"{first.command.capitalize()}{number + 1}"
     return {
         "name": name,

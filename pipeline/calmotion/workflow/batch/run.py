@@ -124,7 +124,6 @@ class _State:
         self.jobs, self.interrupted = jobs, False
         self._folder, self._command, self._on, self._begin, self._progress = folder, command, on, begin, progress
         self._results = {job.name: JobResult(job, WAITING) for job in jobs}
-        self._shown = 0.0  # progress never falls, also where a job begins anew
 
     def keep(self, job: Job) -> bool:
         """Take over what is done already."""
@@ -152,17 +151,15 @@ class _State:
         write_text(os.path.join(self._folder, PAGE), found.page())
         return found
 
-    def show(self, running: Sequence[Job]) -> None:
-        """Tell the progress: jobs that are done, and the shares of those that run."""
+    def show(self) -> None:
+        """Tell how many jobs are done."""
         if self._progress is None:
             return
         ended = sum(result.outcome != WAITING for result in self._results.values())
         kept = sum(result.outcome == KEPT for result in self._results.values())
-        done = ended - kept + sum(map(_fraction, running))
-        elapsed, left = time.perf_counter() - self._begin, len(self.jobs) - kept
-        more = elapsed * (left - done) / done if done > 0.0 else None
-        self._shown = max(self._shown, min(1.0, (kept + done) / len(self.jobs)))
-        self._progress(Progress(_STAGE, self._shown, f"{ended} of {len(self.jobs)} shots", more))
+        elapsed, done = time.perf_counter() - self._begin, ended - kept
+        more = elapsed * (len(self.jobs) - ended) / done if done else None
+        self._progress(Progress(_STAGE, ended / len(self.jobs), f"{ended} of {len(self.jobs)} shots", more))
 
 
 def _work(backend: Backend, jobs: Sequence[Job], state: _State, cancel: Callable[[], bool] | None) -> None:
@@ -186,7 +183,7 @@ def _work(backend: Backend, jobs: Sequence[Job], state: _State, cancel: Callable
                 waiting.append((job, found.get("worker", "")))
                 continue
             state.add(_result(job, found, max(1, attempts)))
-        state.show(list(running.values()))
+        state.show()
         if lost:
             revivals += 1
             if revivals > MOST_REVIVALS or not backend.revive():
@@ -225,24 +222,6 @@ def _attempts(job: Job) -> int:
             return sum(line.startswith(MARK) for line in log)
     except OSError:
         return 0
-
-
-def _fraction(job: Job) -> float:
-    """How far a job that runs is, by the last line of its log of progress."""
-    try:
-        with open(job.progress, "rb") as file:
-            file.seek(max(0, os.fstat(file.fileno()).st_size - 4096))
-            lines = file.read().splitlines()
-    except OSError:
-        return 0.0
-    for line in reversed(lines):
-        try:
-            found = json.loads(line)
-            if found.get("event") == "progress":
-                return 0.5 * min(1.0, max(0.0, float(found["fraction"])))  # of one stage of several
-        except (ValueError, AttributeError, KeyError, TypeError):
-            continue
-    return 0.0
 
 
 @contextmanager

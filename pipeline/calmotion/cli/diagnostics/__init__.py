@@ -1,1 +1,0 @@
-"""What happened and why: the log of a run, the report of a crash, and the doctor."""
