@@ -16,7 +16,6 @@ import numpy as np
 
 from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.linear_algebra.nested_dissection import Dissection
-from calmotion.linear_algebra.unlocked_blas import add_gram, divide_right, factor_cholesky
 from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
@@ -116,6 +115,9 @@ class MultifrontalCholesky:
             self._factor(matrix.tocsr()[self._order][:, self._order].tocsc(), dissection.parent, outer)
 
     def _factor(self, A: Any, parent: Any, outer: Any) -> None:
+        from scipy.linalg.blas import dsyrk, dtrsm
+        from scipy.linalg.lapack import dpotrf
+
         complements = _Complements(parent, outer)
         place = np.zeros(A.shape[0], dtype=np.int64)
         for k, border in enumerate(self._borders):
@@ -137,24 +139,29 @@ class MultifrontalCholesky:
                 _add_triangle(F11, update, 0, at[:split])
                 _add_block(F21, update, split, at)
                 _add_triangle(F22, update, split, at[split:])
+            # the results overwrite the arguments, which are contiguous in Fortran order
+            _, info = dpotrf(F11, lower=1, clean=0, overwrite_a=1)
             # OpenBLAS does not report NaN
-            if not factor_cholesky(F11) or not np.isfinite(F11.diagonal()).all():
+            if info != 0 or not np.isfinite(F11.diagonal()).all():
                 raise NotPositiveDefinite("the matrix is not positive definite")
-            divide_right(F21, F11, transposed=True)
-            add_gram(F22, F21, -1.0, lower=True)
+            if len(border):
+                dtrsm(1.0, F11, F21, side=1, lower=1, trans_a=1, overwrite_b=1)
+                dsyrk(-1.0, F21, beta=1.0, c=F22, lower=1, overwrite_c=1)
 
     def solve(self, b: Array) -> Array:
         """x with matrix @ x = b, b of shape [n, k]."""
+        from scipy.linalg.blas import dtrsm
+
         x = np.ascontiguousarray(b[self._order], dtype=float)
         pieces = list(zip(self._start[:-1], self._start[1:], self._borders, self._diagonal, self._below, strict=True))
         for s, e, border, L11, L21 in pieces:
-            divide_right(x[s:e].T, L11, transposed=True)
+            dtrsm(1.0, L11, x[s:e].T, side=1, lower=1, trans_a=1, overwrite_b=1)
             if len(border):
                 x[border] -= L21 @ x[s:e]
         for s, e, border, L11, L21 in reversed(pieces):
             if len(border):
                 x[s:e] -= L21.T @ x[border]
-            divide_right(x[s:e].T, L11, transposed=False)
+            dtrsm(1.0, L11, x[s:e].T, side=1, lower=1, overwrite_b=1)
         out = np.empty_like(x)
         out[self._order] = x
         return out

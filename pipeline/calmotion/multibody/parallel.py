@@ -1,4 +1,4 @@
-"""Independent pieces of work in threads: compiled kernels and dense products run without the interpreter's lock."""
+"""Independent pieces of work in threads: compiled kernels and products of NumPy run without the interpreter's lock."""
 
 from __future__ import annotations
 

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.linear_algebra.unlocked_blas import add_gram
 from calmotion.reduction.elements.assembly import QuadraticMesh, corner_gradients
 from calmotion.reduction.elements.green_strain_fields import green_fields
 from calmotion.shot.character import Array
@@ -144,6 +143,8 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
     Source: Barbic and James, Real-Time Subspace Integration for St. Venant-Kirchhoff Deformable Models, 2005 (the
     cubic polynomial), in the form of a Gram matrix.
     """
+    from scipy.linalg.blas import dsyrk
+
     r = modes.shape[2]
     p = r if directions is None else directions.shape[1]
     size = r + p * (p + 1) // 2
@@ -160,7 +161,7 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
         H = G if directions is None else np.tensordot(directions.T, G, 1)
         fields = np.empty((size, 6, G.shape[2]))
         green_fields(G, H, np.sqrt(rule.weights[elements].ravel()), shear, bulk, fields)
-        add_gram(A, fields.reshape(size, -1).T, 1.0, lower=False, of_columns=True)
+        dsyrk(1.0, fields.reshape(size, -1).T, beta=1.0, c=A, trans=1, overwrite_c=1)
     return np.ascontiguousarray(A + np.triu(A, 1).T)
 
 
