@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from beams import timoshenko_frequencies
 from boxes import box_tets
 from calmotion.errors import ShotError
-from calmotion.reduction.elements.assembly import quadratic_mesh
+from calmotion.reduction.basis.natural_modes import frequencies
+from calmotion.reduction.elements.assembly import assemble, quadratic_mesh
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.interfaces.named_patch import named_patch
-from calmotion.shot import Frame, InterfaceSurface
+from calmotion.shot import ElasticMaterial, Frame, InterfaceSurface
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -67,3 +69,25 @@ def test_too_small_and_overlapping_ones_are_refused(plate):
     other = attachment("/J/b", (0.2, 0.1, 0.0), square(0.08, 0.2, 0.0, 0.2, 0.001))
     with pytest.raises(ShotError, match="overlaps"):
         interface_patches(plate, [one, other], -1.0, "/Plate")
+
+
+@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize("ratio", [1.0, 0.3, 0.19, 0.1, 0.03, 0.01])
+def test_a_strip_is_clamped_on_the_whole_of_its_end_however_thin(named, ratio):
+    """The first bending frequencies both ways are within 1% of Timoshenko's beam, by a named end face and by itself.
+
+    Without lateral contraction the solid is a beam.
+    """
+    width, length = 0.025, 0.4
+    thickness = ratio * width
+    steel = ElasticMaterial("/Looks/Steel", 1.93e11, 0.0, 7850.0)
+    model = assemble(*box_tets((80, 4, 1), (length, width, thickness)), steel)
+    a, b, c, d = np.array([[0.0, y, z] for y, z in ((0.0, 0.0), (0.0, thickness), (width, thickness), (width, 0.0))])
+    end = np.array([[a, b, c], [a, c, d]])
+    joint = attachment("/J/hub", (0.0, 0.5 * width, 0.5 * thickness), end if named else None)
+    (patch,) = interface_patches(model.mesh, [joint], -1.0, "/Strip")
+    assert np.array_equal(patch.nodes, np.flatnonzero(model.mesh.nodes[:, 0] < 1e-9))
+    f = frequencies(model, 12, patch.nodes)
+    for height in (thickness, width):
+        (theory,) = timoshenko_frequencies(steel, length, height, 1)
+        assert np.abs(f / theory - 1.0).min() < 0.01

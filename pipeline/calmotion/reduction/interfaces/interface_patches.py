@@ -30,7 +30,7 @@ from calmotion.shot.meshes import CutPatch
 _GROWTH = 1.25
 _FEWEST = 6  # nodes of a triangle
 _ON = 1e-7  # of the diagonal: distance of a node from the triangle that it is on
-_SPREAD = 0.2  # second largest over largest extent below which a patch is a line and cannot carry a moment
+_SPREAD = 1e-3  # second largest over largest extent below which nodes are on a line; the end of a thin strip is not
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,7 +300,7 @@ def _nearest_spanning(mesh: QuadraticMesh, free: IntArray, center: Array) -> Int
 
 
 def spans_a_plane(points: Array) -> bool:
-    """Whether points are three or more, and not (nearly) on one line."""
+    """Whether points are three or more, and not on one line, so that they carry a moment about every axis."""
     if len(points) < 3:
         return False
     extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from calmotion.geometry.distances import closest_on_triangles
+from calmotion.geometry.nearby_triangles import unit_normals
 from calmotion.reduction.elements.assembly import QuadraticMesh
 from calmotion.shot.character import Array, IntArray
 
@@ -13,7 +14,7 @@ _FACING = 0.5  # least cosine between the normals; excludes the other side of a 
 
 
 def named_patch(mesh: QuadraticMesh, triangles: Array) -> IntArray:
-    """Surface nodes that lie on given triangles and face the same direction, ascending.
+    """Surface nodes that lie on given triangles and on a triangle of the mesh that faces the same direction, ascending.
 
     The mesh need not share points or edges with the triangles. Where its elements are larger than the named part, the
     patch may be empty.
@@ -23,28 +24,19 @@ def named_patch(mesh: QuadraticMesh, triangles: Array) -> IntArray:
         triangles: Corners [m], shape [k, 3, 3], body frame, outward.
     """
     distance = _DISTANCE * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    size = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = normals / np.maximum(size, np.finfo(float).tiny)
-    node_normals = _node_normals(mesh)
-    surface = mesh.surface_nodes
-    x = mesh.nodes[surface]
+    normals, _ = unit_normals(triangles)
+    of_mesh, _ = unit_normals(mesh.nodes[mesh.surface[:, :3]])
     low, high = triangles.min(axis=(0, 1)) - distance, triangles.max(axis=(0, 1)) + distance
-    near = surface[np.all((x >= low) & (x <= high), axis=1)]
+    surface = mesh.surface_nodes
+    near = surface[np.all((mesh.nodes[surface] >= low) & (mesh.nodes[surface] <= high), axis=1)]
+    corners = mesh.surface.ravel()
+    order = np.argsort(corners, kind="stable")
+    first, last = (np.searchsorted(corners[order], near, side) for side in ("left", "right"))
     nodes = []
-    for node in near:
+    for node, begin, end in zip(near, first, last, strict=True):
         gaps = np.linalg.norm(closest_on_triangles(mesh.nodes[node], triangles) - mesh.nodes[node], axis=1)
-        touched = gaps <= distance
-        if np.any(touched & (normals @ node_normals[node] > _FACING)):
+        # each triangle by itself: the mean at the rim of a thin end is mostly that of the sides
+        around = of_mesh[order[begin:end] // mesh.surface.shape[1]]
+        if np.any(around @ normals[gaps <= distance].T > _FACING):
             nodes.append(node)
     return np.array(nodes, dtype=np.int32)
-
-
-def _node_normals(mesh: QuadraticMesh) -> Array:
-    """Outward unit normals at the surface nodes, the area-weighted mean of the triangles around, shape [n, 3]."""
-    corners = mesh.nodes[mesh.surface[:, :3]]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    out = np.zeros_like(mesh.nodes)
-    for column in range(mesh.surface.shape[1]):
-        np.add.at(out, mesh.surface[:, column], area)
-    return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), np.finfo(float).tiny))
