@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.benchmarks.scenes.beam_arm import IDENTITY, beam_arm
-from calmotion.benchmarks.scenes.exudyn_arm import LENGTH, MATERIAL, PAYLOAD, RETARDATION, THICKNESS, Exudyn
 from calmotion.benchmarks.scenes.recorded_arm import MESH
+from calmotion.benchmarks.speed.exudyn_arm import LENGTH, MATERIAL, PAYLOAD, RETARDATION, THICKNESS, Exudyn
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import signals_of

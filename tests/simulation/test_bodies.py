@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.common.fresh_cache import fresh_cache
+from calmotion.benchmarks.common.timing import fresh_cache
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.multibody.model.model import body_anchors
 from calmotion.multibody.model.topology import span_tree

@@ -5,12 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
-from calmotion.benchmarks.scenes.four_bar import four_bar
 from calmotion.errors import ShotError
 from calmotion.shot import FEMeshes, Frame
-from calmotion.shot.run import RunSettings
-from calmotion.simulation.body_reduction import reduced_shot
-from calmotion.simulation.simulate import simulate_shot
+from four_bar import four_bar
+from made_shots import simulated
 from neutral_hinges import push_rod, truss, turning
 from scipy.spatial.transform import Rotation
 
@@ -27,20 +25,11 @@ NEUTRAL = {
 }
 
 
-def simulated(made, animation, integrator="bdf2"):
-    """The simulation, whose joints are closed."""
-    options = RunSettings(integrator=integrator)
-    shot = reduced_shot(made[0], animation, made[1], options)
-    found = simulate_shot(shot, options, lambda fraction, message: None).before
-    assert found.max_joint_gap < 1e-6
-    return found
-
-
 @pytest.mark.parametrize("integrator", ["bdf2", "generalized-alpha"])
 @pytest.mark.parametrize("name", NEUTRAL)
 def test_rigid_mechanisms_whose_hinges_have_no_stiffness_do_what_they_should(name, integrator):
     """The truss jumped to another pose, with its tip below its feet, from the second step on."""
-    run = simulated((NEUTRAL[name], FEMeshes(())), shot_of(quintic(0.8, 0.5, 0.2), 1.0), integrator)
+    run = simulated((NEUTRAL[name], FEMeshes(())), shot_of(quintic(0.8, 0.5, 0.2), 1.0), integrator=integrator)
     assert run.position_errors.max() < 1e-6
 
 

@@ -2,22 +2,32 @@
 
 import json
 
+import numpy as np
 import pytest
 from calmotion.benchmarks.integrators import integrators
-from calmotion.benchmarks.integrators.integrator_errors import (
+from calmotion.benchmarks.integrators.integrators import (
+    LATER,
+    RATE,
     WORKING_STEP,
     Fate,
     Measured,
+    Scene,
     arm_scene,
     damping,
-    four_bar_scene,
     order_of,
     orders,
     stiff_scene,
 )
-from calmotion.multibody.failure import SimulationFailure
+from calmotion.benchmarks.scenes.beam_arm import quintic, shot_of
+from calmotion.multibody import SimulationFailure
+from four_bar import four_bar
 
 SECOND = {"bdf2": (16, 32), "newmark": (16, 32), "generalized-alpha": (16, 32)}
+
+
+def four_bar_scene():
+    """A four-bar with a flexible coupler, whose crank makes a turn in a second."""
+    return Scene(four_bar(modes=7, damping=0.1), shot_of(quintic(2.0 * np.pi, 1.0, LATER), LATER + 1.0, rate=RATE))
 
 
 @pytest.mark.parametrize(

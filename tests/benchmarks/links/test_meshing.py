@@ -28,7 +28,7 @@ def test_links_are_named_by_path_or_name_or_taken_all(shot):
         read_links(f"{shot}:foot")
     told = []
     found = links_of_all([f"{shot}:foot", f"{shot}:fore"], told.append)
-    assert [(source, link.body.path) for source, link in found] == [(f"{shot}:fore", FORE)]
+    assert [(link.body.path, robot) for link, robot in found] == [(FORE, "arm")]
     assert len(told) == 1 and "no such link" in told[0], "one that is not there does not keep the others away"
 
 
@@ -47,7 +47,7 @@ def test_the_table_shows_errors_that_decrease_towards_the_finest_mesh(shot, tmp_
     assert float(fine["f1"]) == pytest.approx(beam, rel=0.03)
     assert float(coarse["error"]) > 0.0 and np.isnan(float(max(auto, fine, key=lambda r: int(r["nodes"]))["error"]))
     assert float(coarse["estimate"]) > float(fine["estimate"]) > 0.0
-    assert all(float(fine[name]) > 0.0 for name in ("mesh_time", "reduce_time"))
+    assert float(fine["mesh_time"]) > 0.0
     lines = capsys.readouterr().out.splitlines()
     assert lines[2].startswith("| fore | auto |") and lines[3].startswith("| fore | 40 |")
     assert lines[-1].startswith("fore: ") and lines[-1].endswith("% over 3 meshes")
@@ -55,7 +55,7 @@ def test_the_table_shows_errors_that_decrease_towards_the_finest_mesh(shot, tmp_
 
 def test_the_automatic_mesh_is_judged_by_the_finest_one():
     rows = [
-        meshing.Row("fore", size, nodes, 1.0, 1.0, f1, 2.0 * f1, 3.0 * f1, np.nan, 9.0, 0.1, "joint")
+        meshing.Row("fore", size, nodes, 1.0, f1, 2.0 * f1, 3.0 * f1, np.nan, 9.0, 0.1, "joint")
         for size, nodes, f1 in ((np.nan, 900, 103.0), (8.0, 500, 110.0), (2.0, 50_000, 100.0))
     ]
     rows = meshing._compared(rows)
@@ -76,7 +76,7 @@ def test_links_that_cannot_be_meshed_are_reported_and_the_others_are_measured(sh
 def test_a_refined_row_is_named_and_judges_the_automatic_mesh(shot, tmp_path):
     (fore,) = read_links(f"{shot}:fore")
     auto, refined = meshing.study(fore, ["auto"], 60.0, refine=6_000)
-    assert np.isnan(auto.size) and refined.size == 0.0 and np.isnan(refined.reduce_time)
+    assert np.isnan(auto.size) and refined.size == 0.0
     assert refined.nodes > auto.nodes and 0.0 < auto.error < 2.0 and refined.estimate < auto.estimate
     assert "| fore | refined |" in meshing.table([auto, refined])
     assert "the automatic mesh" in meshing.verdicts([auto, refined])

@@ -18,8 +18,6 @@ def test_gauss_newton_needs_a_fraction_of_a_quasi_newton_method(capsys, monkeypa
     assert ours["largest_after_mm"] < ours["largest_before_mm"] / 35
     assert rows["L-BFGS"]["seconds"] is None and rows["L-BFGS"]["objective"] > 1.1 * ours["converged"]
     assert rows["L-BFGS"]["evaluations"] == 20 and rows["L-BFGS, time spent"]["seconds"] > 0.0
-    unknowns = [row["unknowns"] for row in report["costs"]]
-    assert unknowns[0] <= 10 and unknowns[-1] > 1500 and all(row["product"] > 0 for row in report["costs"])
 
 
 @pytest.mark.long

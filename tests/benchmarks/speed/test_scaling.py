@@ -4,10 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.scenes import exudyn_arm, mujoco_arm
-from calmotion.benchmarks.scenes.exudyn_arm import Run, time_at
-from calmotion.benchmarks.speed import scaling
-from calmotion.benchmarks.speed.growth import STEP, Growth, branches, links, motion, prepared
+from calmotion.benchmarks.speed import exudyn_arm, scaling
+from calmotion.benchmarks.speed.exudyn_arm import Run, time_at
+from calmotion.benchmarks.speed.scaling import STEP, Growth, branches, links, motion, prepared
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
@@ -57,8 +56,7 @@ def test_the_simulated_arm_converges_at_second_order():
 
 
 def test_without_the_others_the_command_says_so_and_goes_on(capsys, monkeypatch):
-    for module in (exudyn_arm, mujoco_arm):
-        monkeypatch.setattr(module, "installed", lambda: False)
+    monkeypatch.setattr(scaling, "find_spec", lambda name: None)
     monkeypatch.setattr(scaling, "growths", lambda *sizes: [Growth("bodies", (4, 8), (1e-4, 2e-4))])
     assert scaling.main([]) == 0
     out = capsys.readouterr().out

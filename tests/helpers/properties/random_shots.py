@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from unittest.mock import patch
 
+import four_bar
 import numpy as np
-from calmotion.benchmarks.scenes import four_bar
 from calmotion.benchmarks.scenes.beam_arm import beam_mesh, quintic
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import (

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.body_reduction import reduced_shot
+from calmotion.simulation.simulate import simulate_shot
 from linkage_arm import SOFT, linkage_arm, performance
 
 
@@ -19,3 +21,20 @@ def soft_linkage_shot():
     """An arm with a four-bar linkage and thin links, with a shake of 0.25 m."""
     character, meshes = linkage_arm(thickness=SOFT)
     return reduced_shot(character, performance(), meshes, RunSettings())
+
+
+def simulated(made, animation, **settings):
+    """The simulation of a character with its meshes: finite, with closed joints and rotations that are rotations.
+
+    Args:
+        settings: Of `RunSettings`.
+    """
+    options = RunSettings(**settings)
+    shot = reduced_shot(made[0], animation, made[1], options)
+    run = simulate_shot(shot, options, lambda fraction, message: None).before
+    motion = run.motion
+    parts = (motion.positions, motion.rotations, motion.target_positions, motion.motor_efforts, *motion.elastic)
+    assert all(np.all(np.isfinite(part)) for part in parts)
+    assert np.abs(np.linalg.norm(motion.rotations, axis=2) - 1.0).max() < 1e-9
+    assert run.max_joint_gap < 1e-6
+    return run

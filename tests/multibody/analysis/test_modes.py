@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from arms import chain, compiled
 from calmotion.benchmarks.scenes.beam_arm import beam_arm
-from calmotion.benchmarks.scenes.four_bar import four_bar
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.modes import elastic_modes, falling_rate, system_modes
 from calmotion.multibody.integrators.workspace import Workspace
@@ -12,6 +11,7 @@ from calmotion.multibody.model.model import compile_model
 from calmotion.multibody.model.topology import span_tree
 from calmotion.multibody.statics.equilibrium import equilibrium
 from calmotion.simulation.bodies import reduce_bodies
+from four_bar import four_bar
 from particles import particle_system
 from sweep_cases import rigid_start
 
@@ -87,7 +87,7 @@ def test_what_hangs_free_has_no_elastic_frequency():
 
 def test_motions_along_a_tree_span_those_that_joints_allow(monkeypatch):
     """`null_space` takes time with the cube of the number of bodies."""
-    from calmotion.benchmarks.speed.growth import branches, prepared
+    from calmotion.benchmarks.speed.scaling import branches, prepared
     from calmotion.multibody.analysis import modes
 
     model, found, spans = prepared(*branches()), [], []
@@ -106,7 +106,7 @@ def test_motions_along_a_tree_span_those_that_joints_allow(monkeypatch):
 
 
 def test_joints_that_form_a_loop_or_leave_a_child_free_are_not_a_tree_of_welds():
-    from calmotion.benchmarks.speed.growth import branches, prepared
+    from calmotion.benchmarks.speed.scaling import branches, prepared
     from calmotion.multibody.analysis import modes
 
     model = prepared(*branches())

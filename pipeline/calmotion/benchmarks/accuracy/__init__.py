@@ -1,1 +1,1 @@
-"""Error against run time, tolerances, convergence of the reduction, value of simplifications."""
+"""Error against run time, tolerances, estimates, calibrations."""

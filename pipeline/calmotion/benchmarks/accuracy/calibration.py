@@ -20,10 +20,10 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from calmotion import ShotError
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import finish, resumed_rows, say, write_rows
 from calmotion.benchmarks.scenes.recorded_arm import recorded_arm
-from calmotion.errors import ShotError
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion.shot.calibration.estimates import HIGHER_MODES
 from calmotion.shot.run import RunSettings
@@ -88,20 +88,8 @@ def tried(number: int, finer: bool = False) -> list[Recovered]:
         else:
             error, deviation = item.value - truth, item.standard_deviation
             pull = error / deviation
-        rows.append(
-            Recovered(
-                number,
-                finer,
-                item.kind,
-                float(error),
-                float(deviation),
-                float(pull),
-                item.identifiable,
-                found.converged,
-                found.simulations,
-                found.wall_s,
-            )  # fmt: skip
-        )
+        known = item.identifiable, found.converged, found.simulations, found.wall_s
+        rows.append(Recovered(number, finer, item.kind, float(error), float(deviation), float(pull), *known))
     return rows
 
 

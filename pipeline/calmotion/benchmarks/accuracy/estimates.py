@@ -20,6 +20,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from calmotion import ShotError
 from calmotion.accuracy.converged_reduction import converged_reduction
 from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.pod_subspace import ReferenceRun, project_to_subspace, reference_run
@@ -29,7 +30,6 @@ from calmotion.benchmarks.accuracy.figures import HONEST, LIMIT, draw_estimates
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import finish, resumed_rows, say, write_rows
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, beam_mesh, quintic, shot_of
-from calmotion.errors import ShotError
 from calmotion.reduction.elements.assembly import quadratic_nodes
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies

@@ -25,7 +25,6 @@ STYLES = {
     "law": ("#cc79a7", "^:"),
     "elements": ("#999999", "v--"),
 }
-SHORT = {"linear": "lin", "stvk": "StVK", "neohookean": "nH"}
 
 
 def draw_estimates(folder: str, ratios: Sequence[float], decide: Sequence[bool]) -> str:
@@ -90,11 +89,6 @@ def draw_work_precision(folder: str, points: Sequence[Point], bar: float) -> str
                 [p.wall_s for p in line], [1e3 * p.error_m for p in line], style, color=color, ms=4, lw=1,
                 label=label if size == sizes[0] else None,
             )  # fmt: skip
-        if series == "law":
-            for p in in_series:
-                axes.annotate(
-                    SHORT[p.setting], (p.wall_s, 1e3 * p.error_m), (4, 4), textcoords="offset points", fontsize=7
-                )
     chosen = [p for p in points if p.series == "tolerance"]
     axes.loglog(
         [p.wall_s for p in chosen], [1e3 * p.error_m for p in chosen], "D", color="black", ms=6, label="--tolerance"

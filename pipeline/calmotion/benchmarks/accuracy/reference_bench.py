@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from calmotion import ShotError
 from calmotion.accuracy.mesh_budget import mesh_error
 from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, reference_run
 from calmotion.accuracy.step_error import StepRun, distance, simulate_at
-from calmotion.benchmarks.common.finer_meshes import with_more_nodes
 from calmotion.benchmarks.common.shots import Unreduced
 from calmotion.benchmarks.common.tables import say
 from calmotion.benchmarks.common.timing import median_time
-from calmotion.errors import ShotError
-from calmotion.reduction.reduced_body import ReducedBody
+from calmotion.multibody import ReducedBody
+from calmotion.reduction.elements.assembly import quadratic_mesh
 from calmotion.shot import Animation
 from calmotion.shot.character import Array, with_settings
 from calmotion.shot.run import RunSettings
@@ -31,6 +31,11 @@ REFERENCE_STEP, SMALLEST_STEP = 1 / 3840, 1 / 30720  # of the reference: at most
 BASE, FINEST = 1e-5, 1e-7  # reductions: of the runs that vary something else, and of the reference [m]
 REPEATS = 3
 ENOUGH_TIME = 10.0  # of runs that are timed [s]: longer ones are run once
+TIMES = 8.0  # nodes of a reference over those of what is measured
+_LAST = 0.6  # refinement ends above this part of its limit of nodes
+# Most nodes of the meshes that the stiffness of those is taken from (results take theirs from up to a third of them),
+# and its relative error from which on these are fine enough
+STIFFNESS_NODES, _KNOWN = 300_000, 3e-5
 
 
 @dataclass(frozen=True)
@@ -167,6 +172,31 @@ class Bench:
         point = named(took, error)
         say(f"{point.shot}, {series}, {setting}: {1e3 * error:.2g} mm off in {took:.3g} s")
         return point
+
+
+def with_more_nodes(
+    reduction: BodyReduction, times: float = TIMES, tolerance: float | None = None, stiffness: int = STIFFNESS_NODES
+) -> BodyReduction:  # fmt: skip
+    """The reduction on meshes with so many times the nodes, refined for the loads of the shot; the same for 1 or less.
+
+    Their stiffness is that of meshes finer still, or it would be known less well than that of a result.
+
+    Args:
+        reduction: With meshes and loads.
+        times: Nodes of the largest mesh over those that it has; smaller meshes get at least as many more.
+        tolerance: As of `BodyReduction.bodies` [m].
+        stiffness: Largest number of nodes of the meshes that the stiffness is taken from.
+
+    Raises:
+        ShotError: A body that cannot be reduced.
+    """
+    if times <= 1.0 or reduction.meshes is None:
+        return reduction
+    meshes = reduction.meshes.meshes
+    most = max(len(quadratic_mesh(mesh.points, mesh.tets).nodes) for mesh in meshes)
+    wanted = {mesh.body: 0.0 for mesh in meshes}
+    finer = reduction.with_finer_meshes(tolerance, wanted, int(times * most / _LAST), by_factor=False)
+    return finer.with_finer_meshes(tolerance, dict.fromkeys(wanted, _KNOWN), stiffness)
 
 
 def front(points: Sequence[Point]) -> list[Point]:

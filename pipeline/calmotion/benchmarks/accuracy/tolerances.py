@@ -18,13 +18,12 @@ from calmotion.accuracy.converged_reduction import converged_reduction
 from calmotion.accuracy.simplification.analysis import analyse
 from calmotion.accuracy.simulate_to_tolerance import found_tracks, simulate_to_tolerance
 from calmotion.accuracy.step_error import distance, frames_of
-from calmotion.benchmarks.accuracy.reference_bench import FINEST, Bench, Reference
-from calmotion.benchmarks.common.finer_meshes import TIMES
-from calmotion.benchmarks.common.fresh_cache import fresh_cache
-from calmotion.benchmarks.common.parsers import bench_parser, output_options, shots_argument, tolerances_argument
+from calmotion.benchmarks.accuracy.reference_bench import FINEST, TIMES, Bench, Reference
+from calmotion.benchmarks.common.parsers import bench_parser, output_options, shots_argument
 from calmotion.benchmarks.common.shots import SAMPLES, Unreduced, load_unreduced
 from calmotion.benchmarks.common.tables import finish, resumed_rows, say, write_rows
-from calmotion.benchmarks.common.timing import machine
+from calmotion.benchmarks.common.timing import fresh_cache, machine
+from calmotion.cli.options import quantity
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.shot import Result
 from calmotion.shot.run import RunSettings
@@ -161,7 +160,9 @@ def main(arguments: list[str] | None = None) -> int:
     """The command: exit status 1 when a tolerance is not kept."""
     parser = bench_parser("tolerances", __doc__)
     shots_argument(parser, SAMPLES)
-    tolerances_argument(parser, TOLERANCES)
+    parser.add_argument(
+        "--tolerances", metavar="LENGTH", nargs="+", type=quantity("m", positive=True), default=list(TOLERANCES)
+    )
     output_options(parser, csv="a table", markdown=True)
     parser.add_argument(
         "--nodes", type=float, default=TIMES, metavar="N",

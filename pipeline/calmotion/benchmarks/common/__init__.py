@@ -1,1 +1,1 @@
-"""What benchmarks share: shots, tables, timing, figures."""
+"""What benchmarks share: shots, arguments, tables, timing."""

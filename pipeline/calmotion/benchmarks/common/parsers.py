@@ -6,7 +6,7 @@ import argparse
 import re
 from collections.abc import Sequence
 
-from calmotion.cli.options import json_option, quantity
+from calmotion.cli.options import json_option
 
 
 class _Paragraphs(argparse.HelpFormatter):
@@ -46,10 +46,3 @@ def shots_argument(parser: argparse.ArgumentParser, shots: Sequence[str]) -> Non
     """
     names = "the samples" if len(shots) > 2 else " and ".join(shots)
     parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(shots), help=f"USD file (default: {names})")
-
-
-def tolerances_argument(parser: argparse.ArgumentParser, tolerances: Sequence[float]) -> None:
-    """The tolerances [m] that a benchmark goes through."""
-    parser.add_argument(
-        "--tolerances", metavar="LENGTH", nargs="+", type=quantity("m", positive=True), default=list(tolerances)
-    )

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.errors import ShotError
+from calmotion import ShotError
 from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.model_choice import ON
 from calmotion.simulation.compiled_shot import CompiledShot

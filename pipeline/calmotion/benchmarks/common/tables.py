@@ -11,7 +11,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from calmotion.errors import ShotError
+from calmotion import ShotError
 
 
 def write_rows(path: str, kind: type[Any], rows: Iterable[Any]) -> None:

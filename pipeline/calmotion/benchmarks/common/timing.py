@@ -1,11 +1,13 @@
-"""Time that something takes, and where."""
+"""Time that something takes, and where; with an empty cache, so that results are computed again."""
 
 from __future__ import annotations
 
 import os
 import platform
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -44,3 +46,18 @@ def machine() -> dict[str, object]:
         "python": platform.python_version(),
         "numpy": np.__version__,
     }
+
+
+@contextmanager
+def fresh_cache() -> Iterator[None]:
+    """An empty cache folder for a while; it is not for threads."""
+    before = os.environ.get("CALMOTION_CACHE")
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["CALMOTION_CACHE"] = folder
+        try:
+            yield
+        finally:
+            if before is None:
+                del os.environ["CALMOTION_CACHE"]
+            else:
+                os.environ["CALMOTION_CACHE"] = before

@@ -1,1 +1,1 @@
-"""Comparison and stability of integrators, accuracy of gradients."""
+"""Comparison of integrators, and where each is stable."""

@@ -2,8 +2,8 @@
 
 `calmotion bench integrators [--json]` measures
 
-- errors of positions and velocities against the step, on a flexible arm with a driven joint and on a four-bar with a
-  flexible coupler, against Radau IIA at a fine step;
+- errors of positions and velocities against the step, on a flexible arm with a driven joint, against Radau IIA at a
+  fine step;
 - the outcome for two thin steel links in a fast motion at the working step: RK4 fails at once, even
   with steps thousands of times smaller, Newmark fails later, BDF2 runs to the end;
 - the numerical damping of an undamped vibration by BDF2, for several numbers of steps in a period.
@@ -13,23 +13,201 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
-from dataclasses import asdict
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
 
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import show
-from calmotion.benchmarks.integrators.integrator_errors import (
-    Fate,
-    Measured,
-    Scene,
-    arm_scene,
-    damping,
-    fates,
-    four_bar_scene,
-    order_of,
-    orders,
-    stiff_scene,
-)
+from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
+from calmotion.shot import Animation, Character, FEMeshes
+
+WORKING_STEP = 1.0 / 240.0
+SHORT = 0.1  # run time [s]
+RK4_PARTS = (1, 1000, 4000)  # of the working step
+SECOND_ORDER = ("bdf2", "newmark", "generalized-alpha")
+# steps in a sample of the motion; explicit steps must resolve the fastest mode
+STEPS: dict[str, tuple[int, ...]] = {name: (8, 16, 32, 64) for name in SECOND_ORDER}
+STEPS |= {"rk4": (32, 64, 128), "radau": (1, 2, 4, 8)}
+# a motion that starts a little later starts from rest, as its spline rings before it; and one that is sampled densely
+# has small jumps of its third derivative, whose waves only small steps resolve
+RATE, LATER = 60.0, 0.25
+FINEST = 24
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One simulation against the reference: largest error of the target [m], of any velocity [m/s, rad/s], and time."""
+
+    integrator: str
+    step_s: float
+    position_error: float
+    velocity_error: float
+    wall_s: float
+
+
+@dataclass(frozen=True)
+class Fate:
+    """Outcome of the stiff scene: `ends_s` is its duration where it ran to the end."""
+
+    integrator: str
+    step_s: float
+    outcome: str
+    ends_s: float
+    wall_s: float
+
+
+class Scene:
+    """A shot whose bodies are reduced once, to be simulated at any step by any integrator."""
+
+    def __init__(self, made: tuple[Character, FEMeshes], animation: Animation):
+        from calmotion.simulation.body_reduction import BodyReduction
+        from calmotion.simulation.compiled_shot import compile_shot
+
+        self.animation = animation
+        self.compiled = compile_shot(made[0], animation, BodyReduction(*made, None).bodies(None))
+
+    def run(self, step: float, integrator: str, seconds: float | None = None) -> Any:
+        """A `ForwardRun`, of the first seconds alone where they are given.
+
+        Raises:
+            SimulationFailure: It did not come to the end.
+        """
+        from calmotion.multibody.integrators.workspace import Workspace
+        from calmotion.shot.run import RunSettings
+        from calmotion.simulation.forward import run_forward
+        from calmotion.simulation.inputs.curves import sample_tracks
+        from calmotion.simulation.prepare import prepare
+
+        options = RunSettings(step=step, pre_roll=0.0, integrator=integrator)
+        prepared = prepare(self.compiled, options)
+        angles, rates = sample_tracks(self.animation.tracks, prepared.grid)
+        last = None if seconds is None else round(seconds / prepared.grid.h) + 1
+        workspace = Workspace.for_system(prepared.model.system)
+        world = prepared.world[:last]
+        return run_forward(
+            prepared.model, workspace, angles[:last], rates[:last], prepared.grid.h, world, integrator=integrator
+        )
+
+
+def arm_scene() -> Scene:
+    """A flexible arm on a driven joint, a quarter turn in half a second."""
+    move = quintic(np.pi / 2, 0.5, LATER)
+    return Scene(beam_arm(modes=3, elasticity="linear"), shot_of(move, LATER + 0.75, rate=RATE))
+
+
+def stiff_scene() -> Scene:
+    """Two steel links of 200 x 3 x 3 mm, both lifted by 86 degrees in 0.3 s with 150 g at the end, without damping."""
+    made = beam_arm(
+        links=2, length=0.2, thickness=0.003, youngs_modulus=2.1e11, density=7800.0, payload=0.15, damping=0.0,
+        elasticity="stvk", modes=8, cells=10,
+    )  # fmt: skip
+    return Scene(made, shot_of(quintic(1.5, 0.3), 2.0, 2))
+
+
+def orders(scene: Scene, steps: dict[str, tuple[int, ...]] = STEPS, finest: int = FINEST) -> list[Measured]:
+    """Errors at the samples of the motion, by integrator and step.
+
+    Args:
+        steps: Steps in a sample, by integrator.
+        finest: Those of the reference.
+    """
+    frame = float(scene.animation.frame_times[1])
+    reference = scene.run(frame / finest, "radau")
+    found = []
+    for integrator, counts in steps.items():
+        scene.run(frame / counts[0], integrator, 2.0 * frame)  # compiles
+        for count in counts:
+            run = scene.run(frame / count, integrator)
+            # a short run is timed more often, and the least disturbed one counts
+            again = [] if run.trajectory.wall_s > SHORT else [scene.run(frame / count, integrator) for _ in range(2)]
+            wall = min(item.trajectory.wall_s for item in (run, *again))
+            off = run.target_positions[::count] - reference.target_positions[::finest]
+            V, exact = run.trajectory.states.V[::count], reference.trajectory.states.V[::finest]
+            found.append(
+                Measured(
+                    integrator, frame / count, float(np.linalg.norm(off, axis=2).max()),
+                    float(np.abs(V - exact)[1:].max()), wall,
+                )
+            )  # fmt: skip
+    return found
+
+
+def order_of(rows: Sequence[Measured], integrator: str, error: str = "position_error") -> float:
+    """Order of an integrator: the largest slope between neighbouring steps.
+
+    Coarse steps do not resolve everything yet, and errors of fine ones reach that of the reference.
+    """
+    own = [row for row in rows if row.integrator == integrator]
+    steps, errors = np.log([row.step_s for row in own]), np.log([getattr(row, error) for row in own])
+    return float(np.max(np.diff(errors) / np.diff(steps)))
+
+
+def fates(scene: Scene, parts: Sequence[int] = RK4_PARTS) -> list[Fate]:
+    """Outcome of the stiff scene."""
+    from calmotion.multibody import SimulationFailure
+
+    cases: list[tuple[str, float, float | None]] = [(name, WORKING_STEP, None) for name in SECOND_ORDER]
+    cases += [("rk4", WORKING_STEP / part, 0.1) for part in parts]
+    found: list[Fate] = []
+    for integrator, step, seconds in cases:
+        begin, outcome, end = time.perf_counter(), "runs to the end", seconds or float(scene.animation.frame_times[-1])
+        try:
+            run = scene.run(step, integrator, seconds)
+            if run.trajectory.refined:
+                outcome = f"needs {len(run.trajectory.refined)} smaller steps"
+        except SimulationFailure as failure:
+            outcome, end = failure.reason, failure.time_s
+        found.append(Fate(integrator, step, outcome, end, time.perf_counter() - begin))
+    return found
+
+
+def damping(counts: Sequence[int] = (10, 20, 40, 80, 160)) -> list[tuple[int, float, float]]:
+    """Damping ratio that BDF2 gives an undamped vibration: (steps in a period, measured, from its root)."""
+    from calmotion.multibody.analysis.kinematics import rigid_state
+    from calmotion.multibody.analysis.modes import system_modes
+    from calmotion.multibody.integrators.simulation import simulate
+    from calmotion.multibody.integrators.workspace import Workspace
+    from calmotion.shot.run import RunSettings
+    from calmotion.simulation.prepare import prepare
+
+    scene = Scene(beam_arm(modes=1, elasticity="linear", damping=0.0, gravity=0.0), shot_of(quintic(0.0, 1.0), 1.0))
+    prepared = prepare(scene.compiled, RunSettings(pre_roll=0.0))
+    model, periods, found = prepared.model, 10, []
+    frequency = float(system_modes(model, np.zeros(len(model.motor)))[0][0])
+    for count in counts:
+        h = 1.0 / (frequency * count)
+        start = rigid_state(model, np.zeros(len(model.motor)))
+        _deflect(model, start, 1e-6)
+        none = np.zeros((periods * count + 1, len(model.motor)))
+        ws = Workspace.for_system(model.system)
+        u = simulate(model.system, start, none, none, h, ws, from_equilibrium=False).states.u[:, 0, 0]
+        # amplitudes of the first and the last period
+        first, last = np.abs(u[: count + 1]).max(), np.abs(u[-count - 1 :]).max()
+        measured = float(np.log(first / last) / (2.0 * np.pi * (periods - 1)))
+        found.append((count, measured, _root_damping(2.0 * np.pi / count)))
+    return found
+
+
+def _deflect(model: Any, start: Any, size: float) -> None:
+    """Bend the only flexible component by `size`, its load following."""
+    system = model.system
+    start.u[0, 0] = size
+    start.c[1] += system.Phi[1, 0, :, 0] * size
+    turned = 0.5 * system.Psi[1, 0, :, 0] * size
+    start.q[1] = np.array([1.0, *turned])
+    start.q[1] /= np.linalg.norm(start.q[1])
+
+
+def _root_damping(phase: float) -> float:
+    """Damping ratio of BDF2 on an oscillator of so many radians a step: from 3/2 - 2/z + 1/(2 z^2) = i phase."""
+    inverse = np.roots([0.5, -2.0, 1.5 - 1j * phase])
+    z = 1.0 / inverse
+    exponent = np.log(z[np.argmin(np.abs(z - np.exp(1j * phase)))])
+    return float(-exponent.real / np.abs(exponent))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -37,41 +215,36 @@ def main(arguments: list[str] | None = None) -> int:
     parser = bench_parser("integrators", __doc__)
     output_options(parser)
     options = parser.parse_args(arguments)
-    scenes: dict[str, Callable[[], Scene]] = {"flexible arm": arm_scene, "four-bar, flexible coupler": four_bar_scene}
-    measured = {name: orders(make()) for name, make in scenes.items()}
-    outcomes, damped = fates(stiff_scene()), damping()
+    measured, outcomes, damped = orders(arm_scene()), fates(stiff_scene()), damping()
     if options.json:
-        report: dict[str, object] = {name: [asdict(row) for row in rows] for name, rows in measured.items()}
         columns = ("steps_in_a_period", "measured", "of_the_root")
         ratios = [dict(zip(columns, row, strict=True)) for row in damped]
-        print(json.dumps({"orders": report, "stiff": [asdict(fate) for fate in outcomes], "bdf2_damping": ratios}))
+        found = {"orders": [asdict(row) for row in measured], "stiff": [asdict(fate) for fate in outcomes]}
+        print(json.dumps(found | {"bdf2_damping": ratios}))
     else:
         print_tables(measured, outcomes, damped)
     return 0
 
 
-def print_tables(
-    measured: dict[str, list[Measured]], outcomes: list[Fate], damped: list[tuple[int, float, float]]
-) -> None:
+def print_tables(measured: list[Measured], outcomes: list[Fate], damped: list[tuple[int, float, float]]) -> None:
     """The tables for a person."""
-    for name, rows in measured.items():
-        shown = [
-            [
-                row.integrator, f"{1e3 * row.step_s:.3g}", f"{row.position_error:.1e}", f"{row.velocity_error:.1e}",
-                f"{row.wall_s:.3f}",
-            ]
-            for row in rows
-        ]  # fmt: skip
-        show(f"Errors: {name}", ["integrator", "step [ms]", "position [m]", "velocity", "time [s]"], shown)
-        found = [
-            [one, *(f"{order_of(rows, one, error):.2f}" for error in ("position_error", "velocity_error"))]
-            for one in dict.fromkeys(row.integrator for row in rows)
+    rows = [
+        [
+            row.integrator, f"{1e3 * row.step_s:.3g}", f"{row.position_error:.1e}", f"{row.velocity_error:.1e}",
+            f"{row.wall_s:.3f}",
         ]
-        show(f"Orders: {name}", ["integrator", "position", "velocity"], found)
-    fated = [[f.integrator, f"{f.step_s:.2g}", f.outcome, f"{f.ends_s:.4g}", f"{f.wall_s:.2f}"] for f in outcomes]
-    show("Two thin steel links", ["integrator", "step [s]", "outcome", "at [s]", "time [s]"], fated)
-    ratios = [[str(count), f"{100 * one:.3g} %", f"{100 * other:.3g} %"] for count, one, other in damped]
-    show("Damping of BDF2", ["steps in a period", "measured", "of the root"], ratios, texts=0)
+        for row in measured
+    ]  # fmt: skip
+    show("Errors of a flexible arm", ["integrator", "step [ms]", "position [m]", "velocity", "time [s]"], rows)
+    rows = [
+        [one, *(f"{order_of(measured, one, error):.2f}" for error in ("position_error", "velocity_error"))]
+        for one in dict.fromkeys(row.integrator for row in measured)
+    ]
+    show("Orders", ["integrator", "position", "velocity"], rows)
+    rows = [[f.integrator, f"{f.step_s:.2g}", f.outcome, f"{f.ends_s:.4g}", f"{f.wall_s:.2f}"] for f in outcomes]
+    show("Two thin steel links", ["integrator", "step [s]", "outcome", "at [s]", "time [s]"], rows)
+    rows = [[str(count), f"{100 * one:.3g} %", f"{100 * other:.3g} %"] for count, one, other in damped]
+    show("Damping of BDF2", ["steps in a period", "measured", "of the root"], rows, texts=0)
 
 
 if __name__ == "__main__":

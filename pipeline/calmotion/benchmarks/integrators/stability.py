@@ -1,8 +1,8 @@
-"""Stiff and extreme scenes: each must run to its end, or be refused with a reason, without NaN.
+"""Where each integrator is stable: the swung arm over stiffness, speed or load, and step.
 
-`calmotion bench stability [--json] [--csv FILE] [--only TEXT]` simulates every case of `CASES` like a
-shot, then every cell of the maps over stiffness, speed, load and step by each integrator
-(`stability_map`), and prints the outcomes. It ends with exit status 1 when a case or a cell fails.
+`calmotion bench stability [--json] [--csv FILE] [--only TEXT]` simulates every cell of the maps by each integrator. A
+cell runs to its end or is refused with a reason, without NaN. Below an integrator's boundary all smaller steps run. It
+ends with exit status 1 when a cell fails.
 """
 
 from __future__ import annotations
@@ -15,51 +15,62 @@ from dataclasses import asdict
 
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import show, write_rows
-from calmotion.benchmarks.integrators.outcomes import CASES, FAILED, Outcome, run_case
+from calmotion.benchmarks.integrators import stability_map
+from calmotion.benchmarks.integrators.stability_map import FAILED, REFUSED, RUNS, Cell, all_cells
 
 
-def print_outcomes(outcomes: Sequence[Outcome]) -> None:
-    """The table for a person."""
-    rows = [[o.group, o.name, o.outcome, *_numbers(o)] for o in outcomes]
-    heads = ["extreme", "case", "outcome", "steps", "solves/step", "error [mm]", "gap [m]", "time [s]"]
-    show("Stiff and extreme cases", heads, rows, texts=3)
-    for outcome in outcomes:
-        if outcome.why:
-            print(f"{outcome.group}, {outcome.name}: {outcome.why}")
+def largest_steps(cells: Sequence[Cell]) -> dict[float, float | None]:
+    """The boundary of one integrator in one map: for each value the largest step from which on all smaller ones run,
+    None where the smallest does not."""
+    found: dict[float, float | None] = {}
+    for value in dict.fromkeys(cell.value for cell in cells):
+        found[value] = None
+        for cell in sorted((cell for cell in cells if cell.value == value), key=lambda cell: cell.step_s):
+            if cell.outcome != RUNS:
+                break
+            found[value] = cell.step_s
+    return found
 
 
-def _numbers(outcome: Outcome) -> list[str]:
-    if not outcome.steps:
-        return ["-"] * 5
-    return [
-        str(outcome.steps), f"{outcome.newton:.1f}", f"{1e3 * outcome.error_m:.3g}", f"{outcome.gap_m:.0e}",
-        f"{outcome.wall_s:.2f}",
-    ]  # fmt: skip
+def step_name(step: float | None) -> str:
+    """A step as a fraction of a second."""
+    return "none" if step is None else f"1/{round(1 / step)}"
+
+
+def print_cells(cells: Sequence[Cell]) -> None:
+    """The boundary of each integrator, and how many cells there are of which outcome, for a person."""
+    for name in dict.fromkeys(cell.map for cell in cells):
+        own = [cell for cell in cells if cell.map == name]
+        lines = {
+            integrator: largest_steps([cell for cell in own if cell.integrator == integrator])
+            for integrator in dict.fromkeys(cell.integrator for cell in own)
+        }
+        values = list(dict.fromkeys(cell.value for cell in own))
+        rows = [[f"{value:g}", *(step_name(line[value]) for line in lines.values())] for value in values]
+        show(f"Largest stable step [s] over {name}", [name, *lines], rows, texts=0)
+    for outcome in (RUNS, REFUSED, FAILED):
+        count = sum(cell.outcome == outcome for cell in cells)
+        print(f"{count} cells {'run' if outcome == RUNS else 'are refused' if outcome == REFUSED else 'fail'}")
+    for cell in cells:
+        if cell.outcome == FAILED:
+            print(f"{cell.map} {cell.value:g}, {step_name(cell.step_s)} s, {cell.integrator}: {cell.why}")
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """The command: exit status 1 when a case or a cell fails."""
-    from calmotion.benchmarks.integrators.stability_map import MAPS, Cell, all_cells, print_cells
-
+    """The command: exit status 1 when a cell fails."""
     parser = bench_parser("stability", __doc__)
-    output_options(parser, csv="the cells of the maps as a table")
-    parser.add_argument("--only", metavar="TEXT", default="", help="only cases and maps (`map load`) so named")
+    output_options(parser, csv="the cells as a table")
+    parser.add_argument("--only", metavar="TEXT", default="", help="only maps (`load`) so named")
     options = parser.parse_args(arguments)
     begin = time.perf_counter()
-    only = options.only.lower()
-    outcomes = [run_case(case) for case in CASES if only in f"{case.group} {case.name}".lower()]
-    maps = {name: rows for name, rows in MAPS.items() if only in f"map {name}"}
-    cells = all_cells(maps)
+    cells = all_cells({name: rows for name, rows in stability_map.MAPS.items() if options.only.lower() in name})
     if options.csv:
         write_rows(options.csv, Cell, cells)
     if options.json:
-        report = {"cases": [asdict(outcome) for outcome in outcomes], "cells": [asdict(cell) for cell in cells]}
-        print(json.dumps(report | {"total_wall_s": time.perf_counter() - begin}))
+        print(json.dumps({"cells": [asdict(cell) for cell in cells], "total_wall_s": time.perf_counter() - begin}))
     else:
-        print_outcomes(outcomes)
         print_cells(cells)
-    fates = [outcome.outcome for outcome in outcomes] + [cell.outcome for cell in cells]
-    return int(FAILED in fates)
+    return int(FAILED in [cell.outcome for cell in cells])
 
 
 if __name__ == "__main__":

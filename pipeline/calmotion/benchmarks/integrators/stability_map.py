@@ -6,20 +6,23 @@ can afford (`STEPS`); a cell that takes longer than `PATIENCE` has failed.
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from calmotion.benchmarks.common.tables import show
-from calmotion.benchmarks.integrators.outcomes import FAILED, REFUSED, RUNS, judged
+from calmotion import ShotError
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.body_reduction import BodyReduction
+from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
+from calmotion.simulation.simulate import simulate_shot
 
+RUNS, REFUSED, FAILED = "runs", "refused", "failed"
+NORM = 1e-9  # how far a quaternion's norm may be from 1
+REACH = 1.5  # times the arm's length: a target beyond it has flown away
 IMPLICIT = (1 / 24, 1 / 48, 1 / 120, 1 / 240, 1 / 480, 1 / 2400)
 STEPS: dict[str, tuple[float, ...]] = {
     "bdf2": IMPLICIT,
@@ -79,42 +82,13 @@ MAPS: dict[str, Rows] = {
 }
 
 
-class _Patience(Exception):
-    """A cell took too long."""
-
-
-@contextmanager
-def within(seconds: float) -> Iterator[None]:
-    """Interrupt what takes longer, where the system can: in the main thread of a POSIX process.
-
-    Compiled loops are interrupted as they return, which each does after a bounded number of steps.
-    """
-    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def stop(number: int, frame: Any) -> None:
-        raise _Patience(_late(seconds))
-
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
-
-
-def _late(seconds: float) -> str:
-    return f"took longer than {seconds:g} s"
+def all_cells(maps: Mapping[str, Rows], steps: Mapping[str, Sequence[float]] | None = None) -> list[Cell]:
+    """The cells of all maps."""
+    return [cell for name, rows in maps.items() for cell in cells_of(name, rows, steps)]
 
 
 def cells_of(name: str, rows: Rows, steps: Mapping[str, Sequence[float]] | None = None) -> list[Cell]:
     """The cells of one map; a row's bodies are reduced once."""
-    from calmotion.shot.run import RunSettings
-    from calmotion.simulation.body_reduction import BodyReduction
-    from calmotion.simulation.compiled_shot import compile_shot
-
     found = []
     for value in rows[1]:
         (character, meshes), animation = rows[2](value)
@@ -127,60 +101,32 @@ def cells_of(name: str, rows: Rows, steps: Mapping[str, Sequence[float]] | None 
                     beginning = replace(animation, frame_times=np.array([0.0, BEGINNING * step]))
                     shot = replace(whole, animation=beginning)
                 options = RunSettings(step=step, integrator=integrator, pre_roll=0.0 if brief else None)
-                try:
-                    with within(PATIENCE):
-                        item = judged(rows[0], f"{value:g}", shot, options, CLOSED)
-                    outcome, why, error = item.outcome, item.why, item.error_m
-                except _Patience as late:
-                    outcome, why, error = FAILED, str(late), float("nan")
-                if outcome == FAILED and time.perf_counter() - begin >= PATIENCE:
-                    why = _late(PATIENCE)  # an interrupted library may raise an error of its own
-                found.append(
-                    Cell(
-                        name, value, step, integrator, outcome, why, None if brief or not np.isfinite(error) else error,
-                        time.perf_counter() - begin,
-                    )
-                )  # fmt: skip
+                outcome, why, error = judged(shot, options)
+                wall = time.perf_counter() - begin
+                if wall > PATIENCE:
+                    outcome, why, error = FAILED, f"took longer than {PATIENCE:g} s", None
+                found.append(Cell(name, value, step, integrator, outcome, why, None if brief else error, wall))
     return found
 
 
-def all_cells(maps: Mapping[str, Rows], steps: Mapping[str, Sequence[float]] | None = None) -> list[Cell]:
-    """The cells of all maps."""
-    return [cell for name, rows in maps.items() for cell in cells_of(name, rows, steps)]
-
-
-def largest_steps(cells: Sequence[Cell]) -> dict[float, float | None]:
-    """The boundary of one integrator in one map: for each value the largest step from which on all smaller ones run,
-    None where the smallest does not."""
-    found: dict[float, float | None] = {}
-    for value in dict.fromkeys(cell.value for cell in cells):
-        found[value] = None
-        for cell in sorted((cell for cell in cells if cell.value == value), key=lambda cell: cell.step_s):
-            if cell.outcome != RUNS:
-                break
-            found[value] = cell.step_s
-    return found
-
-
-def step_name(step: float | None) -> str:
-    """A step as a fraction of a second."""
-    return "none" if step is None else f"1/{round(1 / step)}"
-
-
-def print_cells(cells: Sequence[Cell]) -> None:
-    """The boundary of each integrator, and how many cells there are of which outcome, for a person."""
-    for name in dict.fromkeys(cell.map for cell in cells):
-        own = [cell for cell in cells if cell.map == name]
-        lines = {
-            integrator: largest_steps([cell for cell in own if cell.integrator == integrator])
-            for integrator in dict.fromkeys(cell.integrator for cell in own)
-        }
-        values = list(dict.fromkeys(cell.value for cell in own))
-        rows = [[f"{value:g}", *(step_name(line[value]) for line in lines.values())] for value in values]
-        show(f"Largest stable step [s] over {name}", [name, *lines], rows, texts=0)
-    for outcome in (RUNS, REFUSED, FAILED):
-        count = sum(cell.outcome == outcome for cell in cells)
-        print(f"{count} cells {'run' if outcome == RUNS else 'are refused' if outcome == REFUSED else 'fail'}")
-    for cell in cells:
-        if cell.outcome == FAILED:
-            print(f"{cell.map} {cell.value:g}, {step_name(cell.step_s)} s, {cell.integrator}: {cell.why}")
+def judged(shot: CompiledShot, options: RunSettings) -> tuple[str, str, float | None]:
+    """Simulate a shot: the outcome, its reason, and the largest error of the tip [m] where it came to its end."""
+    try:
+        simulation = simulate_shot(shot, options, lambda fraction, message: None).before
+    except ShotError as error:
+        return REFUSED, str(error), None
+    except Exception as error:  # whatever it is, it is what this looks for
+        return FAILED, f"{type(error).__name__}: {error}", None
+    motion = simulation.motion
+    parts = (motion.positions, motion.rotations, motion.target_positions, motion.motor_efforts, *motion.elastic)
+    reach = sum(float(np.linalg.norm(joint.frame0.position)) for joint in shot.character.joints if joint.body0 >= 0)
+    wrong = ""
+    if not all(np.all(np.isfinite(part)) for part in parts):
+        wrong = "not a number"
+    elif np.linalg.norm(motion.target_positions, axis=2).max() > REACH * reach:
+        wrong = "the target flew away"
+    elif simulation.max_joint_gap > CLOSED:
+        wrong = f"a joint came apart by {simulation.max_joint_gap:.1e} m"
+    elif np.abs(np.linalg.norm(motion.rotations, axis=2) - 1.0).max() > NORM:
+        wrong = "a quaternion lost its length"
+    return (FAILED, wrong, None) if wrong else (RUNS, "", float(simulation.position_errors.max()))

@@ -21,19 +21,17 @@ import time
 from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from calmotion import ShotError
 from calmotion.benchmarks.common.parsers import bench_parser
 from calmotion.benchmarks.common.tables import markdown, resumed_rows, say, write_rows
 from calmotion.benchmarks.links.robots import survey_robots
 from calmotion.benchmarks.links.survey import LinkRow
 from calmotion.benchmarks.links.tables import done, summary, survey_tables
-from calmotion.benchmarks.scenes.links import Link, attachments_of, file_of, frames_of, links_of_all
-from calmotion.benchmarks.scenes.mesher import mesher
-from calmotion.errors import ShotError
+from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, links_of_all, mesher
 
 _REFINED = "refined"  # word for a row of it
 _AUTO = "auto"  # word for the automatic mesh among element sizes
@@ -48,7 +46,7 @@ class Row:
         link: Name.
         size: Element size [mm]; not a number: the automatic mesh; 0: that mesh, refined.
         nodes: Of the ten-node tetrahedra.
-        mesh_time, reduce_time: [s].
+        mesh_time: [s].
         f1, f2, f3: First frequencies [Hz], held by the parent's joint; elastic ones of the free body without.
         error: Largest relative difference of the three to the mesh with the most nodes [%].
         estimate: Largest error of the three estimated on this mesh alone [%]; of the automatic mesh what is reported.
@@ -60,7 +58,6 @@ class Row:
     size: float
     nodes: int
     mesh_time: float
-    reduce_time: float
     f1: float
     f2: float
     f3: float
@@ -113,29 +110,25 @@ def _refined(link: Link, mesh: Any, nodes: int) -> Row:
     start = time.perf_counter()
     effort = Effort(_FINEST, int(nodes / 0.6), 0.0)
     finer = refined_for_frequencies(mesh, link.body, link.carrier, effort, attachments_of(link))
-    row = _row(link, 0.0, finer, time.perf_counter() - start, False)
+    row = _row(link, 0.0, finer, time.perf_counter() - start)
     return replace(row, estimate=100.0 * (finer.quality.frequency_error or 0.0))
 
 
-def _row(link: Link, size: float, mesh: Any, mesh_time: float, reduces: bool = True) -> Row:
+def _row(link: Link, size: float, mesh: Any, mesh_time: float) -> Row:
     from calmotion.reduction.discretization_error import frequency_errors
     from calmotion.reduction.elements.assembly import assemble
     from calmotion.reduction.interfaces.interface_patches import interface_patches
-    from calmotion.reduction.reduce import reduce_body
 
     settings = link.body.flexible
     assert settings is not None
     model = assemble(mesh.points, mesh.tets, settings.material)
-    clamped, reduce_time = None, float("nan")
+    clamped = None
     if link.carrier is not None:
-        joints = attachments_of(link)
         try:
-            radius = settings.interface_radius
-            clamped = interface_patches(model.mesh, joints, radius, link.body.path, mesh.patches)[0].nodes
-            start = time.perf_counter()
-            if reduces:
-                reduce_body(mesh, link.body, joints, (), 0)
-                reduce_time = time.perf_counter() - start
+            patches = interface_patches(
+                model.mesh, attachments_of(link), settings.interface_radius, link.body.path, mesh.patches
+            )
+            clamped = patches[0].nodes
         except ShotError:
             clamped = None  # a joint off the link's surface is not a property of its mesh
     frequencies, errors = frequency_errors(model, settings.material, 3, clamped)
@@ -145,7 +138,6 @@ def _row(link: Link, size: float, mesh: Any, mesh_time: float, reduces: bool = T
         size=1e3 * size,
         nodes=len(model.mesh.nodes),
         mesh_time=mesh_time,
-        reduce_time=reduce_time,
         f1=float(frequencies[0]),
         f2=float(frequencies[1]),
         f3=float(frequencies[2]),
@@ -181,7 +173,7 @@ def _length(text: str, automatic: float) -> float:
 def table(rows: Sequence[Row]) -> str:
     """The rows as a Markdown table."""
     heads = [
-        "link", "size mm", "nodes", "mesh s", "reduce s", "f1 Hz", "f2 Hz", "f3 Hz", "error %", "estimate %",
+        "link", "size mm", "nodes", "mesh s", "f1 Hz", "f2 Hz", "f3 Hz", "error %", "estimate %",
         "volume %", "held",
     ]  # fmt: skip
     shown = ([_size(row.size) if k == 1 else _cell(value) for k, value in enumerate(astuple(row))] for row in rows)
@@ -233,7 +225,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--resume", action="store_true", help="keep the links that the file of --csv has")
     options = parser.parse_args(arguments)
     known: list[LinkRow] = [] if options.sizes else resumed_rows(parser, options, LinkRow)
-    found = [(link, Path(file_of(source)).stem) for source, link in links_of_all(options.links, say)]
+    found = list(links_of_all(options.links, say))
     if options.sizes:
         return _study_all([link for link, _ in found], options)
     rows = survey_robots(found, options, known)

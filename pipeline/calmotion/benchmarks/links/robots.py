@@ -12,8 +12,7 @@ import numpy as np
 
 from calmotion.benchmarks.common.tables import say, write_rows
 from calmotion.benchmarks.links.survey import LinkRow, faulty_row, same_row, survey_link
-from calmotion.benchmarks.scenes.links import Link, frames_of
-from calmotion.benchmarks.scenes.mesher import mesher
+from calmotion.benchmarks.scenes.links import Link, frames_of, mesher
 from calmotion.reduction.cache import cache_key
 from calmotion.support.processes.workers import Fault, results_of
 

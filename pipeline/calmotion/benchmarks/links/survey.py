@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from calmotion import ShotError
 from calmotion.benchmarks.common.timing import processor_time
-from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of
-from calmotion.benchmarks.scenes.mesher import mesher
-from calmotion.errors import ShotError
+from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, mesher
 from calmotion.shot import FEMesh
 from calmotion.support.processes.workers import Fault
 

@@ -1,1 +1,1 @@
-"""Benchmarks of motors that give: what they cost, and what commands for them bring."""
+"""Motors that give, and what commands for them bring."""

@@ -1,1 +1,1 @@
-"""Gauss-Newton against L-BFGS, and input shapers as baselines."""
+"""Gradients, Gauss-Newton against L-BFGS, and input shapers as baselines."""

@@ -1,8 +1,8 @@
-"""Gauss-Newton against a quasi-Newton method, and run times of gradients and products.
+"""Gauss-Newton against a quasi-Newton method.
 
 `calmotion bench optimizer [SHOT ...]` optimises each shot by Gauss-Newton and by L-BFGS (scipy) on the same exact
 gradient, and reports the time until each is within 1% of the converged objective, in forward simulations of the
-same shot in the same run. It then times one gradient and one Gauss-Newton product for 10 to 2000 unknowns.
+same shot in the same run.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ import json
 import sys
 import time
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
-from functools import partial
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -68,17 +67,6 @@ class Convergence:
     products: int
     seconds: float | None
     simulations: float | None
-
-
-@dataclass(frozen=True)
-class Cost:
-    """Time of one gradient and of one product over that of one forward simulation, for a number of unknowns."""
-
-    shot: str
-    unknowns: int
-    forward_s: float
-    gradient: float
-    product: float
 
 
 def make_problem(shot: CompiledShot, prepared: Prepared, spacing: float) -> RetargetProblem:
@@ -190,24 +178,19 @@ def _lbfgs(problem: RetargetProblem, most: int, enough: float) -> tuple[Array, l
     return best, trace
 
 
-def costs(name: str, shot: CompiledShot) -> list[Cost]:
-    """Gradient and product for 10 to 2000 unknowns: knots closer and closer, on the same simulation."""
-    prepared = prepare(shot, RunSettings())
-    end, motors = float(prepared.grid.frame_times[-1]), len(shot.character.motors)
-    rows: list[Cost] = []
-    # every instant may carry a knot here, so that there can be more unknowns than frames times motors
-    grid = prepared.grid
-    prepared = replace(prepared, grid=replace(grid, frame_times=grid.times[grid.pre_steps :], substeps=1))
-    for wanted in (10, 50, 200, 2000):
-        problem = make_problem(shot, prepared, end * motors / wanted)
-        if rows and problem.size == rows[-1].unknowns:
-            continue
-        zero = np.zeros(problem.size)
-        forward = median_time(partial(problem.value, zero))
-        gradient = median_time(problem.linearize)
-        product = median_time(partial(problem.product, np.random.default_rng(0).normal(size=problem.size)))
-        rows.append(Cost(name, problem.size, forward, gradient / forward, product / forward))
-    return rows
+HEADS = ("method", "largest error", "objective / converged", "simulations", "products", "cost to 1% [simulations]")
+
+
+def cells(rows: list[Convergence]) -> list[list[str]]:
+    """The table for a person, without its heads."""
+    return [
+        [
+            row.method, f"{row.largest_before_mm:.1f} -> {row.largest_after_mm:.2f} mm",
+            f"{row.objective / row.converged:.4g}", str(row.evaluations), str(row.products),
+            "-" if row.simulations is None else f"{row.simulations:.1f}",
+        ]
+        for row in rows
+    ]  # fmt: skip
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -218,34 +201,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--lbfgs", type=int, default=400, help="most evaluations of L-BFGS")
     options = parser.parse_args(arguments)
     converged: list[Convergence] = []
-    timed: list[Cost] = []
     for path in options.shots:
-        name, shot = Path(path).stem, load(path)
-        own_costs, own = costs(name, shot), compare(name, shot, options.lbfgs)
-        timed += own_costs
+        own = compare(Path(path).stem, load(path), options.lbfgs)
         converged += own
         if not options.json:
-            print_tables(own, own_costs)
+            show(f"{own[0].shot}: convergence", HEADS, cells(own))
     if options.json:
-        print(json.dumps({"convergence": [asdict(r) for r in converged], "costs": [asdict(r) for r in timed]}))
+        print(json.dumps({"convergence": [asdict(row) for row in converged]}))
     return 0
-
-
-def print_tables(converged: list[Convergence], timed: list[Cost]) -> None:
-    """The tables of one shot for a person."""
-    rows = [
-        [
-            row.method, f"{row.largest_before_mm:.1f} -> {row.largest_after_mm:.2f} mm",
-            f"{row.objective / row.converged:.4g}", str(row.evaluations), str(row.products),
-            "-" if row.simulations is None else f"{row.simulations:.1f}",
-        ]
-        for row in converged
-    ]  # fmt: skip
-    heads = ["method", "largest error", "objective / converged", "simulations", "products", "cost to 1% [simulations]"]
-    show(f"{converged[0].shot}: convergence", heads, rows)
-    rows = [[str(row.unknowns), f"{row.forward_s:.3f} s", f"{row.gradient:.2f}", f"{row.product:.2f}"] for row in timed]
-    heads = ["unknowns", "simulation", "gradient / simulation", "product / simulation"]
-    show(f"{converged[0].shot}: cost", heads, rows, texts=0)
 
 
 if __name__ == "__main__":

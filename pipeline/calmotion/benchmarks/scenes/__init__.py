@@ -1,1 +1,1 @@
-"""Characters and mechanisms that benchmarks build."""
+"""Characters that benchmarks build or read."""

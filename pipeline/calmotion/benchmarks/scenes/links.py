@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calmotion.errors import ShotError
+from calmotion import ShotError
 from calmotion.shot import Body, ElasticMaterial, FlexibleSettings, Frame, MassProperties
 
 if TYPE_CHECKING:
@@ -86,8 +88,8 @@ def read_links(source: str) -> list[Link]:
     return links
 
 
-def links_of_all(sources: Iterable[str], say: Callable[[str], None]) -> Iterator[tuple[str, Link]]:
-    """The links that each of some sources names, with the source; of what cannot be read only the reason is told.
+def links_of_all(sources: Iterable[str], say: Callable[[str], None]) -> Iterator[tuple[Link, str]]:
+    """The links that each of some sources names, with the name of its file; of what cannot be read the reason is told.
 
     Args:
         sources: As of `read_links`.
@@ -99,12 +101,7 @@ def links_of_all(sources: Iterable[str], say: Callable[[str], None]) -> Iterator
         except ShotError as error:
             say(str(error))
             continue
-        yield from ((source, link) for link in links)
-
-
-def file_of(source: str) -> str:
-    """The file of FILE or FILE:PRIM."""
-    return _split(source)[0]
+        yield from ((link, Path(_split(source)[0]).stem) for link in links)
 
 
 def _split(source: str) -> tuple[str, str]:
@@ -148,3 +145,11 @@ def attachments_of(link: Link) -> list[AttachmentFrame]:
     from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 
     return [AttachmentFrame(f"joint {k}", frame, "interface") for k, frame in enumerate(frames_of(link))]
+
+
+def mesher() -> Any:
+    """The module of the bundled mesher that makes meshes, as the host loads it."""
+    from calmotion.host import open_host
+
+    operator = open_host().operators["fe.mesh"]
+    return import_module(operator.__module__.rsplit(".", 1)[0] + ".body_mesh")

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +11,7 @@ from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.identification.parameters import robot_parameters
 from calmotion.identification.robots import Robot, robot_with
 from calmotion.identification.signals import Signals, signals_of
-from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody import SimulationFailure
 from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.discretization_error import frequency_errors
 from calmotion.reduction.elements.assembly import assemble
@@ -29,7 +27,6 @@ from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 REFERENCE = RunSettings(step=1.0 / 3840.0, integrator="newmark")  # of the real robot, and half of it
 RATES = {MARKER: 120.0, ACCELEROMETER: 800.0, ANGLE: 200.0}  # of the sensors [Hz]
 NOISE = {MARKER: 3e-4, ACCELEROMETER: 0.1, ANGLE: 3e-4}  # [m], [m/s^2], [rad]
-COLUMNS = {MARKER: "xyz", ACCELEROMETER: ("ax", "ay", "az"), ANGLE: ("angle",)}  # of their tables
 BIAS, PLACE, DRIFT = 0.2, 1e-3, 3e-5  # standard deviations of what sensors have of their own
 MISSING, OUTLIERS = 0.01, 0.003  # shares of the samples
 AFTER = 0.6  # what is recorded after the end of the shot [s]
@@ -79,7 +76,7 @@ def recorded_arm(number: int, finer: bool = False) -> RecordedArm:
     values = {p.name: p.value(max(float(v), p.least)) for p, v in zip(parameters, x, strict=True)}
     truth = {(p.kind, p.path, p.axis): values[p.name] for p in parameters}
     signals = _reference(robot_with(real, truth))
-    recordings = recorded(model.character, signals, rng, 1)
+    recordings = _recorded(model.character, signals, rng)
     return RecordedArm(model, recordings, values)
 
 
@@ -139,18 +136,15 @@ def _halved(robot: Robot, options: RunSettings) -> tuple[Signals, Signals]:
     return coarse, signals_of(robot, replace(options, step=0.5 * options.step), AFTER)
 
 
-def recorded(
-    character: Character, signals: Signals, rng: np.random.Generator, targets: int | None = None
-) -> tuple[SensorRecording, ...]:
-    """A camera system and accelerometers at the first targets, all by default, and the encoders, each on its own clock.
+def _recorded(character: Character, signals: Signals, rng: np.random.Generator) -> tuple[SensorRecording, ...]:
+    """A marker and an accelerometer at the first target, and the encoders, each on its own clock.
 
     Args:
         character: With targets and motors.
         signals: What they do.
         rng: Of noise, clocks, biases and places.
-        targets: Number of targets with sensors.
     """
-    loads, end = [target.path for target in character.targets[:targets]], float(signals.times[-1])
+    loads, end = [character.targets[0].path], float(signals.times[-1])
     motors = [motor.path for motor in character.motors]
     found = []
     for kind, paths in ((MARKER, loads), (ACCELEROMETER, loads), (ANGLE, motors)):
@@ -167,19 +161,6 @@ def recorded(
             channels.append(Channel(kind, path, start + own / (1.0 + drift), values))
         found.append(SensorRecording(f"{kind}.csv", f"{kind}", tuple(channels)))
     return tuple(found)
-
-
-def written(recording: SensorRecording, path: Path) -> str:
-    """Write a recording whose channels have common times as the table that `calibrate` reads; returns its path."""
-    heads, columns = ["time_s"], [recording.channels[0].times[:, None]]
-    for channel in recording.channels:
-        heads += [f"{channel.path}.{name}" for name in COLUMNS[channel.kind]]
-        columns.append(channel.values)
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(heads)
-        writer.writerows(["" if np.isnan(v) else f"{v:.9g}" for v in row] for row in np.hstack(columns))
-    return str(path)
 
 
 def _disturbed(values: Array, noise: float, rng: np.random.Generator) -> Array:

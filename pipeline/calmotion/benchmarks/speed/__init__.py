@@ -1,1 +1,1 @@
-"""Run time against problem size: scaling, reduction, meshing, reading."""
+"""Where the time of a run goes, and how it grows."""

@@ -1,7 +1,7 @@
 """The benchmark of both adjoints, on a small shot."""
 
 import pytest
-from calmotion.benchmarks.integrators import gradients
+from calmotion.benchmarks.optimizer import gradients
 from made_shots import plastic_shot
 
 

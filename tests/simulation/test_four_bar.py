@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from calmotion.benchmarks.scenes.beam_arm import quintic, shot_of
-from calmotion.benchmarks.scenes.four_bar import COUPLER, CRANK, GROUND, ROCKER, corners, four_bar
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot.run import RunSettings
@@ -14,6 +13,7 @@ from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.intended_motion import rigid_motion
 from calmotion.simulation.prepare import prepare
+from four_bar import COUPLER, CRANK, GROUND, ROCKER, corners, four_bar
 
 
 def test_its_corners_are_as_far_apart_as_its_bars_are_long():

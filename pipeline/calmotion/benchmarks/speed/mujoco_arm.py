@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 
-from calmotion.benchmarks.scenes.exudyn_arm import (
+from calmotion.benchmarks.speed.exudyn_arm import (
     DURATION,
     FIXED_MODES,
     LENGTH,
@@ -25,13 +25,6 @@ from calmotion.shot.character import Array
 
 HINGES = 6 + FIXED_MODES
 HUB = 1e6  # inertia of the hub [kg m^2]: the arm turns it by a millionth of the motion
-
-
-def installed() -> bool:
-    """Whether MuJoCo can be imported."""
-    from importlib.util import find_spec
-
-    return find_spec("mujoco") is not None
 
 
 def accelerations(times: Array) -> Array:

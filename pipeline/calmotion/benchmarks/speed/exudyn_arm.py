@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.benchmarks.integrators.integrator_errors import Scene
+from calmotion.benchmarks.integrators.integrators import Scene
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, beam_mesh, quintic, shot_of
 from calmotion.reduction.elements.assembly import FEModel, assemble
 from calmotion.shot import ElasticMaterial
@@ -37,13 +37,6 @@ class Run:
     steps: int
     error: float
     wall_s: float
-
-
-def installed() -> bool:
-    """Whether Exudyn can be imported."""
-    from importlib.util import find_spec
-
-    return find_spec("exudyn") is not None
 
 
 @dataclass(frozen=True, eq=False)

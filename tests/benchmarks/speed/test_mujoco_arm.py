@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.scenes import exudyn_arm, mujoco_arm
+from calmotion.benchmarks.speed import exudyn_arm, mujoco_arm
 
 pytest.importorskip("mujoco")
 

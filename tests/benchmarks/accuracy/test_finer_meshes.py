@@ -1,7 +1,7 @@
 """Meshes of references have as many more nodes as they should, and the same loads."""
 
 import pytest
-from calmotion.benchmarks.common.finer_meshes import with_more_nodes
+from calmotion.benchmarks.accuracy.reference_bench import with_more_nodes
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.reduction.elements.assembly import quadratic_mesh
 from calmotion.shot.run import RunSettings

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-
 from calmotion.benchmarks.scenes.beam_arm import LIFTS, beam_mesh
 from calmotion.shot import (
     Body,
@@ -21,6 +19,7 @@ from calmotion.shot import (
     Target,
 )
 from calmotion.shot.character import WORLD, Array
+from scipy.spatial.transform import Rotation
 
 # crank, coupler, rocker and ground [m]: a crank-rocker (Grashof: 0.12 + 0.5 < 0.4 + 0.42)
 CRANK, COUPLER, ROCKER, GROUND = 0.12, 0.42, 0.4, 0.5
