@@ -6,7 +6,8 @@ import sys
 import warnings
 
 import pytest
-from calmotion.cli.output import own_messages, printable
+from calmotion.cli.output import own_messages
+from calmotion.cli.signals import prepare_streams
 from calmotion.cli.tables import console_on, print_table
 
 
@@ -39,13 +40,11 @@ def test_warnings_are_errors_where_the_user_says_so(no_filters):
         warnings.warn("invalid value in divide", RuntimeWarning, stacklevel=1)
 
 
-def test_a_stream_of_ascii_gets_plain_characters(monkeypatch):
+def test_a_stream_of_ascii_replaces_what_it_does_not_have(monkeypatch):
     stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
     monkeypatch.setattr(sys, "stdout", stream)
-    with printable():
-        print_table(console_on(sys.stdout), "9.81 m/s²", ["motor", "at"], [["/Robot/机", "90°"]])
+    prepare_streams()
+    print_table(console_on(sys.stdout), "9.81 m/s²", ["motor", "at"], [["/Robot/机", "90°"]])
     stream.flush()
-    assert stream.buffer.getvalue().decode().splitlines() == [
-        "9.81 m/s^2", "motor      at", "--------  ---", "/Robot/?  90 deg"
-    ]  # fmt: skip
-    assert stream.errors == "strict"
+    text = stream.buffer.getvalue().decode()
+    assert "9.81 m/s?" in text and "/Robot/?" in text and "90?" in text

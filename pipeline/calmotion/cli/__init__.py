@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from calmotion.cli.output import FAILED, INTERRUPTED, Output, conclude, notice
     from calmotion.cli.progress import ProgressDisplay
     from calmotion.cli.quantities import angle, counted, length, measured, quantity_in
-    from calmotion.cli.sentences import unbroken
     from calmotion.cli.tables import console_on, print_table, say
 
 __all__ = [
@@ -56,7 +55,6 @@ __all__ = [
     "shot_arguments",
     "simulation_arguments",
     "simulation_options",
-    "unbroken",
 ]
 
 _HOMES = {
@@ -68,7 +66,6 @@ _HOMES = {
     "cli.output": ("FAILED", "INTERRUPTED", "Output", "conclude", "notice"),
     "cli.progress": ("ProgressDisplay",),
     "cli.quantities": ("angle", "counted", "length", "measured", "quantity_in"),
-    "cli.sentences": ("unbroken",),
     "cli.tables": ("console_on", "print_table", "say"),
 }  # fmt: skip
 

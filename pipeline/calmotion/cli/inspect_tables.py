@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.quantities import angle, counted, frequency, length, memory
 from calmotion.cli.reports.left_out import print_left_out
-from calmotion.cli.run_report import NOTHING_SHAKES, prim_paths, print_notes
-from calmotion.cli.sentences import unbroken
+from calmotion.cli.run_report import NOTHING_SHAKES, print_notes
 from calmotion.cli.tables import console_on, print_table, say
 from calmotion.shot.motor import DRIVE, ON_ERROR, ON_JOINT, PRESCRIBED, SERVO
 from calmotion.shot.outputs import ERROR, WARNING
@@ -23,7 +22,7 @@ def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
     if "findings" in report:
         _print_findings(console_on(stream), report)
     else:
-        _print_contents(console_on(stream, prim_paths(report)), report)
+        _print_contents(console_on(stream), report)
 
 
 def _print_findings(console: Console, report: dict[str, Any]) -> None:
@@ -35,13 +34,13 @@ def _print_findings(console: Console, report: dict[str, Any]) -> None:
                 say(console, f"  {label}: {finding[label]}")
     levels = [finding["level"] for finding in report["findings"]]
     counts = ", ".join(counted(levels.count(level), level) for level in (ERROR, WARNING))
-    say(console, f"{unbroken(report['shot'])}: {counts if levels else 'no findings'}")
+    say(console, f"{report['shot']}: {counts if levels else 'no findings'}")
 
 
 def _print_contents(console: Console, report: dict[str, Any]) -> None:
     units = report["units"]
     frames = counted(report["frames"], "frame")
-    say(console, f"{unbroken(report['shot'])}: {report['character']}, {frames}, {report['duration_s']:.4g} s")
+    say(console, f"{report['shot']}: {report['character']}, {frames}, {report['duration_s']:.4g} s")
     _print_answer(console, report)
     gravity = ", ".join(f"{component:.4g}" for component in report["gravity_m_s2"])
     say(
@@ -51,14 +50,14 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
         f"gravity ({gravity}) m/s²",
     )
     for layer in report["earlier_layers"]:
-        say(console, f"contains an optimised layer: {unbroken(layer)}")
+        say(console, f"contains an optimised layer: {layer}")
     bodies = [_body_row(body) for body in report["bodies"]]
     print_table(console, "Bodies", ["body", "kind", "mass", "elements", "frequencies"], bodies, texts=2)
     solids = [_solid_row(body) for body in report["bodies"] if "solid" in body]
     print_table(console, "Solids of flexible bodies", ["body", "made of", "volume", "frequency error"], solids, texts=2)
     for body in report["bodies"]:
         for note in body.get("solid_notes", ()):
-            say(console, f"{unbroken(body['path'])}: {note}")
+            say(console, f"{body['path']}: {note}")
     print_table(
         console,
         "Joints",
@@ -86,7 +85,7 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
     _print_gains(console, report)
     print_left_out(console, report["left_out"])
     if report["mode_shapes"]:
-        say(console, f"mode shapes: {', '.join(map(unbroken, report['mode_shapes']))}")
+        say(console, f"mode shapes: {', '.join(report['mode_shapes'])}")
     print_notes(console, report["notes"])
 
 
@@ -107,7 +106,7 @@ def _print_answer(console: Console, report: dict[str, Any]) -> None:
         )
         return
     say(console, _expected(report["expected"]))
-    say(console, f"next: calmotion simulate {unbroken(shlex.quote(report['shot']))} shows how much it shakes")
+    say(console, f"next: calmotion simulate {shlex.quote(report['shot'])} shows how much it shakes")
 
 
 def _expected(row: dict[str, Any]) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from calmotion.cli.commands.table import BUILT_IN, all_commands
 from calmotion.cli.parser import Parser, add_examples, overview
-from calmotion.cli.signals import as_interrupts, ignore, open_closed_streams
+from calmotion.cli.signals import as_interrupts, ignore, prepare_streams
 from calmotion.errors import ShotError
 from calmotion.version import __version__
 
@@ -30,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
     if arguments is None:
-        open_closed_streams()
+        prepare_streams()
     with as_interrupts(ends=arguments is None):
         try:
             return _run(given)
@@ -56,11 +56,10 @@ def _run(given: list[str]) -> int:
         from calmotion.cli.output import Output
 
         return _refused(error, Output(sys.stdout, "--json" in given))
-    from calmotion.cli.output import own_messages, print_fault, printable, protected_stdout, refuse_missing_folder
+    from calmotion.cli.output import own_messages, print_fault, protected_stdout
 
-    with printable(), protected_stdout(getattr(args, "json", False)) as output, own_messages():
+    with protected_stdout(getattr(args, "json", False)) as output, own_messages():
         try:
-            refuse_missing_folder()
             status: int = args.command(args, output)
             return status
         except ShotError as error:

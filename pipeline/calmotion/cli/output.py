@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import json
+import logging
 import os
+import shutil
 import sys
+import textwrap
 import traceback
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any, TextIO
+from typing import IO, Any, TextIO
 
-from calmotion.cli.sentences import width_of, wrapped
 from calmotion.errors import ShotError, each, failure_of_machine
 from calmotion.host import Host
 from calmotion.support.memory import was_short
@@ -68,51 +70,20 @@ def own_messages() -> Iterator[None]:
 
     Where warnings are errors (`python -W error`), or an option of Python names those to show, they are left alone.
     """
-    import logging
-    import warnings
-
-    class Notices(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            notice(f"{record.levelname.lower()}: {record.getMessage()}")
-
-    # The handler of the root takes messages that no one else takes, which Python would print on stderr.
-    handlers = ((logging.getLogger("calmotion"), Notices()), (logging.getLogger(), logging.NullHandler()))
+    own, root = logging.getLogger("calmotion"), logging.getLogger()
+    notices, silence = logging.Handler(), logging.NullHandler()  # without one at the root, Python prints on stderr
+    notices.emit = lambda record: notice(f"{record.levelname.lower()}: {record.getMessage()}")  # type: ignore[method-assign]
     os.environ.setdefault("RUST_LOG", "off")  # rerun would print messages of its own besides its exceptions
     with warnings.catch_warnings():
         if not sys.warnoptions and all(action != "error" for action, *_ in warnings.filters):
             warnings.simplefilter("ignore")
-        for logger, handler in handlers:
-            logger.addHandler(handler)
+        own.addHandler(notices)
+        root.addHandler(silence)
         try:
             yield
         finally:
-            for logger, handler in handlers:
-                logger.removeHandler(handler)
-
-
-_PLAIN = {"…": "...", "─": "-", "━": "-", "°": " deg", "²": "^2", "³": "^3", "–": "-", "’": "'"}
-
-
-@contextmanager
-def printable() -> Iterator[None]:
-    """Let streams that cannot encode a character, such as those of the locale C, print a plain one."""
-    import codecs
-
-    def plain_text(error: UnicodeError) -> tuple[str, int]:
-        if not isinstance(error, UnicodeEncodeError):
-            raise error
-        return "".join(_PLAIN.get(letter, "?") for letter in error.object[error.start : error.end]), error.end
-
-    codecs.register_error("calmotion.plain", plain_text)
-    changed = [stream for stream in (sys.stdout, sys.stderr) if isinstance(stream, io.TextIOWrapper)]
-    before = [stream.errors for stream in changed]
-    for stream in changed:
-        stream.reconfigure(errors="calmotion.plain")
-    try:
-        yield
-    finally:
-        for stream, errors in zip(changed, before, strict=True):
-            stream.reconfigure(errors=errors or "strict")
+            own.removeHandler(notices)
+            root.removeHandler(silence)
 
 
 def _descriptor(stream: TextIO) -> int | None:
@@ -144,21 +115,6 @@ def _print_problems(problems: Sequence[Problem], output: Output) -> None:
     except OSError:
         with suppress(OSError):
             conclude({}, problems, Output(sys.stderr, False))
-
-
-def refuse_missing_folder() -> None:
-    """Refuse to run in a folder that was removed meanwhile.
-
-    Raises:
-        ShotError: The working folder is gone.
-    """
-    try:
-        os.getcwd()
-    except OSError as error:
-        raise ShotError(
-            "the folder in which the command runs does not exist any more", path=os.environ.get("PWD", "."),
-            found=error.strerror, remedy="Change into a folder that is there",
-        ) from error  # fmt: skip
 
 
 def conclude(
@@ -211,4 +167,30 @@ def tell_error(error: ShotError) -> None:
 
 def notice(text: str, indent: str = "  ") -> None:
     """Print a sentence on stderr, wrapped on a terminal."""
-    print(wrapped(text, width_of(sys.stderr), indent), file=sys.stderr, flush=True)
+    print(filled(text, sys.stderr, indent), file=sys.stderr, flush=True)
+
+
+def width_of(stream: IO[str]) -> int | None:
+    """Characters of a line on a stream; None in a file, unless COLUMNS gives it, as for other programs."""
+    limited = stream.isatty() or os.environ.get("COLUMNS", "").isdigit()
+    return max(shutil.get_terminal_size().columns, 20) if limited else None
+
+
+def filled(text: str, stream: IO[str], indent: str = "  ") -> str:
+    """A text whose lines are wrapped between words where the stream is a terminal; no word is broken.
+
+    Args:
+        text: One or several lines.
+        stream: Where it will be printed.
+        indent: Before each further line of what is wrapped.
+    """
+    width = width_of(stream)
+    if width is None:
+        return text
+    return "\n".join(
+        textwrap.fill(
+            line, width, subsequent_indent=" " * (len(line) - len(line.lstrip())) + indent,
+            break_long_words=False, break_on_hyphens=False,
+        )
+        for line in text.split("\n")
+    )  # fmt: skip

@@ -9,8 +9,7 @@ import sys
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from calmotion.cli.output import notice
-from calmotion.cli.sentences import width_of, wrapped
+from calmotion.cli.output import filled, notice
 from calmotion.host import OperatorResult, Outcome
 from calmotion.workflow.run import Progress as Stage
 
@@ -81,7 +80,7 @@ class ProgressDisplay:
 
     def _tell(self, line: str) -> None:
         if self._bars:
-            self._bars.console.print(wrapped(line, width_of(sys.stderr)), markup=False, highlight=False, soft_wrap=True)
+            self._bars.console.print(filled(line, sys.stderr), markup=False, highlight=False, soft_wrap=True)
         else:
             notice(line)
 

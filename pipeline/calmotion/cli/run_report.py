@@ -13,8 +13,7 @@ from calmotion.cli.quantities import about, angle, length
 from calmotion.cli.reports.feet import print_contacts, print_support
 from calmotion.cli.reports.left_out import print_left_out
 from calmotion.cli.reports.limits import print_limits, print_reason
-from calmotion.cli.sentences import unbroken
-from calmotion.cli.tables import console_on, paths_in, print_table, say
+from calmotion.cli.tables import console_on, print_table, say
 from calmotion.shot.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
 
 # What helps where an entry of the error budget is too large.
@@ -210,7 +209,7 @@ def print_run(report: dict[str, Any], stream: TextIO, verbose: bool = False) -> 
         stream: Where it is printed.
         verbose: Whether the search, the steps, the error budget and the notes are printed as well.
     """
-    console = console_on(stream, prim_paths(report))
+    console = console_on(stream)
     print_verdict(console, report)
     print_errors(console, report, verbose)
     print_robustness(console, report)
@@ -222,12 +221,6 @@ def print_run(report: dict[str, Any], stream: TextIO, verbose: bool = False) -> 
         print_work(console, report)
         print_notes(console, report["notes"])
     print_left_out(console, report["left_out"], verbose)
-
-
-def prim_paths(report: dict[str, Any]) -> list[str]:
-    """The prims that sentences of a report name."""
-    named = [row["path"] for kind in ("targets", "motors", "bodies") for row in report.get(kind, ())]
-    return named + paths_in([row["what"] for row in report["left_out"]])
 
 
 def print_errors(console: Console, report: dict[str, Any], verbose: bool = False) -> None:
@@ -250,22 +243,22 @@ def print_files(console: Console, report: dict[str, Any]) -> None:
     """What was written, and what to do with it."""
     for name in ("layer", "root_layer", "rrd", "video", "csv"):
         if report[name]:
-            say(console, f"wrote {unbroken(report[name])}")
+            say(console, f"wrote {report[name]}")
     figures = [Path(figure) for figure in report["figures"]]
     for folder in dict.fromkeys(figure.parent for figure in figures):
         names = ", ".join(figure.name for figure in figures if figure.parent == folder)
-        say(console, f"wrote {names} in {unbroken(folder)}")
+        say(console, f"wrote {names} in {folder}")
     if report["root_layer"]:
         shown_with = "the new curves" if _last(report) else "the simulated motion"
-        say(console, f"next: open {unbroken(report['root_layer'])}, which shows the shot with {shown_with}")
+        say(console, f"next: open {report['root_layer']}, which shows the shot with {shown_with}")
     if report["rrd"]:
-        say(console, f"next: rerun {unbroken(report['rrd'])}")
+        say(console, f"next: rerun {report['rrd']}")
     shakes = _shakes(report)
     if not report["can_shake"] and not shakes:
         say(console, NOTHING_SHAKES)
         say(console, "next: apply CalmFlexibleBodyAPI to links that bend")
     elif not _last(report):
-        command = f"calmotion optimize {unbroken(shlex.quote(report['shot']))} -o LAYER"
+        command = f"calmotion optimize {shlex.quote(report['shot'])} -o LAYER"
         if shakes:
             say(console, f"next: {command} removes the shake")
         else:

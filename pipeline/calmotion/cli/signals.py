@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import stat
@@ -77,11 +78,11 @@ def _leave_terminal() -> None:
     os.close(nowhere)
 
 
-def open_closed_streams() -> None:
-    """Open standard streams that are closed on the null device.
+def prepare_streams() -> None:
+    """Open standard streams that are closed on the null device, and let all replace characters that they do not have.
 
-    Python has None for them then, and the next file that is opened gets the number of the stream: what a library prints
-    would go into that file.
+    Python has None for closed ones, and the next file that is opened gets the number of the stream: what a library
+    prints would go into that file.
     """
     for number in (0, 1, 2):
         try:
@@ -91,3 +92,6 @@ def open_closed_streams() -> None:
     for name, number in (("stdout", 1), ("stderr", 2)):
         if getattr(sys, name) is None:
             setattr(sys, name, open(number, "w", encoding="utf-8", errors="replace", closefd=False))
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")

@@ -102,9 +102,7 @@ def _next(report: dict[str, Any]) -> str:
     """What makes curves of the robot, or what it lacks for that."""
     import shlex
 
-    from calmotion.cli.sentences import unbroken
-
-    layer = unbroken(shlex.quote(str(report["layer"])))
+    layer = shlex.quote(str(report["layer"]))
     if report["frames"] < 2:
         return f"import again with --motion FILE, or animate the motors; calmotion inspect {layer} shows them"
     if not report["flexible"]:

@@ -40,7 +40,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
     from calmotion.cli.quantities import angle
-    from calmotion.cli.sentences import unbroken
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
@@ -56,7 +55,7 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     print_table(console, "Rotating joints", ["joint", "body", "hinges", "residual angle"], rows, texts=2)
     for target in report["targets"]:
         say(console, f"target: {target}")
-    say(console, f"wrote {unbroken(report['layer'])}, which is a shot")
+    say(console, f"wrote {report['layer']}, which is a shot")
     if not report["flexible"]:
         say(console, "all links are rigid: apply CalmFlexibleBodyAPI, or add --set rig.skeleton.flexible=all")
-    say(console, f"next: calmotion inspect {unbroken(shlex.quote(report['layer']))} shows how stiff it is")
+    say(console, f"next: calmotion inspect {shlex.quote(report['layer'])} shows how stiff it is")

@@ -102,10 +102,10 @@ def _operator(cls: type[Operator]) -> dict[str, Any]:
 
 
 def _print_plugin(plugin: Plugin, output: Output, verbose: bool) -> None:
-    from calmotion.cli.sentences import width_of, wrapped
+    from calmotion.cli.output import filled
 
     def tell(line: str) -> None:
-        print(wrapped(line, width_of(output.stream), " " * 8), file=output.stream)
+        print(filled(line, output.stream, " " * 8), file=output.stream)
 
     manifest = plugin.manifest
     version = f" {manifest.version}" if manifest else ""

@@ -118,7 +118,6 @@ def _went(row: dict[str, Any]) -> str:
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
     from calmotion.cli.quantities import counted, quantity_in
-    from calmotion.cli.sentences import unbroken
     from calmotion.cli.tables import console_on, say
 
     console = console_on(stream)
@@ -140,9 +139,9 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
             say(console, f"{row['name']} is not identifiable from these recordings: {row['advice']}")
     for file in (report["layer"], report["root"], *report["figures"]):
         if file:
-            say(console, f"wrote {unbroken(file)}")
+            say(console, f"wrote {file}")
     if report["root"]:
-        say(console, f"next: calmotion optimize {unbroken(report['root'])} -o LAYER makes curves for this robot")
+        say(console, f"next: calmotion optimize {report['root']} -o LAYER makes curves for this robot")
     for note in report["notes"]:
         say(console, f"note: {note}")
     measurement = [row for row in report["parameters"] if not row["of_robot"]]

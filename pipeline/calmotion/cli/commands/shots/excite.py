@@ -78,7 +78,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
     from calmotion.cli.quantities import counted, quantity_in
-    from calmotion.cli.sentences import unbroken
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
@@ -99,11 +98,11 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         ["parameter", "of", "in the shot", "before", "after a chirp", "after this motion", "identifiable"], rows,
         texts=2,
     )  # fmt: skip
-    say(console, f"wrote {unbroken(report['layer'])}")
+    say(console, f"wrote {report['layer']}")
     say(
         console,
-        f"next: play it on the robot (calmotion export {unbroken(report['layer'])} writes commands), record it, and "
-        f"calmotion calibrate {unbroken(report['layer'])} --recording FILE -o LAYER",
+        f"next: play it on the robot (calmotion export {report['layer']} writes commands), record it, and "
+        f"calmotion calibrate {report['layer']} --recording FILE -o LAYER",
     )
     rows = [
         [row["path"], *(f"{row[name]:.3g}" for name in ("excursion", "velocity", "acceleration", "effort")),
@@ -122,16 +121,15 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
 def _collisions(report: dict[str, Any]) -> list[str]:
     """What is known of collisions."""
     from calmotion.cli.quantities import length
-    from calmotion.cli.sentences import unbroken
 
     told, unchecked = [], report["unchecked_pairs"]
     if report["clearances"]:
         nearest = min(report["clearances"], key=lambda row: row["least_m"])
-        one, other = map(unbroken, nearest["bodies"])
+        one, other = nearest["bodies"]
         least = length(nearest["least_m"])
         told.append(f"bodies of the robot that no joint connects stay {least} apart or more ({one} and {other})")
     if unchecked:
-        pairs = ", ".join(f"{unbroken(one)} and {unbroken(other)}" for one, other in unchecked[:3])
+        pairs = ", ".join(f"{one} and {other}" for one, other in unchecked[:3])
         more = f" and {len(unchecked) - 3} more pairs" if len(unchecked) > 3 else ""
         told.append(f"not checked for collisions, almost touching in the first pose or in closed chains: {pairs}{more}")
     return [*told, "collisions with what is not a body of the robot are not checked: look at the motion first"]

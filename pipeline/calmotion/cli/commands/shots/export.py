@@ -85,7 +85,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
     from calmotion.cli.quantities import counted, length
-    from calmotion.cli.sentences import unbroken
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
@@ -98,7 +97,7 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     if report["searched"] and lowest:
         say(console, f"The lowest rate that keeps it: {lowest} Hz.")
     for file in report["files"]:
-        say(console, f"wrote {unbroken(file)}")
+        say(console, f"wrote {file}")
     if kept:
         say(console, "next: the page 'Exporting for a controller' of the documentation tells how the file is played")
     elif lowest:

@@ -64,7 +64,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
     from calmotion.cli.quantities import length, measured, quantity_in
-    from calmotion.cli.sentences import unbroken
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
@@ -102,11 +101,10 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     )  # fmt: skip
     for file in (report["layer"], report["root"], report["model"], report["model_root"]):
         if file:
-            say(console, f"wrote {unbroken(file)}")
+            say(console, f"wrote {file}")
     say(
         console,
-        f"next: play {unbroken(report['root'])} in take {report['take'] + 1}, record it, and run calmotion refine "
-        f"again",
+        f"next: play {report['root']} in take {report['take'] + 1}, record it, and run calmotion refine again",
     )
     for note in report["notes"]:
         say(console, f"note: {note}")

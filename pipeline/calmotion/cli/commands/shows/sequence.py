@@ -52,7 +52,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
     from calmotion.cli.quantities import length
-    from calmotion.cli.sentences import unbroken
     from calmotion.cli.tables import console_on, print_table, say
 
     console, members = console_on(stream), [*report["clips"], *report["transitions"]]
@@ -71,7 +70,7 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     for member in members:
         if member["problem"]:
             say(console, f"{member['name']}: {member['problem']['problem']}")
-    say(console, f"wrote {unbroken(report['folder'] + '/sequence.md')}")
+    say(console, f"wrote {report['folder'] + '/sequence.md'}")
     layers = [member["layer"] for member in members if member["good"] and member["layer"]]
     if not report["good"]:
         say(
@@ -82,7 +81,7 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     if layers:
         several = " (one for each clip and transition)" if len(layers) > 1 else ""
         command = f"calmotion export {shlex.quote(layers[0])} --to csv --rate 100 -o FILE"
-        say(console, f"next: {unbroken(command)} writes commands for a controller{several}")
+        say(console, f"next: {command} writes commands for a controller{several}")
 
 
 def _name(row: dict[str, Any]) -> str:
