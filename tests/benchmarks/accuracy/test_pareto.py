@@ -17,7 +17,6 @@ def points():
     return [
         Point("a", "bdf2", "fast and wrong", 0.1, 1, 0.1, 2e-3),
         Point("a", "radau", "fails", 0.1, 1, np.nan, np.nan),
-        Point("a", "elements", "another body", 0.1, 1, 0.1, 1e-9),
         Point("a", "newmark", "fastest", 0.1, 1, 0.5, 9e-4),
         Point("a", "tolerance", "1 mm", 0.1, 1, 0.8, 5e-4),
     ]

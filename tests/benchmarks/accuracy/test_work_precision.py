@@ -15,7 +15,7 @@ from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 @pytest.fixture(scope="module")
 def bench():
     character, meshes = beam_arm(payload=0.1, damping=0.02)
-    shot = Unreduced("arm", "arm.usda", character, shot_of(quintic(0.8, 0.35, 0.1), 0.75), meshes, 0.05)
+    shot = Unreduced("arm", character, shot_of(quintic(0.8, 0.35, 0.1), 0.75), meshes)
     return Bench(shot, repeats=1)
 
 

@@ -1,15 +1,14 @@
 """How honest the estimated errors are: random shots, each simulated to a tolerance and compared with a finer run.
 
-`calmotion bench estimates [--count N] [--first K] [--csv FILE [--resume]] [--figures DIR]` draws arms of one or two
-slender links with a load, of random size, material and motion, simulates each to a random tolerance as the program
-chooses, and measures the result against a simulation with regular meshes of some ten times the nodes, a reduction
-that is refined until it moves no target by more than a tenth of the estimate, and a step that is extrapolated to zero.
-How well that is known is measured too, by coarser regular meshes and by the last refinement of its reduction. Shot
-number K is the same on every machine; `--resume` goes on with the shots that the CSV file does not have. The table and
-the histogram count the shots by their error over their estimate: below one the estimate is on the safe side. A
-reference that is known to no better than half of the error and half of the estimate decides nothing, and its shot is
-counted apart. Shots that may be on the other side of 0.05 or 1, as their reference is known no better, are counted on
-both.
+`calmotion bench estimates [--count N] [--first K] [--csv FILE [--resume]]` draws arms of one or two slender links with
+a load, of random size, material and motion, simulates each to a random tolerance as the program chooses, and measures
+the result against a simulation with regular meshes of some ten times the nodes, a reduction that is refined until it
+moves no target by more than a tenth of the estimate, and a step that is extrapolated to zero. How well that is known is
+measured too, by coarser regular meshes and by the last refinement of its reduction. Shot number K is the same on every
+machine; `--resume` goes on with the shots that the CSV file does not have. The table counts the shots by their error
+over their estimate: below one the estimate is on the safe side. A reference that is known to no better than half of the
+error and half of the estimate decides nothing, and its shot is counted apart. Shots that may be on the other side of
+0.05 or 1, as their reference is known no better, are counted on both.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.pod_subspace import ReferenceRun, project_to_subspace, reference_run
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.accuracy.step_error import StepRun, distance, frames_of, simulate_at
-from calmotion.benchmarks.accuracy.figures import HONEST, LIMIT, draw_estimates
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import finish, resumed_rows, say, write_rows
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, beam_mesh, quintic, shot_of
@@ -39,6 +37,7 @@ from calmotion.shot.run import RunSettings
 from calmotion.simulation.body_reduction import BodyReduction, reduction_for
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 
+HONEST, LIMIT = (0.05, 1.0), 1.5  # where errors over estimates are to be, and what none may exceed
 EDGES = (0.0, HONEST[0], 0.1, 0.2, 0.5, HONEST[1], LIMIT, np.inf)  # of the classes of error over estimate
 MESH_ACCURACY, MAX_NODES = 0.01, 15_000  # of the first meshes, as of the mesher
 MESHES = ((3, 2), (4, 3))  # of references: cells along a link over those of the first mesh, and across; the last counts
@@ -243,7 +242,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=200, help="number of shots (default: 200)")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first shot (default: 0)")
     parser.add_argument("--resume", action="store_true", help="keep the shots that the file of --csv has")
-    parser.add_argument("--figures", metavar="DIR", help="also draw the histogram to DIR/estimates.png")
     output_options(parser, csv="a row for each shot", markdown=True)
     options = parser.parse_args(arguments)
     rows: list[Judged] = resumed_rows(parser, options, Judged)
@@ -265,8 +263,6 @@ def main(arguments: list[str] | None = None) -> int:
             write_rows(options.csv, Judged, rows)
     if not rows:
         return 1
-    if options.figures:
-        draw_estimates(options.figures, [row.ratio for row in rows], [row.decides for row in rows])
     found = {"rows": [asdict(row) | {"ratio": row.ratio, "decides": row.decides} for row in rows]}
     finish(options, "Random shots by error over estimate", HEADS, counts(rows), found)
     return int(any(row.decides and row.ratio > LIMIT for row in rows))

@@ -215,7 +215,7 @@ def over_fastest(points: Sequence[Point], tolerances: Sequence[float]) -> dict[f
     for tolerance in tolerances:
         choice = chosen.get(setting_of(tolerance))
         if choice is not None:
-            keeping = [p for p in points if p.series != "elements" and p.error_m <= tolerance]
+            keeping = [p for p in points if p.error_m <= tolerance]
             fastest = min(keeping, key=lambda p: p.wall_s, default=choice)
             ratios[tolerance] = choice.wall_s / fastest.wall_s, fastest
     return ratios

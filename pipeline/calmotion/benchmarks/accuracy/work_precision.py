@@ -1,7 +1,7 @@
 """Error against run time for all settings of the simulation, against a reference with a measured error.
 
 `calmotion bench work-precision [SHOT ...] [--csv FILE] [--figures DIR]` simulates each shot as animated with many
-settings: step and integrator, reduction, POD subspace, elastic law, elements, and the choices of `--tolerance`. The
+settings: step and integrator, reduction, POD subspace, elastic law, and the choices of `--tolerance`. The
 error is the largest distance of any target, at any frame, to a reference with a much smaller step and many more
 coordinates. The error of the reference is shown as its error bar; smaller errors cannot be compared. Times are medians
 of the simulation. The choices for each tolerance are compared with the fastest setting that keeps the tolerance.
@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from calmotion.benchmarks.accuracy import work_precision_points
-from calmotion.benchmarks.accuracy.figures import draw_work_precision
 from calmotion.benchmarks.accuracy.reference_bench import REPEATS, TOLERANCES, Bench, Point, over_fastest, setting_of
+from calmotion.benchmarks.accuracy.work_precision_figure import draw_work_precision
 from calmotion.benchmarks.common.parsers import bench_parser, output_options, shots_argument
 from calmotion.benchmarks.common.shots import SAMPLES, load_unreduced
 from calmotion.benchmarks.common.tables import show, write_rows
@@ -46,7 +46,6 @@ def main(arguments: list[str] | None = None) -> int:
     shots_argument(parser, SAMPLES)
     output_options(parser, csv="a table")
     parser.add_argument("--figures", metavar="DIR", help="also draw error against run time, to this folder")
-    parser.add_argument("--elements", action="store_true", help="also vary the element size; takes long")
     parser.add_argument("--repeats", type=int, default=REPEATS, help="repetitions; times are medians")
     options = parser.parse_args(arguments)
     points: dict[str, list[Point]] = {}
@@ -58,8 +57,6 @@ def main(arguments: list[str] | None = None) -> int:
         bars[name] = reference.bar_m
         points[name] = work_precision_points.forward_points(bench, reference)
         points[name] += work_precision_points.chosen_points(bench, reference)
-        if options.elements:
-            points[name] += work_precision_points.element_points(bench)
         if options.csv:  # the next shot may take long
             write_rows(options.csv, Point, [point for own in points.values() for point in own])
         if options.figures:

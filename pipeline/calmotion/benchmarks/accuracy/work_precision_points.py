@@ -11,7 +11,6 @@ from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.simulate_to_tolerance import project_to_tolerance
 from calmotion.accuracy.step_choice import chosen_step
 from calmotion.benchmarks.accuracy.reference_bench import BASE, TOLERANCES, Bench, Point, Reference, setting_of
-from calmotion.benchmarks.common.shots import load_unreduced
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.body_reduction import reduction_for
@@ -26,7 +25,6 @@ LEVELS = (5e-4, 5e-6)  # what holding bodies to directions may change in the run
 DIRECTIONS = (1e-3, 1e-4, 1e-5, 1e-6)  # and in those that vary it
 CUBATURE = 1e-3  # the reduction of Neo-Hookean bodies: their cubature takes minutes for finer ones [m]
 REDUCTIONS = (1e-2, 1e-3, 1e-4, BASE, 1e-6)
-ELEMENTS = (2.0, 1.4, 1.0, 0.7)  # edge lengths over those of the mesh that the shot gets
 
 
 def forward_points(bench: Bench, reference: Reference) -> list[Point]:
@@ -80,15 +78,3 @@ def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float
 
 def _step_and_integrator(shot: CompiledShot, left_out: float, options: RunSettings) -> tuple[float, str]:
     return chosen_step(shot, options, left_out)[0], options.scheme
-
-
-def element_points(bench: Bench, factors: Sequence[float] = ELEMENTS) -> list[Point]:
-    """Sizes of elements, against the smallest of them: a finer mesh is another body, with its own limit."""
-    benches = [Bench(load_unreduced(bench.shot.path, factor * bench.shot.edge), bench.repeats) for factor in factors]
-    fine = 0.5 * MAX_STEP
-    runs = [(other, other.bodies(BASE)) for other in benches]
-    finest = Reference(runs[-1][0].run(runs[-1][1], fine).positions, 0.0)
-    return [
-        other.measure(finest, "elements", f"{1e3 * factor * bench.shot.edge:.3g} mm", bodies, fine)
-        for factor, (other, bodies) in zip(factors[:-1], runs[:-1], strict=True)
-    ]

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from calmotion import ShotError
 from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.model_choice import ON
@@ -19,40 +17,27 @@ SAMPLES = tuple(f"samples/{name}/{name}.usda" for name in ("bartender", "dancer"
 
 @dataclass(frozen=True, eq=False)
 class Unreduced:
-    """A shot with its meshes, to be reduced in one way and another; `path` is that of its file.
-
-    Attributes:
-        edge: Mean edge of the elements [m].
-    """
+    """A shot with its meshes, to be reduced in one way and another."""
 
     name: str
-    path: str
     character: Character
     animation: Animation
     meshes: FEMeshes
-    edge: float
 
 
-def load_unreduced(path: str, element_size: float | None = None) -> Unreduced:
+def load_unreduced(path: str) -> Unreduced:
     """A shot by its file.
-
-    Args:
-        element_size: Edge of the elements [m]; None: automatic.
 
     Raises:
         ShotError: It cannot be read, or nothing is flexible.
     """
     # everything is kept, so that what could be left out can be compared with it
-    settings: dict[str, dict[str, object]] = {
-        "accuracy.analyse": dict.fromkeys(("bodies", "turning", "loops", "motors"), ON)
-    }
-    if element_size is not None:
-        settings["fe.mesh"] = {"element_size": element_size}
+    kept: dict[str, object] = dict.fromkeys(("bodies", "turning", "loops", "motors"), ON)
+    settings = {"accuracy.analyse": kept}
     character, animation, meshes = _processed(path, "simulate", (Character, Animation, FEMeshes), settings)
     if character is None or animation is None or meshes is None:
         raise ShotError("has nothing flexible to reduce", path=path)
-    edges = [np.linalg.norm(m.points[m.tets[:, 0]] - m.points[m.tets[:, 1]], axis=1) for m in meshes.meshes]
-    return Unreduced(Path(path).stem, path, character, animation, meshes, float(np.mean(np.concatenate(edges))))
+    return Unreduced(Path(path).stem, character, animation, meshes)
 
 
 def load(path: str, rigid: bool = False) -> CompiledShot:

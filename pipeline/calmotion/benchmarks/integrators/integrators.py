@@ -1,12 +1,11 @@
-"""Comparison of the integrators: orders, a stiff nonlinear scene, and the numerical damping of BDF2.
+"""Comparison of the integrators: orders, and a stiff nonlinear scene.
 
 `calmotion bench integrators [--json]` measures
 
 - errors of positions and velocities against the step, on a flexible arm with a driven joint, against Radau IIA at a
   fine step;
 - the outcome for two thin steel links in a fast motion at the working step: RK4 fails at once, even
-  with steps thousands of times smaller, Newmark fails later, BDF2 runs to the end;
-- the numerical damping of an undamped vibration by BDF2, for several numbers of steps in a period.
+  with steps thousands of times smaller, Newmark fails later, BDF2 runs to the end.
 """
 
 from __future__ import annotations
@@ -165,68 +164,20 @@ def fates(scene: Scene, parts: Sequence[int] = RK4_PARTS) -> list[Fate]:
     return found
 
 
-def damping(counts: Sequence[int] = (10, 20, 40, 80, 160)) -> list[tuple[int, float, float]]:
-    """Damping ratio that BDF2 gives an undamped vibration: (steps in a period, measured, from its root)."""
-    from calmotion.multibody.analysis.kinematics import rigid_state
-    from calmotion.multibody.analysis.modes import system_modes
-    from calmotion.multibody.integrators.simulation import simulate
-    from calmotion.multibody.integrators.workspace import Workspace
-    from calmotion.shot.run import RunSettings
-    from calmotion.simulation.prepare import prepare
-
-    scene = Scene(beam_arm(modes=1, elasticity="linear", damping=0.0, gravity=0.0), shot_of(quintic(0.0, 1.0), 1.0))
-    prepared = prepare(scene.compiled, RunSettings(pre_roll=0.0))
-    model, periods, found = prepared.model, 10, []
-    frequency = float(system_modes(model, np.zeros(len(model.motor)))[0][0])
-    for count in counts:
-        h = 1.0 / (frequency * count)
-        start = rigid_state(model, np.zeros(len(model.motor)))
-        _deflect(model, start, 1e-6)
-        none = np.zeros((periods * count + 1, len(model.motor)))
-        ws = Workspace.for_system(model.system)
-        u = simulate(model.system, start, none, none, h, ws, from_equilibrium=False).states.u[:, 0, 0]
-        # amplitudes of the first and the last period
-        first, last = np.abs(u[: count + 1]).max(), np.abs(u[-count - 1 :]).max()
-        measured = float(np.log(first / last) / (2.0 * np.pi * (periods - 1)))
-        found.append((count, measured, _root_damping(2.0 * np.pi / count)))
-    return found
-
-
-def _deflect(model: Any, start: Any, size: float) -> None:
-    """Bend the only flexible component by `size`, its load following."""
-    system = model.system
-    start.u[0, 0] = size
-    start.c[1] += system.Phi[1, 0, :, 0] * size
-    turned = 0.5 * system.Psi[1, 0, :, 0] * size
-    start.q[1] = np.array([1.0, *turned])
-    start.q[1] /= np.linalg.norm(start.q[1])
-
-
-def _root_damping(phase: float) -> float:
-    """Damping ratio of BDF2 on an oscillator of so many radians a step: from 3/2 - 2/z + 1/(2 z^2) = i phase."""
-    inverse = np.roots([0.5, -2.0, 1.5 - 1j * phase])
-    z = 1.0 / inverse
-    exponent = np.log(z[np.argmin(np.abs(z - np.exp(1j * phase)))])
-    return float(-exponent.real / np.abs(exponent))
-
-
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("integrators", __doc__)
     output_options(parser)
     options = parser.parse_args(arguments)
-    measured, outcomes, damped = orders(arm_scene()), fates(stiff_scene()), damping()
+    measured, outcomes = orders(arm_scene()), fates(stiff_scene())
     if options.json:
-        columns = ("steps_in_a_period", "measured", "of_the_root")
-        ratios = [dict(zip(columns, row, strict=True)) for row in damped]
-        found = {"orders": [asdict(row) for row in measured], "stiff": [asdict(fate) for fate in outcomes]}
-        print(json.dumps(found | {"bdf2_damping": ratios}))
+        print(json.dumps({"orders": [asdict(row) for row in measured], "stiff": [asdict(fate) for fate in outcomes]}))
     else:
-        print_tables(measured, outcomes, damped)
+        print_tables(measured, outcomes)
     return 0
 
 
-def print_tables(measured: list[Measured], outcomes: list[Fate], damped: list[tuple[int, float, float]]) -> None:
+def print_tables(measured: list[Measured], outcomes: list[Fate]) -> None:
     """The tables for a person."""
     rows = [
         [
@@ -243,8 +194,6 @@ def print_tables(measured: list[Measured], outcomes: list[Fate], damped: list[tu
     show("Orders", ["integrator", "position", "velocity"], rows)
     rows = [[f.integrator, f"{f.step_s:.2g}", f.outcome, f"{f.ends_s:.4g}", f"{f.wall_s:.2f}"] for f in outcomes]
     show("Two thin steel links", ["integrator", "step [s]", "outcome", "at [s]", "time [s]"], rows)
-    rows = [[str(count), f"{100 * one:.3g} %", f"{100 * other:.3g} %"] for count, one, other in damped]
-    show("Damping of BDF2", ["steps in a period", "measured", "of the root"], rows, texts=0)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ WHAT = {
     "estimates": ("accuracy.estimates", "estimated against measured error, on random shots"),
     "calibration": ("accuracy.calibration", "known parameters of random arms, found from noisy recordings"),
     "meshing": ("links.meshing", "links of robots: their solids, meshes, frequencies and errors"),
-    "integrators": ("integrators.integrators", "orders and numerical damping of the integrators"),
+    "integrators": ("integrators.integrators", "orders of the integrators, and a stiff scene"),
     "stability": ("integrators.stability", "maps of each integrator over stiffness, speed, load and step"),
     "gradients": ("optimizer.gradients", "both adjoints against differences"),
     "optimizer": ("optimizer.optimizer", "Gauss-Newton and a quasi-Newton method"),

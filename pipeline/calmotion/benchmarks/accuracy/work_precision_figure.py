@@ -1,18 +1,14 @@
-"""The figures of `estimates` and `work_precision`."""
+"""The figure of `work_precision`: error against run time, the Pareto front, and the choices of the program."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from calmotion.benchmarks.accuracy.reference_bench import Point, front
 
-LEAST, MOST, BINS = 0.01, 10.0, 30  # of the axis; ratios beyond are counted at its ends
-HONEST, LIMIT = (0.05, 1.0), 1.5  # where estimates are to be, and what no error may exceed
-INK, SAFE, UNDECIDED = "#22313f", "#4a86b8", "#c9d3dc"
 COLORS = {
     "bdf2": "#0072b2", "newmark": "#d55e00", "generalized-alpha": "#e69f00", "rk4": "#999999", "radau": "#009e73",
 }  # fmt: skip
@@ -23,41 +19,7 @@ STYLES = {
     "directions": ("#f0e442", "P--"),
     "modes": ("#56b4e9", "s--"),
     "law": ("#cc79a7", "^:"),
-    "elements": ("#999999", "v--"),
 }
-
-
-def draw_estimates(folder: str, ratios: Sequence[float], decide: Sequence[bool]) -> str:
-    """Draw the histogram to `<folder>/estimates.png`; returns the path.
-
-    Args:
-        folder: Where it is written.
-        ratios: Error over estimate of each shot.
-        decide: Whether the reference of each is known well enough.
-    """
-    from matplotlib.figure import Figure
-
-    within = np.clip(ratios, LEAST, MOST)
-    known = np.asarray(decide, dtype=bool)
-    figure = Figure(figsize=(6.4, 3.0), layout="constrained")
-    panel: Any = figure.subplots()
-    edges = np.geomspace(LEAST, MOST, BINS + 1)
-    panel.hist(
-        [within[known], within[~known]], edges, stacked=True, color=[SAFE, UNDECIDED], edgecolor="white", linewidth=0.5,
-        label=[f"{known.sum()} shots", f"{(~known).sum()} whose reference decides nothing"],
-    )  # fmt: skip
-    panel.axvspan(*HONEST, color=SAFE, alpha=0.1, lw=0, zorder=0)
-    panel.axvline(LIMIT, color=INK, lw=1.0, ls=(0, (3, 2)))
-    panel.set_xscale("log")
-    panel.set_xlim(LEAST, MOST)
-    ticks = (0.01, 0.05, 0.1, 0.2, 0.5, 1.0, 1.5, 3.0, 10.0)
-    panel.set_xticks(ticks, [f"{tick:g}" for tick in ticks], minor=False)
-    panel.set_xticks([], minor=True)
-    panel.yaxis.get_major_locator().set_params(integer=True)
-    panel.set_xlabel("measured error over estimated error", color=INK)
-    panel.set_ylabel("random shots", color=INK)
-    panel.legend(frameon=False, loc="upper left", fontsize=8)
-    return _saved(figure, panel, folder, "estimates")
 
 
 def draw_work_precision(folder: str, points: Sequence[Point], bar: float) -> str:
@@ -71,8 +33,7 @@ def draw_work_precision(folder: str, points: Sequence[Point], bar: float) -> str
 
     figure = Figure(figsize=(9.0, 5.6), layout="constrained")
     axes = figure.add_subplot()
-    comparable = [p for p in points if p.series != "elements" and np.isfinite(p.error_m)]
-    best = front(comparable)
+    best = front(points)
     axes.step(
         [p.wall_s for p in best], [1e3 * p.error_m for p in best], where="post", color="0.8", lw=5, zorder=0,
         label="Pareto front",
@@ -81,13 +42,12 @@ def draw_work_precision(folder: str, points: Sequence[Point], bar: float) -> str
         in_series = [p for p in points if p.series == series and np.isfinite(p.error_m)]
         if not in_series:
             continue
-        label = "elements (against the finest mesh)" if series == "elements" else series
         sizes = [0] if series not in COLORS else sorted({p.coordinates for p in in_series})
         for size in sizes:  # a line for each number of coordinates
             line = [p for p in in_series if p.coordinates == size] if size else in_series
             axes.loglog(
                 [p.wall_s for p in line], [1e3 * p.error_m for p in line], style, color=color, ms=4, lw=1,
-                label=label if size == sizes[0] else None,
+                label=series if size == sizes[0] else None,
             )  # fmt: skip
     chosen = [p for p in points if p.series == "tolerance"]
     axes.loglog(
@@ -106,15 +66,10 @@ def draw_work_precision(folder: str, points: Sequence[Point], bar: float) -> str
     axes.set_ylabel("largest error of any target [mm]")
     axes.set_title(f"{points[0].shot}, simulated as animated", loc="left", fontsize=10)
     figure.legend(frameon=False, fontsize=8, loc="outside right upper")  # over the points it would hide some
-    return _saved(figure, axes, folder, f"work_precision_{points[0].shot}")
-
-
-def _saved(figure: Any, panel: Any, folder: str, name: str) -> str:
-    """Write a figure with a light grid and no frame above and to the right to `<folder>/<name>.png`; returns that."""
-    panel.grid(True, which="major", lw=0.3, alpha=0.6)
+    axes.grid(True, which="major", lw=0.3, alpha=0.6)
     for side in ("top", "right"):
-        panel.spines[side].set_visible(False)
+        axes.spines[side].set_visible(False)
     Path(folder).mkdir(parents=True, exist_ok=True)
-    path = Path(folder) / f"{name}.png"
+    path = Path(folder) / f"work_precision_{points[0].shot}.png"
     figure.savefig(path, dpi=150)
     return str(path)
