@@ -230,12 +230,10 @@ class VerifyResult(Operator):
         context: RunContext, function: Callable[..., Any], work: Sequence[tuple[Any, ...]]
     ) -> Iterator[tuple[int, Any]]:
         """The parts on the backend that the properties name, with the progress of their number."""
-        from calmotion.workflow.batch.backends import backend_for
-        from calmotion.workflow.batch.calls import results_on
+        from calmotion.workflow.batch.workers import results_on
 
         chosen = context.properties
-        backend = backend_for(chosen.on, chosen.workers or None)
-        for done, found in enumerate(results_on(backend, function, work), 1):
+        for done, found in enumerate(results_on(chosen.on, chosen.workers or None, function, work), 1):
             context.progress(0.5 + 0.5 * done / len(work), f"{done} of {len(work)} parts are simulated")
             yield found
 

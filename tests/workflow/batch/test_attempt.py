@@ -7,8 +7,9 @@ import sys
 
 import pytest
 from calmotion.workflow.batch import child
-from calmotion.workflow.batch.attempt import DIED, DONE, FAILED, _judged, _locked
+from calmotion.workflow.batch.attempt import _judged
 from calmotion.workflow.batch.jobs import jobs_for
+from calmotion.workflow.batch.report import DIED, DONE, FAILED
 
 
 @pytest.fixture
@@ -36,10 +37,10 @@ ERROR = {"problem": "no bodies", "path": "/Robot", "attribute": "", "found": "",
     ],
 )
 def test_a_process_that_refuses_has_failed_and_one_that_ends_otherwise_has_died(job, status, printed, outcome, problem):
-    found = _judged(job, status, "" if printed is None else json.dumps(printed))
-    assert found["outcome"] == outcome
-    assert (found["problem"] or {}).get("problem") == problem
-    assert found["report"] == (printed if outcome != DIED else None)
+    found, why, report = _judged(job, status, "" if printed is None else json.dumps(printed))
+    assert found == outcome
+    assert (why or {}).get("problem") == problem
+    assert report == (printed if outcome != DIED else None)
 
 
 def test_a_process_ends_with_the_worker_that_holds_its_input():
@@ -52,15 +53,3 @@ def test_a_process_ends_with_the_worker_that_holds_its_input():
     process.stdin.close()
     assert process.wait(timeout=600) == child.ORPHANED
     process.stdout.close()
-
-
-def test_a_job_is_locked_while_a_process_runs_it_also_when_its_worker_is_killed(tmp_path):
-    fcntl = pytest.importorskip("fcntl")
-    path = str(tmp_path / "lock")
-    with _locked(path) as descriptor:
-        process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, pass_fds=(descriptor,))
-    with open(path) as file, pytest.raises(BlockingIOError):  # the worker has let go of it
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    process.communicate(b"\n", timeout=600)
-    with open(path) as file:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -43,11 +43,6 @@ def test_a_batch_that_cannot_be_is_refused(shots, command, problem):
         jobs_for(shots, "out", command)
 
 
-def test_a_job_comes_back_from_plain_values():
-    (job,) = jobs_for(["a.usda"], "out", "optimize", ["--step=0.01s"], ["rrd"], {"A": "b"})
-    assert Job.of(json.loads(json.dumps(job.as_dict()))) == job
-
-
 def finished(folder: Path) -> Job:
     """A job whose files are there."""
     (folder / "shot.usda").write_text("shot")

@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -113,12 +115,46 @@ def test_wrong_arguments_are_setting_errors(shots, tmp_path, options, problem):
 
 
 def test_the_command_line_prints_one_line_for_each_job(shots, tmp_path, calmotion, monkeypatch):
-    monkeypatch.setattr(batches, "_work", lambda backend, jobs, state, cancel: None)
+    monkeypatch.setattr(batches, "_work", lambda *arguments: None)
     run = calmotion("batch", *shots, "-o", tmp_path / "out", "--tolerance", "1mm", "--csv", "--quiet", "--json")
     report = json.loads(run.stdout)
     assert run.returncode == 1 and report["outcomes"] == {"not run": 3} and report["command"] == "batch"
     run = calmotion("batch", *shots, "-o", tmp_path / "out")
     assert "good: not run" in run.stdout and "batch.md" in run.stdout
+
+
+@pytest.mark.long
+def test_a_scheduler_that_is_killed_ends_the_batch_which_goes_on_later(shots, tmp_path, trap):
+    pytest.importorskip("distributed")
+    begun = [subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
+         "--scheduler-file", tmp_path / "scheduler.json"]
+    )]  # fmt: skip
+    while not (tmp_path / "scheduler.json").exists():
+        time.sleep(0.05)
+    address = json.loads((tmp_path / "scheduler.json").read_text())["address"]
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
+    begun.append(subprocess.Popen([*worker, "--death-timeout", "5"]))
+
+    def kill():
+        while not list(tmp_path.glob("*.begun")):
+            time.sleep(0.05)
+        begun[0].kill()
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    try:
+        options = {"on": address.replace("tcp://", "dask://"), "workers": 1} | trap("wait")
+        result = batch(shots[:2], tmp_path / "out", **options)
+    finally:
+        killer.join()
+        for process in begun:
+            process.kill()
+            process.wait()
+    assert outcomes(result) == ["died", "died"] and not result.interrupted
+    assert "scheduler is gone" in result.jobs[0].problem["problem"] and result.jobs[0].attempts == 1
+    (tmp_path / "go").write_text("")
+    assert outcomes(batch(shots[:2], tmp_path / "out", workers=2, **trap("wait"))) == ["done", "done"]
 
 
 @pytest.mark.long

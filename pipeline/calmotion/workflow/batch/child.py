@@ -11,7 +11,6 @@ import runpy
 import sys
 import threading
 
-CORES = "CALMOTION_BATCH_CORES"  # processors that the process may use, numbers with commas
 ORPHANED = 137  # exit status of a process whose worker is gone, as of one that was killed
 
 
@@ -22,9 +21,6 @@ def main() -> None:
     os.dup2(nothing, 0)
     os.close(nothing)
     threading.Thread(target=_end_with_worker, args=(watched,), daemon=True).start()
-    cores = os.environ.pop(CORES, "")
-    if cores and hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {int(core) for core in cores.split(",")})
     sys.argv[0] = "calmotion"
     runpy.run_module("calmotion", run_name="__main__", alter_sys=True)
 

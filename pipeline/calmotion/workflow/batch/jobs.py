@@ -8,9 +8,8 @@ import json
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from calmotion.errors import ShotError
 from calmotion.support.files import write_text
@@ -69,11 +68,6 @@ class Job:
         """The JSON object that the command prints."""
         return self._beside("json")
 
-    @property
-    def lock(self) -> str:
-        """The file that who runs the job has locked."""
-        return self._beside("lock")
-
     def _beside(self, extension: str) -> str:
         return os.path.join(self.folder, LOGS, f"{self.name}_{COMMANDS[self.command]}.{extension}")
 
@@ -90,15 +84,6 @@ class Job:
     def request(self) -> str:
         """Hash of everything that is asked for, but not of the files that are read."""
         return hashlib.sha256(json.dumps([__version__, self.line], sort_keys=True).encode()).hexdigest()
-
-    def as_dict(self) -> dict[str, Any]:
-        """The fields as plain values, for a worker elsewhere."""
-        return asdict(self) | {"environment": dict(self.environment)}
-
-    @classmethod
-    def of(cls, fields: Mapping[str, Any]) -> Job:
-        """The job of `as_dict`, also after a way through JSON."""
-        return cls(**{**fields, "arguments": tuple(fields["arguments"]), "extras": tuple(fields["extras"])})
 
 
 def jobs_for(
@@ -121,8 +106,8 @@ def jobs_for(
         if (other := real.setdefault(os.path.realpath(path), path)) is not path:
             raise ShotError("this shot is named twice", path=path, found=other, remedy="Name it once")
     target, names = os.path.abspath(os.fspath(folder)), _names(paths)
-    more = dict(environment or {})
-    jobs = [Job(names[path], path, target, command, tuple(arguments), tuple(extras), more) for path in paths]
+    given = tuple(arguments), tuple(extras), dict(environment or {})
+    jobs = [Job(names[path], path, target, command, *given) for path in paths]
     for job in jobs:
         if job.layer is not None and os.path.realpath(job.layer) in real:
             raise ShotError(

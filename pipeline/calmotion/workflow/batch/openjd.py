@@ -66,7 +66,7 @@ def _output(results: str, folder: str) -> dict[str, Any]:
 
 
 def write_template(path: str | os.PathLike[str], jobs: Sequence[Job]) -> dict[str, Any]:
-    """Write the template of jobs as YAML; it is checked by `openjd-model` where that is installed.
+    """Write the template of jobs as YAML.
 
     Raises:
         ShotError: It cannot be written, or a text does not fit.
@@ -76,7 +76,6 @@ def write_template(path: str | os.PathLike[str], jobs: Sequence[Job]) -> dict[st
 
     _refuse_other_files(os.fspath(path), jobs)
     template = openjd_template(jobs, os.path.dirname(os.path.abspath(path)))
-    refuse_invalid(template, os.fspath(path))
     try:
         write_text(Path(path), yaml.safe_dump(template, sort_keys=False, width=1000))
     except OSError as error:
@@ -101,35 +100,15 @@ def _refuse_other_files(path: str, jobs: Sequence[Job]) -> None:
             )  # fmt: skip
 
 
-def refuse_invalid(template: dict[str, Any], path: str) -> None:
-    """Refuse a template that `openjd-model` refuses; without it nothing is checked.
-
-    Raises:
-        ShotError: With what is wrong.
-    """
-    try:
-        from openjd.model import DecodeValidationError, decode_job_template
-    except ImportError:
-        return
-    try:
-        decode_job_template(template=template)
-    except DecodeValidationError as error:
-        raise ShotError(
-            "Open Job Description does not allow this template", path=path, found=str(error), remedy="Use shorter names"
-        ) from error
-
-
 def _step(jobs: Sequence[Job], number: int | None) -> dict[str, Any]:
     """The step whose tasks are some shots."""
     first = jobs[0]
-    stem = f"{{{{Param.{_FOLDER}}}}}/{{{{Task.Param.{_NAME}}}}}"
     # the line of a job in which what differs between jobs is a parameter
     pattern = Job(
         f"{{{{Task.Param.{_NAME}}}}}", f"{{{{Task.Param.{_SHOT}}}}}", f"{{{{Param.{_FOLDER}}}}}", first.command,
         first.arguments, first.extras,
     )  # fmt: skip
-    assert pattern.stem.startswith(stem)
-    line = [text for text in pattern.line if text not in ("--json", "--quiet")]
+    line = [text for text in pattern.line if text not in ("--json", "--quiet")]  # farms keep what tasks print
     name = first.command.capitalize() if number is None else f"{first.command.capitalize()}{number + 1}"
     return {
         "name": name,

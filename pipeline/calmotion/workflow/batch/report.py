@@ -9,7 +9,7 @@ from typing import Any
 from calmotion.version import __version__
 from calmotion.workflow.batch.jobs import Job
 
-DONE, KEPT, FAILED, DIED, WAITING = "done", "kept", "failed", "died", "not run"
+OUTCOMES = DONE, KEPT, FAILED, DIED, WAITING = "done", "kept", "failed", "died", "not run"
 
 
 @dataclass(frozen=True)
@@ -46,15 +46,12 @@ class JobResult:
 
     def as_dict(self) -> dict[str, Any]:
         """Its row in the object of `--json`."""
-        report = self.report or {}
+        report = (self.report if self.has_result else None) or {}
         targets = report.get("targets") or []
         errors = {
-            key: max((row[name] for row in targets if row.get(name) is not None), default=None)
-            for key, name in (
-                ("max_error_before_m", "max_error_before_m"), ("max_error_after_m", "max_error_after_m"),
-                ("max_error_m", "max_error_m"),
-            )
-        }  # fmt: skip
+            name: max((row[name] for row in targets if row.get(name) is not None), default=None)
+            for name in ("max_error_before_m", "max_error_after_m", "max_error_m")
+        }
         return {
             "shot": self.job.shot,
             "name": self.job.name,
@@ -63,12 +60,12 @@ class JobResult:
             "wall_s": self.wall_s,
             "processor_s": self.processor_s,
             "layer": self.job.layer if self.has_result else None,
-            "root_layer": report.get("root_layer") if self.has_result else None,
+            "root_layer": report.get("root_layer"),
             "manifest": self.job.manifest if self.has_result else None,
             "log": self.job.log,
             "host": self.host,
             "worker": self.worker,
-            "tolerance_kept": report.get("tolerance_kept") if self.has_result else None,
+            "tolerance_kept": report.get("tolerance_kept"),
             **{key: value for key, value in errors.items() if value is not None},
             "problem": self.problem,
         }
@@ -111,19 +108,20 @@ class BatchResult:
             "wall_s": self.wall_s,
             "jobs_wall_s": worked,
             "interrupted": self.interrupted,
-            "outcomes": {name: sum(job.outcome == name for job in self.jobs) for name in self.outcomes},
+            "outcomes": self.outcomes,
             "jobs": [job.as_dict() for job in self.jobs],
         }
 
     @property
-    def outcomes(self) -> list[str]:
-        """The outcomes that there are."""
-        return [name for name in (DONE, KEPT, FAILED, DIED, WAITING) if any(job.outcome == name for job in self.jobs)]
+    def outcomes(self) -> dict[str, int]:
+        """The outcomes that there are, and how many jobs have each."""
+        counts = {name: sum(job.outcome == name for job in self.jobs) for name in OUTCOMES}
+        return {name: count for name, count in counts.items() if count}
 
     def page(self) -> str:
         """The report for people, in Markdown."""
         rows = [self._row(job.as_dict()) for job in self.jobs]
-        counts = ", ".join(f"{sum(job.outcome == name for job in self.jobs)} {name}" for name in self.outcomes)
+        counts = ", ".join(f"{count} {name}" for name, count in self.outcomes.items())
         lines = [
             f"# Batch of {len(self.jobs)} shots", "",
             f"`calmotion {self.command}` on {self.on}, {self.wall_s:.1f} s: {counts}"

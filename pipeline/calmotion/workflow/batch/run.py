@@ -7,8 +7,9 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from concurrent.futures import Executor
 from contextlib import contextmanager
+from dataclasses import replace
 from numbers import Integral
 from pathlib import Path
 from typing import Any
@@ -17,17 +18,16 @@ from calmotion.errors import ShotError
 from calmotion.host import SettingError
 from calmotion.support import interrupts
 from calmotion.support.files import try_writing, write_text
-from calmotion.workflow.batch.attempt import DIED, MARK
-from calmotion.workflow.batch.backends import LOCAL, Backend, backend_for, refuse_unknown_place
+from calmotion.support.processes.workers import Fault
+from calmotion.workflow.batch.attempt import attempt, attempts, stored_report
 from calmotion.workflow.batch.jobs import EXTRAS, LOGS, Job, forget, is_done, jobs_for
-from calmotion.workflow.batch.report import KEPT, WAITING, BatchResult, JobResult
+from calmotion.workflow.batch.report import DIED, KEPT, WAITING, BatchResult, JobResult
+from calmotion.workflow.batch.workers import LOCAL, executor_on, finished, refuse_unknown_place, result_of
 from calmotion.workflow.plain import plain
 from calmotion.workflow.run import Progress
 
 MOST_ATTEMPTS = 3
-MOST_REVIVALS = 3  # of a scheduler
 REPORT, PAGE, LOCK = "batch.json", "batch.md", ".batch.lock"
-_TICK = 0.5  # [s]
 _STAGE = "Batch"
 
 
@@ -102,15 +102,12 @@ def run_jobs(
         left = [job for job in jobs if not state.keep(job)]
         state.write()
         if left:
-            backend = backend_for(on, workers)
             try:
-                _work(backend, left, state, cancel)
+                with executor_on(on, workers) as (executor, limit):
+                    _work(executor, limit, left, state, cancel)
             except KeyboardInterrupt:
                 interrupts.answer()
                 state.interrupted = True
-            finally:
-                with interrupts.deferred():
-                    backend.close()
         return state.write()
 
 
@@ -130,11 +127,7 @@ class _State:
         if not is_done(job):
             forget(job)
             return False
-        try:
-            report = json.loads(Path(job.report).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            report = None
-        self._results[job.name] = JobResult(job, KEPT, report=report)
+        self._results[job.name] = JobResult(job, KEPT, report=stored_report(job))
         return True
 
     def add(self, result: JobResult) -> None:
@@ -161,67 +154,34 @@ class _State:
         more = elapsed * (len(self.jobs) - ended) / done if done else None
         self._progress(Progress(_STAGE, ended / len(self.jobs), f"{ended} of {len(self.jobs)} shots", more))
 
+    @property
+    def unfinished(self) -> list[Job]:
+        """Jobs without an outcome."""
+        return [result.job for result in self._results.values() if result.outcome == WAITING]
 
-def _work(backend: Backend, jobs: Sequence[Job], state: _State, cancel: Callable[[], bool] | None) -> None:
+
+def _work(
+    executor: Executor, limit: int | None, jobs: Sequence[Job], state: _State, cancel: Callable[[], bool] | None
+) -> None:  # fmt: skip
     """Run jobs until each has a result."""
-    waiting, running, revivals = deque((job, "") for job in jobs), dict[Future[dict[str, Any]], Job](), 0
-    while waiting or running:
-        while waiting and (backend.limit is None or len(running) < backend.limit):
-            job, avoid = waiting.popleft()
-            running[backend.submit(job.as_dict(), avoid)] = job
-        ended = wait(running, timeout=_TICK, return_when=FIRST_COMPLETED).done
-        interrupts.check()
+    calls = deque[tuple[Any, ...]]((attempt, job) for job in jobs)
+    for ended in finished(executor, calls, limit):
         if cancel is not None and cancel():
             raise KeyboardInterrupt
-        lost = False
-        for future in ended:
-            job, found = running.pop(future), _outcome(future)
-            lost |= found is None
-            found = found or {"outcome": DIED, "problem": {"problem": f"its worker is gone: {_why(future)}"}}
-            attempts = _attempts(job)
-            if found["outcome"] == DIED and attempts < MOST_ATTEMPTS:
-                waiting.append((job, found.get("worker", "")))
+        if ended is not None:
+            (_, job), future = ended
+            found = result_of(future)
+            if isinstance(found, Fault):
+                found = JobResult(job, DIED, attempts(job), problem={"problem": found.reason, "remedy": "Run it again"})
+                if future.cancelled():  # all of them are
+                    for job in state.unfinished:
+                        state.add(replace(found, job=job, attempts=attempts(job)))
+                    return
+            elif found.outcome == DIED and found.attempts < MOST_ATTEMPTS:
+                calls.append((attempt, job))
                 continue
-            state.add(_result(job, found, max(1, attempts)))
+            state.add(found)
         state.show()
-        if lost:
-            revivals += 1
-            if revivals > MOST_REVIVALS or not backend.revive():
-                gone = {"outcome": DIED, "problem": {"problem": "its workers are gone", "remedy": "Run it again"}}
-                for job in [*running.values(), *(job for job, _ in waiting)]:
-                    state.add(_result(job, gone, _attempts(job)))
-                return
-
-
-def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any] | None:
-    """What an attempt returned; None where its worker, or the scheduler, was lost."""
-    try:
-        return future.result()
-    except (Exception, CancelledError):
-        return None
-
-
-def _why(future: Future[dict[str, Any]]) -> str:
-    if future.cancelled():
-        return "the scheduler has lost it"
-    error = future.exception()
-    return f"{type(error).__name__}: {error}" if error is not None else ""
-
-
-def _result(job: Job, found: Mapping[str, Any], attempts: int) -> JobResult:
-    return JobResult(
-        job, found["outcome"], attempts, found.get("wall_s", 0.0), found.get("problem"), found.get("report"),
-        found.get("host", ""), found.get("processor_s"), found.get("worker", ""),
-    )  # fmt: skip
-
-
-def _attempts(job: Job) -> int:
-    """How often a job was begun, by its log: schedulers try again on their own as well."""
-    try:
-        with open(job.log, encoding="utf-8", errors="replace") as log:
-            return sum(line.startswith(MARK) for line in log)
-    except OSError:
-        return 0
 
 
 @contextmanager
