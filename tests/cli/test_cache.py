@@ -2,10 +2,11 @@
 
 import argparse
 import json
+import re
 
 import numpy as np
 import pytest
-from calmotion.cli.commands.setup.cache import readable, size
+from calmotion.cli.commands.setup.cache import size
 from calmotion.cli.main import main
 from calmotion.support.caching.caches import store_arrays
 
@@ -27,14 +28,14 @@ def test_info_lists_each_cache(folder, capsys):
     assert caches["meshes"]["entries"] == 2 and 16000 < caches["meshes"]["size_bytes"] < 18000
     assert main(["cache", "info"]) == 0
     text = capsys.readouterr().out
-    assert "tetrahedral meshes: 2 entries, 16." in text and str(folder) in text
+    assert re.search(r"tetrahedral meshes +meshes +2 +16\.\d kB +1\.0 GB", text) and str(folder) in text
 
 
 def test_prune_and_clear_remove_what_they_say(folder, capsys):
     assert main(["cache", "prune", "reductions", "--size", "0B"]) == 0
-    assert capsys.readouterr().out == "reductions: removed 0 entries, 0 B\n"
+    assert re.search(r"reductions +0 +0 bytes", capsys.readouterr().out)
     assert main(["cache", "prune", "--size", "10kB"]) == 0
-    assert "meshes: removed 1 entry, 8." in capsys.readouterr().out
+    assert re.search(r"meshes +1 +8\.\d kB", capsys.readouterr().out)
     assert main(["cache", "clear", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert [row["removed"] for row in told["caches"]] == [0, 1, 0]
@@ -47,8 +48,5 @@ def test_a_size_needs_a_unit(wrong):
         size(wrong)
 
 
-def test_sizes_are_read_and_written():
+def test_sizes_are_read():
     assert [size(text) for text in ("0B", "5kB", "1.5 MB", "2gb")] == [0, 5000, 1500000, 2 * 10**9]
-    assert [readable(count) for count in (0, 999, 1000, 2_500_000, 3 * 10**9)] == [
-        "0 B", "999 B", "1.0 kB", "2.5 MB", "3.0 GB",
-    ]  # fmt: skip

@@ -61,15 +61,6 @@ def test_what_a_command_alone_has_comes_before_what_all_have(capsys):
     assert places == sorted(places)
 
 
-def test_a_negative_number_is_the_value_of_the_option_before_it(capsys):
-    assert build_parser().parse_args(["export", "a.usda", "--to", "csv", "--start-delay", "5ms"]).start_delay == 0.005
-    for value in ("-5ms", "-.5"):
-        assert main(["export", "a.usda", "--to", "csv", "--start-delay", value]) == 2
-        assert f"{value} is out of range" in capsys.readouterr().err
-    assert main(["simulate", "a.usda", "--tolerance", "--json"]) == 2
-    assert "expected one argument" in capsys.readouterr().err
-
-
 def test_options_before_the_command_are_told_where_they_stand(capsys):
     assert main(["--json", "simulate", "a.usda"]) == 2
     assert "there is no option --json. Options stand behind the command." in capsys.readouterr().err

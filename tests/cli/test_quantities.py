@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from calmotion.cli.quantities import about, angle, counted, frequency, length, measured, memory, quantity_in
+from calmotion.cli.quantities import about, angle, counted, frequency, length, measured, quantity_in
 
 
 @pytest.mark.parametrize(
@@ -29,17 +29,6 @@ def test_angles_have_no_powers_of_ten(degrees, text):
 
 def test_one_thing_has_no_plural():
     assert [counted(number, "frame") for number in (0, 1, 2)] == ["0 frames", "1 frame", "2 frames"]
-
-
-@pytest.mark.parametrize(
-    "size, text",
-    [
-        (2.6e4, "less than 1 MB"), (9.99e5, "1 MB"), (3.14e7, "31 MB"), (9.94e8, "990 MB"), (9.96e8, "1 GB"),
-        (1.23e9, "1.2 GB"), (1.234e12, "1230 GB"),
-    ],
-)  # fmt: skip
-def test_memory_has_two_digits(size, text):
-    assert memory(size) == text
 
 
 @pytest.mark.parametrize(

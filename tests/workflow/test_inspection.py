@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.cli.inspect_tables import _solid_row
+from calmotion.cli.reports.inspection import _solid_row
 from calmotion.shot import Body, ElasticMaterial, FEMesh, FlexibleSettings, Frame
 from calmotion.shot.materials.parts import Part
 from calmotion.shot.meshes import MeshQuality

@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 import pytest
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, RunMemory
+from calmotion.cli.commands.shots.watch import _tell
 from calmotion.cli.main import main
 from calmotion.cli.output import Output
-from calmotion.cli.run import _tell
 from calmotion.errors import ShotError
 from calmotion.host import Operator
 from calmotion.host.plan import Plan
@@ -147,11 +147,12 @@ def test_what_a_run_took_over_and_what_it_made_are_told(shot_file, capsys):
     result = watch.run()
     assert (watch.reused, watch.made) == (["time step"], ["meshes", "reduction", "subspaces"])
     args = argparse.Namespace(quiet=False, optimize=False, verbose=True, strict=False)
-    _tell(result, watch, 1.0, args, Output(sys.stdout, False))
+    report = result.report() | {"reused": watch.reused, "made": watch.made, "seconds": 1.0}
+    _tell(result, report, args, Output(sys.stdout, False))
     told = capsys.readouterr().out
     assert told.endswith("; reused time step; made meshes, reduction, subspaces\n")
     args.verbose = False
-    _tell(result, watch, 1.0, args, Output(sys.stdout, False))
+    _tell(result, report, args, Output(sys.stdout, False))
     assert f"{capsys.readouterr().out.strip()}; reused" in told
     watch._last = {ConvergedReduction: converged}
     watch.run()

@@ -84,9 +84,7 @@ def run_options(command: argparse.ArgumentParser) -> None:
         "of the predicted motion (simulated)",
     )
     outputs.add_argument(
-        "--samples-per-second",
-        metavar="HZ",
-        help="write more samples than the frames, for linear interpolation",
+        "--samples-per-second", metavar="HZ", help="write more samples than the frames, for linear interpolation"
     )
     outputs.add_argument(
         "--splines",

@@ -6,8 +6,6 @@ A wrong option or command is answered with the nearest right one.
 from __future__ import annotations
 
 import argparse
-import re
-import sys
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
@@ -30,7 +28,6 @@ START = (
 SHARED = "reports, plugins and settings"
 WIDTH = 79
 _EXAMPLES = "examples:\n"
-_NEGATIVE = re.compile(r"-\.?\d")
 
 
 def overview(commands: Mapping[str, str]) -> str:
@@ -136,8 +133,7 @@ class Parser(argparse.ArgumentParser):
         self, args: Sequence[str] | None = None, namespace: Any = None
     ) -> tuple[Any, list[str]]:
         """The arguments; those that no option takes are refused here, where the options are known."""
-        given = self._joined(sys.argv[1:] if args is None else args)
-        found, rest = super().parse_known_args(given, namespace)
+        found, rest = super().parse_known_args(args, namespace)
         wrong = next((text for text in rest if text.startswith("-")), None)
         if wrong is not None:
             name = wrong.partition("=")[0]
@@ -147,18 +143,6 @@ class Parser(argparse.ArgumentParser):
         if rest and not self.overview:
             self.error(f"no argument takes {' '.join(rest)}; a name with spaces is written in quotation marks")
         return found, rest
-
-    def _joined(self, args: Sequence[str]) -> list[str]:
-        """The arguments, with a negative number of an option joined to it: `--tolerance -1mm`, which argparse takes for
-        an option of its own."""
-        joined: list[str] = []
-        for text in args:
-            action = self._option_string_actions.get(joined[-1]) if joined else None
-            if action is not None and action.nargs is None and joined[-1].startswith("--") and _NEGATIVE.match(text):
-                joined[-1] += f"={text}"
-            else:
-                joined.append(text)
-        return joined
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         try:

@@ -37,18 +37,6 @@ def angle(radians: float | None) -> str:
     return f"{degrees:.4g}°" if abs(degrees) < 9999.5 else f"{degrees:.0f}°"
 
 
-def memory(size: float) -> str:
-    """An amount of memory in bytes as text, to two digits."""
-    for power, unit in ((9, "GB"), (6, "MB")):
-        if size >= 0.995 * 10.0**power:
-            return f"{_to_two_digits(size / 10.0**power)} {unit}"
-    return "less than 1 MB"
-
-
-def _to_two_digits(value: float) -> str:
-    return f"{value:.2g}" if value < 99.5 else f"{round(value, -1):.0f}"
-
-
 def counted(count: int, noun: str) -> str:
     """A number of things: `1 frame`, `2 frames`."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

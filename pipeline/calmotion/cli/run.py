@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import argparse
 import os
-import time
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from calmotion.cli.options import opened_shot, progress_display, run_arguments, simulation_arguments
 from calmotion.cli.output import FAILED, INTERRUPTED, Output, conclude
+from calmotion.host import SettingError
 from calmotion.shot.run import OutputPaths
-from calmotion.support import interrupts
 from calmotion.workflow.results import SimulationResult
 
 if TYPE_CHECKING:
     from calmotion.workflow.shot import Shot
-    from calmotion.workflow.watch import Watch
 
 
 def run_shot(
@@ -35,46 +33,26 @@ def run_shot(
         ShotError: When nothing could be computed.
         SettingError: When an option or setting does not fit.
     """
-    from calmotion.cli.run_report import print_run
+    from calmotion.cli.reports.run import print_run
 
-    shot = opened_shot(args)
-    paths = OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures, video=args.video)
-    _refuse_files(shot, args, paths)
-    with progress_display(args) as display:
-        result = function(
-            shot,
-            verify=args.verify,
-            outputs=paths,
-            **simulation_arguments(args),
-            **run_arguments(args, display),
-            **options,
-        )
-    report = result.report()
-    if manifest := _write_manifest(result, args):
-        report["manifest"] = manifest
+    shot = shot_to_run(args)
+    result, report = run_once(function, shot, args, args.quiet, **options)
     conclude(report, result.problems, output, None if args.quiet else partial(print_run, verbose=args.verbose))
-    return _status(result, report, args)
+    return status_of(result, report, args)
 
 
-def _status(result: SimulationResult, report: dict[str, Any], args: argparse.Namespace) -> int:
-    """The exit status of a run."""
-    if result.interrupted:
-        return INTERRUPTED
-    unlike = any(row["unlike_ground"] for row in report["contacts"])
-    return FAILED if result.problems or (args.strict and (unlike or not report["tolerance_kept"])) else 0
-
-
-def _refuse_files(shot: Shot, args: argparse.Namespace, paths: OutputPaths) -> None:
-    """Refuse a manifest over what is read or another output, and options of a layer that is not written.
+def shot_to_run(args: argparse.Namespace) -> Shot:
+    """The shot of `simulate`, `optimize` or `watch`, whose options fit.
 
     Raises:
-        SettingError: One is.
+        SettingError: A manifest over what is read, over another output or over a file of another kind, or an option of
+            a layer that is not written.
     """
-    from calmotion.host import SettingError
     from calmotion.workflow.outputs import files_of, refuse_overwriting
 
-    own = {"--manifest": args.manifest} if args.manifest else {}
-    refuse_overwriting(shot.inputs, files_of(paths) | own)
+    shot = opened_shot(args)
+    manifest = {"--manifest": args.manifest} if args.manifest else {}
+    refuse_overwriting(shot.inputs, files_of(_paths(args)) | manifest)
     if args.manifest and not _may_be_manifest(args.manifest):
         raise SettingError(
             "the file that is there is no manifest, and is never changed", path="--manifest", found=args.manifest,
@@ -87,6 +65,38 @@ def _refuse_files(shot: Shot, args: argparse.Namespace, paths: OutputPaths) -> N
             "this option says how the layer is written, and no layer is", path=unused[0],
             remedy=f"Name one with -o, or leave {unused[0]} out.",
         )  # fmt: skip
+    return shot
+
+
+def run_once(
+    function: Callable[..., SimulationResult], shot: Shot, args: argparse.Namespace, quiet: bool, **options: Any
+) -> tuple[SimulationResult, dict[str, Any]]:
+    """Simulate or optimise a shot, and write the manifest of a run that made all it was asked for; result and report.
+
+    Raises:
+        ShotError: When nothing could be computed.
+    """
+    with progress_display(args, quiet) as display:
+        options |= simulation_arguments(args) | run_arguments(args, display)
+        result = function(shot, verify=args.verify, outputs=_paths(args), **options)
+    report = result.report()
+    if args.manifest and not result.problems and not result.interrupted:
+        from calmotion.workflow.publishing.manifest import write_manifest
+
+        report["manifest"] = write_manifest(result, args.manifest)
+    return result, report
+
+
+def status_of(result: SimulationResult, report: dict[str, Any], args: argparse.Namespace) -> int:
+    """The exit status of a run."""
+    if result.interrupted:
+        return INTERRUPTED
+    unlike = any(row["unlike_ground"] for row in report["contacts"])
+    return FAILED if result.problems or (args.strict and (unlike or not report["tolerance_kept"])) else 0
+
+
+def _paths(args: argparse.Namespace) -> OutputPaths:
+    return OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures, video=args.video)
 
 
 def _may_be_manifest(path: str) -> bool:
@@ -95,90 +105,3 @@ def _may_be_manifest(path: str) -> bool:
         return True
     with open(path, "rb") as file:
         return file.read(64).strip()[:1] in (b"", b"{")
-
-
-def _write_manifest(result: SimulationResult, args: argparse.Namespace) -> str | None:
-    """The manifest that is requested, of a run that made all it was asked for."""
-    if not args.manifest or result.problems or result.interrupted:
-        return None
-    from calmotion.workflow.publishing.manifest import write_manifest
-
-    return write_manifest(result, args.manifest)
-
-
-def watch_shot(args: argparse.Namespace, output: Output) -> int:
-    """Simulate or optimise a shot whenever it is saved, and print a line for each run; the exit status of the last.
-
-    Raises:
-        SettingError: An option or setting does not fit.
-    """
-    from calmotion.cli.output import notice, print_error
-    from calmotion.errors import ShotError
-    from calmotion.host import SettingError
-    from calmotion.workflow.commands import optimize, simulate
-    from calmotion.workflow.watch import Watch
-
-    if args.optimize and not args.output:
-        raise SettingError("optimize writes a layer", path="-o", remedy="Name it with -o LAYER.")
-    paths = OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures, video=args.video)
-
-    def run(shot: Shot) -> SimulationResult:
-        function = optimize if args.optimize else simulate
-        with progress_display(args, quiet=True) as display:  # a run has one line
-            options = run_arguments(args, display) | simulation_arguments(args)
-            return function(shot, verify=args.verify, outputs=paths, **options)
-
-    shot = opened_shot(args)
-    _refuse_files(shot, args, paths)
-    watch, done, status = Watch(shot, run), 0, 0
-    if not args.quiet:
-        notice(f"watching {args.shot}; Ctrl-C ends it")
-    while args.runs is None or done < args.runs:
-        try:
-            if done:
-                watch.wait()
-        except KeyboardInterrupt:
-            interrupts.answer()
-            return 0
-        begin = time.perf_counter()
-        try:
-            result = watch.run()
-            _write_manifest(result, args)
-        except ShotError as error:  # the next save may repair it
-            print_error(error, output)
-            status = FAILED
-        else:
-            status = _tell(result, watch, time.perf_counter() - begin, args, output)
-            if result.interrupted:
-                return status
-        done += 1
-    return status
-
-
-def _tell(result: SimulationResult, watch: Watch, seconds: float, args: argparse.Namespace, output: Output) -> int:
-    """Print one line for a run; the exit status that it has alone."""
-    from calmotion.cli.quantities import length
-    from calmotion.workflow.watch import largest_error
-
-    report: dict[str, Any] = result.report()
-    status = _status(result, report, args)
-    if output.json:
-        output.object(report | {"reused": watch.reused, "made": watch.made, "seconds": seconds})
-        return status
-    if args.quiet:
-        return status
-    path, error, moment = largest_error(result)
-    verdict = "tolerance kept" if report["tolerance_kept"] else "tolerance missed"
-    what = "optimised" if args.optimize else "simulated"
-    before = report.get("max_error_before_m")
-    largest = length(error) if before is None else f"{length(before)} to {length(error)}"
-    reused = f"; reused {', '.join(watch.reused)}" if watch.reused else ""
-    reused += f"; made {', '.join(watch.made)}" if watch.made else ""
-    print(
-        f"{time.strftime('%H:%M:%S')} {what} in {seconds:.2f} s: largest error {largest} of {path} at "
-        f"{moment:.2f} s, {verdict}{reused if args.verbose else ''}",
-        file=output.stream, flush=True,
-    )  # fmt: skip
-    for problem in result.problems:
-        print(f"  {problem.error}", file=output.stream, flush=True)
-    return status

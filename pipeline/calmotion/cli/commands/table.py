@@ -1,4 +1,7 @@
-"""The commands: those of the engine, and those that plugins bring. Each is imported when it is called."""
+"""The commands: those of the engine, and those that plugins bring. Each is imported when it is called.
+
+The module of a command has `add_arguments(parser)` and `run(arguments, output)`, and may have `EXAMPLES`.
+"""
 
 from __future__ import annotations
 
@@ -6,26 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
-from typing import Protocol
+from typing import TYPE_CHECKING, TypeAlias
 
+if TYPE_CHECKING:
+    from calmotion.host.discovery import PluginCommand
 
-class Command(Protocol):
-    """A command; its module has `add_arguments(parser)` and `run(arguments, output)`, and may have `EXAMPLES`."""
-
-    @property
-    def help(self) -> str:
-        """What it does, in a line."""
-
-    @property
-    def disabled(self) -> bool:
-        """Whether it cannot be called, and is not listed."""
-
-    def load(self) -> ModuleType:
-        """Its module.
-
-        Raises:
-            ShotError: It cannot be imported, or must not be.
-        """
+Command: TypeAlias = "BuiltIn | Absent | PluginCommand"
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
-from calmotion.cli.quantities import length
+from calmotion.cli.quantities import counted, length
 from calmotion.cli.tables import print_table, say
 
 # What raises a limit, by its quantity.
@@ -36,16 +36,18 @@ def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: 
 def print_reason(console: Console, report: dict[str, Any]) -> None:
     """Why the curves of `optimize` exceed limits or are worse than the animation, and what to do; else nothing."""
     limits, worse = report["limits"], not report["objective_after"] <= report["objective_before"]
-    exceeded = [row for row in limits if row["exceeded"]]
+    exceeded = sorted((row for row in limits if row["exceeded"]), key=_excess, reverse=True)
     if exceeded:
-        asked = [row for row in limits if _excess(row, "before") > 0.0]
-        if asked:
-            say(console, f"The animation asks for more than the motors may do: {_worst(asked, 'before')}.")
-        cost = " follow it less well and" if worse else ""
-        still = " still" if asked else ""
-        say(console, f"The new curves{cost}{still} exceed {_counted(exceeded)}: {_worst(exceeded)}.")
+        row = exceeded[0]
+        limit, _, value = row["shown"]
+        if row["quantity"] != "position":
+            limit, value = limit.removeprefix("-"), value.removeprefix("-")
+        cost = "follow it less well and " if worse else ""
+        more = f", and {len(exceeded) - 1} more" if len(exceeded) > 1 else ""
+        broken = f"{row['path']} has {row['quantity']} {value} where {limit} is allowed{more}"
+        say(console, f"The new curves {cost}exceed {counted(len(exceeded), 'limit')}: {broken}.")
         names = " and ".join(dict.fromkeys(RAISED_BY[row["quantity"]] for row in exceeded))
-        times = ", ".join(dict.fromkeys(f"{row['time_s']:.2f} s" for row in _by_excess(exceeded)[:3]))
+        times = ", ".join(dict.fromkeys(f"{row['time_s']:.2f} s" for row in exceeded[:3]))
         say(console, f"Slow the animation down around {times}, or raise {names} if the motors can do more.")
     elif worse and any(row["cost_m"] is not None for row in limits):
         say(console, "The new curves keep limits that the animation exceeds; the table of limits says what each costs.")
@@ -55,29 +57,8 @@ def print_reason(console: Console, report: dict[str, Any]) -> None:
         say(console, f"The search {how} before it improved on the animation: keep the shot as it is, or go on.")
 
 
-def _counted(rows: Sequence[dict[str, Any]]) -> str:
-    return f"{len(rows)} limit{'s' if len(rows) > 1 else ''}"
-
-
-def _excess(row: dict[str, Any], when: str) -> float:
-    """By how much a value exceeds its limit, over the size of the limit; only those of positions have sides."""
-    limit, value = float(row["limit"]), float(row[when])
-    if row["quantity"] == "position":
-        beyond = value - limit if row["after"] >= limit else limit - value  # the side that the new curves exceed
-    else:
-        beyond = abs(value) - abs(limit)
+def _excess(row: dict[str, Any]) -> float:
+    """By how much the new curves exceed a limit, over its size; only limits of positions have sides."""
+    limit, value = float(row["limit"]), float(row["after"])
+    beyond = abs(value - limit) if row["quantity"] == "position" else abs(value) - abs(limit)
     return beyond / max(abs(limit), 1e-12)
-
-
-def _by_excess(rows: Sequence[dict[str, Any]], when: str = "after") -> list[dict[str, Any]]:
-    return sorted(rows, key=lambda row: -_excess(row, when))
-
-
-def _worst(rows: Sequence[dict[str, Any]], when: str = "after") -> str:
-    """The row that exceeds its limit most, in words."""
-    row = _by_excess(rows, when)[0]
-    limit, value = row["shown"][0], row["shown"][1 if when == "before" else 2]
-    if row["quantity"] != "position":
-        limit, value = limit.removeprefix("-"), value.removeprefix("-")
-    more = f", and {len(rows) - 1} more" if len(rows) > 1 else ""
-    return f"{row['path']} has {row['quantity']} {value} where {limit} is allowed{more}"

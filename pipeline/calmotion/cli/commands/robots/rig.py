@@ -17,13 +17,7 @@ EXAMPLES = (("calmotion rig skinned.usda -o robot.usda", "a robot from a UsdSkel
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     shot_arguments(command)
-    command.add_argument(
-        "-o",
-        "--output",
-        metavar="LAYER",
-        required=True,
-        help="USD layer to write, over the shot",
-    )
+    command.add_argument("-o", "--output", metavar="LAYER", required=True, help="USD layer to write, over the shot")
 
 
 def run(args: argparse.Namespace, output: Output) -> int:

@@ -41,8 +41,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.cli.inspect_tables import print_inspection
     from calmotion.cli.output import FAILED, INTERRUPTED, conclude
+    from calmotion.cli.reports.inspection import print_inspection
     from calmotion.workflow.commands import inspect
 
     shot = opened_shot(args)

@@ -77,32 +77,21 @@ def print_joint_gap(console: Console, gap: float) -> None:
         say(console, f"joints come apart by up to {length(gap)}")
 
 
-def print_efforts(console: Console, efforts: Sequence[dict[str, Any]], coarse: bool) -> None:
-    """How well the efforts of the motors are known: that of the least known one, over its largest value.
+def print_efforts(console: Console, efforts: Sequence[dict[str, Any]]) -> None:
+    """The motor whose efforts depend most on the time step, where that is more than a little.
 
     A motor that hardly works among the others, such as one that turns a cup, does not count.
-
-    Args:
-        coarse: Whether to print it where it is not known well, or where it is.
     """
     known = [row for row in efforts if row["estimated_error"] is not None and row["largest"] > 0.0]
-    strongest = {
-        unit: max(row["largest"] for row in known if row["unit"] == unit) for unit in {r["unit"] for r in known}
-    }
+    strongest: dict[str, float] = {}
+    for row in known:
+        strongest[row["unit"]] = max(strongest.get(row["unit"], 0.0), row["largest"])
     known = [row for row in known if row["largest"] > IDLE_EFFORT * strongest[row["unit"]]]
-    if not known:
-        return
-    worst = max(known, key=lambda row: row["estimated_error"] / row["largest"])
-    share, unit = worst["estimated_error"] / worst["largest"], worst["unit"]
-    error, largest = f"{worst['estimated_error']:.3g} {unit}", f"{worst['largest']:.3g} {unit}"
-    if coarse and share >= 1.0:
-        said = f"are not known: that of {worst['path']} changes by {error} with the time step, and is {largest} at most"
-        say(console, f"the efforts of motors {said}. Smooth its curve, or use a shorter --step, where they matter.")
-    elif coarse and share >= COARSE_EFFORT:
+    worst = max(known, key=lambda row: row["estimated_error"] / row["largest"], default=None)
+    if worst and worst["estimated_error"] >= COARSE_EFFORT * worst["largest"]:
+        error, largest = (f"{worst[key]:.3g} {worst['unit']}" for key in ("estimated_error", "largest"))
         said = f"depend on the time step: {worst['path']} by {error} of at most {largest}"
         say(console, f"the efforts of motors {said}. Use a shorter --step where they matter.")
-    elif not coarse and share < COARSE_EFFORT:
-        say(console, f"the efforts of motors are known to {max(100.0 * share, 0.1):.1f}% of their largest values")
 
 
 def print_verdict(console: Console, report: dict[str, Any]) -> None:
@@ -312,7 +301,7 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
     if report["refined_steps"]:
         say(console, f"{report['refined_steps']} steps were divided into smaller ones: try a smaller --step")
     print_joint_gap(console, report["max_joint_gap_m"])
-    print_efforts(console, report["efforts"], True)
+    print_efforts(console, report["efforts"])
     print_support(console, report["reactions"])
     print_contacts(console, report["contacts"])
 
@@ -335,7 +324,6 @@ def print_work(console: Console, report: dict[str, Any]) -> None:
         f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in total"
         + (f", peak memory {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else ""),
     )
-    print_efforts(console, report["efforts"], False)
     for row in report["reactions"]:
         force, moment = f"{row['max_force_n']:.4g} N", f"{row['max_moment_n_m']:.4g} N m"
         say(console, f"the world holds {row['body']} with up to {force} and {moment}")

@@ -6,9 +6,9 @@ import shlex
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.quantities import angle, counted, frequency, length, memory
+from calmotion.cli.quantities import angle, counted, frequency, length
 from calmotion.cli.reports.left_out import print_left_out
-from calmotion.cli.run_report import NOTHING_SHAKES, print_notes
+from calmotion.cli.reports.run import NOTHING_SHAKES, print_notes
 from calmotion.cli.tables import console_on, print_table, say
 from calmotion.shot.motor import DRIVE, ON_ERROR, ON_JOINT, PRESCRIBED, SERVO
 from calmotion.shot.outputs import ERROR, WARNING
@@ -111,12 +111,14 @@ def _print_answer(console: Console, report: dict[str, Any]) -> None:
 
 def _expected(row: dict[str, Any]) -> str:
     """What `optimize` is expected to take, as a sentence."""
+    from rich.filesize import decimal
+
     from calmotion.accuracy.expected_cost import readable_hours
 
     windows = ""
     if row["windows"] > 1:
         windows = f", in {row['windows']} windows of {row['window_s']:.3g} s that overlap by {row['overlap_s']:.3g} s"
-    time, size = readable_hours(row["hours"]), memory(1e9 * row["memory_gb"])
+    time, size = readable_hours(row["hours"]), decimal(round(1e9 * row["memory_gb"]))
     return f"optimize is expected to take {time} of processor time and {size} of memory{windows}"
 
 
