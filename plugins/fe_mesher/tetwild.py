@@ -16,9 +16,9 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.geometry.flat_tets import unflattened
 from calmotion.geometry.tetrahedra import flat_tets, surface_volume
+from calmotion.support.caching.cache_folder import MESHES
+from calmotion.support.caching.caches import key_of, store_arrays, stored_arrays
 from calmotion.support.files import temporary_folder
-
-from . import cache
 
 REMEDY = "Simplify or repair the Mesh, author a larger calm:flexible:elementSize, or give a TetMesh or a mesh file"
 MORE_TIME = ", or allow more with --set fe.mesh.time_limit={:.0f}"
@@ -102,11 +102,11 @@ def tetrahedralize(
         "sequence": 1,
         "pytetwild": version("pytetwild"),
     }
-    key = cache.cache_key(points, triangles, settings)
-    exceeded = cache.cache_key(points, triangles, settings | {"exceeds": True})
+    key = key_of(points, triangles, settings)
+    exceeded = key_of(points, triangles, settings, "exceeds")
     if use_cache:
         _refuse_hopeless(exceeded, f"{len(triangles)} triangles", path, time)
-    mesh = cache.load(key) if use_cache else None
+    mesh = _stored(key, "points", "tets") if use_cache else None
     if mesh is None or flat_tets(*mesh).any():
         for sequence in range(1, 1 + _TRIES):
             settings["sequence"] = sequence
@@ -121,8 +121,13 @@ def tetrahedralize(
                 break
         assert mesh is not None
         if use_cache and not flat_tets(*mesh).any():
-            cache.store(key, {"points": mesh[0], "tets": mesh[1]})
+            store_arrays(MESHES, key, {"points": mesh[0], "tets": mesh[1]})
     return mesh[0], mesh[1]
+
+
+def _stored(key: str, *names: str) -> tuple[np.ndarray, ...] | None:
+    arrays = stored_arrays(MESHES, key)
+    return None if arrays is None or set(names) - set(arrays) else tuple(arrays[name] for name in names)
 
 
 def _improvement(points: np.ndarray, triangles: np.ndarray, element_size: float) -> tuple[int, float]:
@@ -138,16 +143,16 @@ def _refuse_hopeless(key: str, size: str, path: str, time: ProcessorTime) -> Non
     Raises:
         OutOfTime: It has.
     """
-    taken = cache.load(key, ("seconds",))
+    taken = _stored(key, "seconds")
     if taken is not None and taken[0].shape == () and float(taken[0]) >= time.limit - time.used:
         raise _out_of_time(size, path, time)
 
 
 def _keep_hopeless(key: str, taken: float) -> None:
     """Store that a mesh takes longer than a time [s]."""
-    kept = cache.load(key, ("seconds",))
+    kept = _stored(key, "seconds")
     if kept is None or kept[0].shape != () or float(kept[0]) < taken:
-        cache.store(key, {"seconds": np.array(taken)})
+        store_arrays(MESHES, key, {"seconds": np.array(taken)})
 
 
 def _out_of_time(size: str, path: str, time: ProcessorTime) -> OutOfTime:

@@ -6,7 +6,6 @@ replaced atomically, see `support.caches`. What cannot be read is computed and w
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,7 +13,6 @@ from contextvars import ContextVar
 from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -23,7 +21,8 @@ from calmotion.reduction.reduced_body import Elasticity, InterfaceStiffness, Inv
 from calmotion.shot.meshes import CutPatch, FEMesh, MeshQuality, MissingVolume
 from calmotion.shot.result import Simplification
 from calmotion.support.caching.cache_folder import REDUCTIONS
-from calmotion.support.caching.caches import store_arrays, stored_arrays
+from calmotion.support.caching.caches import key_of, store_arrays, stored_arrays
+from calmotion.support.sources import source_digest
 
 T = TypeVar("T")
 
@@ -82,51 +81,14 @@ def cached_reduction(key_parts: object, compute: Callable[[], T]) -> T:
 
 
 def cache_key(parts: object) -> str:
-    """Hash of values and of the sources of this package; hexadecimal."""
-    digest = hashlib.sha256()
-    digest.update(f"{FORMAT} {_sources()}".encode())
-    _feed(digest, parts)
-    return digest.hexdigest()
+    """Hash of values, see `key_of`, and of the sources of this package; hexadecimal."""
+    return key_of(FORMAT, _sources(), parts)
 
 
 @cache
 def _sources() -> str:
-    digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(path.name.encode())
-        digest.update(path.read_bytes())
-    for package in ("numpy", "scipy", "scikit-fem"):
-        digest.update(version(package).encode())
-    return digest.hexdigest()
-
-
-def _feed(digest: Any, value: Any) -> None:
-    """Add a value to a hash, its type and size first, so that different values have different hashes."""
-    if isinstance(value, np.ndarray):
-        if value.dtype.hasobject:
-            raise TypeError("an array of objects cannot be part of a key")
-        digest.update(f"array {value.dtype.str} {value.shape} ".encode())
-        digest.update(np.ascontiguousarray(value).tobytes())
-    elif is_dataclass(value) and not isinstance(value, type):
-        digest.update(f"{type(value).__name__} {len(fields(value))} ".encode())
-        for field in fields(value):
-            _feed(digest, field.name)
-            _feed(digest, getattr(value, field.name))
-    elif isinstance(value, (tuple, list)):
-        digest.update(f"tuple {len(value)} ".encode())
-        for element in value:
-            _feed(digest, element)
-    elif isinstance(value, dict):
-        digest.update(f"dict {len(value)} ".encode())
-        for name in sorted(value):
-            _feed(digest, name)
-            _feed(digest, value[name])
-    elif value is None or isinstance(value, (bool, int, float, str, bytes, np.generic)):
-        plain = value.item() if isinstance(value, np.generic) else value
-        text = repr(plain)
-        digest.update(f"{type(plain).__name__} {len(text)} {text} ".encode())
-    else:
-        raise TypeError(f"a {type(value).__name__} cannot be part of a key")
+    packages = (f"{package} {version(package)}" for package in ("numpy", "scipy", "scikit-fem"))
+    return " ".join([source_digest("reduction"), *packages])
 
 
 def _value_of(arrays: dict[str, np.ndarray], key: str) -> Any:

@@ -20,19 +20,6 @@ def test_a_mesh_is_made_once_and_then_read_from_the_cache(host, package, own_cac
     assert [path.suffix for path in own_cache.iterdir()] == [".npz"]
 
 
-def test_the_key_of_a_mesh_contains_everything_that_determines_it(package):
-    key = package("cache").cache_key
-    points, triangles = np.eye(3), np.array([[0, 1, 2]])
-    keys = [
-        key(points, triangles, {"size": 1.0}),
-        key(points + 1e-15, triangles, {"size": 1.0}),
-        key(points, triangles[:, ::-1], {"size": 1.0}),
-        key(points, triangles, {"size": 1.1}),
-    ]
-    assert len(set(keys)) == 4
-    assert keys[0] == key(points.copy(), triangles.astype(np.int64), {"size": 1.0})
-
-
 def test_a_cache_that_cannot_be_written_is_not_an_error(host, monkeypatch, tmp_path):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "file"))

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import hashlib
 import logging
 import os
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,20 @@ class Entry:
     path: Path
     size: int
     used: int
+
+
+def key_of(*parts: object) -> str:
+    """Hash of values that determine what is stored; hexadecimal.
+
+    Args:
+        parts: Arrays, numbers, texts, None, and tuples, lists, dicts or dataclasses of them.
+
+    Raises:
+        TypeError: A part is of another type.
+    """
+    digest = hashlib.sha256()
+    _feed(digest, parts)
+    return digest.hexdigest()
 
 
 def stored(path: Path, name: str) -> bytes | None:
@@ -181,6 +196,35 @@ def _tidy(folder: Path) -> None:
     """Remove what killed processes left in a folder that this one may only read; once in a process."""
     with contextlib.suppress(OSError):
         remove_abandoned(folder)
+
+
+def _feed(digest: Any, value: Any) -> None:
+    """Add a value to a hash, its type and size first, so that different values have different hashes."""
+    if isinstance(value, np.ndarray):
+        if value.dtype.hasobject:
+            raise TypeError("an array of objects cannot be part of a key")
+        digest.update(f"array {value.dtype.str} {value.shape} ".encode())
+        digest.update(np.ascontiguousarray(value).tobytes())
+    elif is_dataclass(value) and not isinstance(value, type):
+        digest.update(f"{type(value).__name__} {len(fields(value))} ".encode())
+        for field in fields(value):
+            _feed(digest, field.name)
+            _feed(digest, getattr(value, field.name))
+    elif isinstance(value, (tuple, list)):
+        digest.update(f"tuple {len(value)} ".encode())
+        for element in value:
+            _feed(digest, element)
+    elif isinstance(value, dict):
+        digest.update(f"dict {len(value)} ".encode())
+        for name in sorted(value):
+            _feed(digest, name)
+            _feed(digest, value[name])
+    elif value is None or isinstance(value, (bool, int, float, str, bytes, np.generic)):
+        plain = value.item() if isinstance(value, np.generic) else value
+        text = repr(plain)
+        digest.update(f"{type(plain).__name__} {len(text)} {text} ".encode())
+    else:
+        raise TypeError(f"a {type(value).__name__} cannot be part of a key")
 
 
 def _file(cache: str, key: str) -> Path:
