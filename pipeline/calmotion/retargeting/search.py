@@ -104,7 +104,9 @@ class RetargetSearch:
         resumed = self._resume()
         fixed = self.hold()
         try:
-            if not resumed and not np.any(start):
+            if not resumed and (not np.any(start) or self.animation.current is self.animation.tracks):
+                if np.any(start):
+                    self.problem.value(start)
                 self.search = damping_homotopy(self.problem, start, fixed, self.frequency)
             self._descend(fixed)
             if len(idle_motors(self.character)):

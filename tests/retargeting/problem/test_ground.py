@@ -37,7 +37,8 @@ def posed(tmp_path_factory):
     found = prepare(compile_shot(shot.character, shot.animation), options)
     curves = sample_curves(shot.animation.tracks, found.grid)
     intended = intended_motion(found, curves.angles, curves.rates)
-    problem, start, _ = pose(found, curves, intended, options)
+    problem, _, _ = pose(found, curves, intended, options)
+    start = np.zeros(problem.size)  # the animation
     problem.value(start)
     keep_feet(found, problem)
     locked = locked_coefficients(shot.animation, problem.space.basis, problem.space.motors, problem.grid.end)

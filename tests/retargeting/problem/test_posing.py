@@ -36,3 +36,24 @@ def test_a_soft_servo_may_be_told_to_go_far_ahead(monkeypatch):
     monkeypatch.setattr(posing, "CLOSENESS_OF_COMMANDS", CLOSENESS)
     held_back = share()
     assert left < 0.7 * held_back
+
+
+def lagging(max_torque):
+    """An arm on servos whose damping lets them lag by 0.1 s, which the torque that they have allows to make up for."""
+    rotor = Rotor(0.0, np.inf, 0.0, 1.0, 0.1)
+    gains = {"position_gain": 300.0, "velocity_gain": 30.0, "damping_on": "joint", "max_torque": max_torque}
+    character = chain(2, driven=(0, 1), length=0.3)
+    motors = tuple(replace(m, model="servo", rotor=rotor, **gains) for m in character.motors)
+    wave = np.sin(np.pi * FRAMES) ** 4
+    tracks = (Track(FRAMES, 0.9 * wave), Track(FRAMES, -1.2 * wave))
+    return compile_shot(replace(character, motors=motors), Animation(FRAMES, tracks, tracks))
+
+
+def test_a_search_begins_at_the_commands_of_the_rigid_robot():
+    options = RunSettings(step=1 / 240, tolerance=1e-5)
+    result = optimize_shot(lagging(40.0), options, ignore_progress)
+    assert result.stopped == "converged" and result.iterations < 20
+    assert result.steps[0].objective < 0.01 * result.objective_before
+    assert result.after.position_errors.max() < 2e-3 * result.before.position_errors.max()
+    still = optimize_shot(lagging(40.0), replace(options, max_iterations=0), ignore_progress)
+    assert still.objective_after == still.objective_before, "no iteration, no change"

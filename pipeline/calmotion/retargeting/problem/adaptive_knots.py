@@ -92,8 +92,12 @@ def fitted(basis: OffsetBasis, offsets: Array) -> Array:
     return solved
 
 
-def breaks_for(grid: TimeGrid, kept_ends: bool, offsets: Array) -> IntArray:
-    """Frames of knots whose splines reproduce offsets of shape [T, m], by halving where needed."""
+def breaks_for(grid: TimeGrid, kept_ends: bool, offsets: Array, allowed: float = FIT) -> IntArray:
+    """Frames of knots whose splines reproduce offsets of shape [T, m], by halving where needed.
+
+    Args:
+        allowed: Largest error [rad or m].
+    """
     breaks = first_breaks(grid)
     while True:
         basis = basis_on(grid, breaks, kept_ends)
@@ -101,7 +105,7 @@ def breaks_for(grid: TimeGrid, kept_ends: bool, offsets: Array) -> IntArray:
         at = np.clip(np.searchsorted(basis.knots, grid.times, side="right") - 1, 0, len(breaks) - 2)
         worst = np.zeros(len(breaks) - 1)
         np.maximum.at(worst, at, error)
-        finer = halved(grid, breaks, worst > FIT)
+        finer = halved(grid, breaks, worst > allowed)
         if len(finer) == len(breaks):
             return breaks
         breaks = finer

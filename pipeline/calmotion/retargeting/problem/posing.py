@@ -7,24 +7,29 @@ from dataclasses import dataclass
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.retargeting.problem.adaptive_knots import breaks_for, first_breaks, fitted
+from calmotion.multibody.analysis.reactions import reactions
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.model.model import rigid_model
+from calmotion.multibody.motors.inverse import inverse_commands
+from calmotion.retargeting.problem.adaptive_knots import FIT, breaks_for, first_breaks, fitted
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on, uniform_breaks
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.shot import Animation, Character
-from calmotion.shot.character import Array, BoolArray, IntArray
-from calmotion.shot.motor import PRESCRIBED
+from calmotion.shot.character import Array, BoolArray, IntArray, motors_give
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.motor_limits import Bounds, motor_bounds
 from calmotion.simulation.prepare import Prepared
+from calmotion.simulation.simulator import Simulator
 from calmotion.simulation.target_errors import IntendedMotion, Objective
 
 SMOOTHNESS = 1e-10
 CLOSENESS = 1e-4  # an offset of 0.1 rad has the weight of an error of 1 mm [m^2/rad^2]
+AHEAD = 1e-4  # error of the spline fit to the rigid robot's commands, from which a search only starts [rad or m]
 CLOSENESS_OF_COMMANDS = 3e-6  # the same where motors give: commands are ahead of the motion by what motors lag
 
 
@@ -43,7 +48,10 @@ def pose(
         ShotError: No motor may change, or options contradict each other.
     """
     character, grid, animation = prepared.character, prepared.grid, prepared.shot.animation
-    known = unknowns(character, animation, grid, options)
+    ahead = None
+    if motors_give(character) and animation.current is animation.tracks and options.max_iterations:
+        ahead = _rigid_offsets(prepared, curves)
+    known = unknowns(character, animation, grid, options, ahead)
     smoothness = next(v for v in (options.smoothness, character.retarget.smoothness, SMOOTHNESS) if v is not None)
     problem = RetargetProblem(
         prepared.model, grid, curves, Objective.over(prepared.model, intended, grid, animation.weights),
@@ -52,7 +60,25 @@ def pose(
     )  # fmt: skip
     offsets = known.offsets
     start = fitted(known.basis, offsets).ravel() if np.any(offsets) else np.zeros(problem.size)
-    return problem, np.where(known.fixed, 0.0, start), not knot_spacing(character, options)
+    start = np.where(known.fixed, 0.0, start)
+    if ahead is not None and not problem.value(start) < problem.value(np.zeros(problem.size)):
+        start = np.zeros(problem.size)
+    problem.forget()
+    return problem, start, not knot_spacing(character, options)
+
+
+def _rigid_offsets(prepared: Prepared, curves: Curves) -> Array | None:
+    """What the commands of the rigid robot on its motors are ahead of the animation, shape [T, m]; None where the rigid
+    robot cannot follow it."""
+    model, grid, character = prepared.model, prepared.grid, prepared.character
+    rigid = rigid_model(model)
+    try:
+        run = Simulator(rigid, grid.h, prepared.world, grid.cyclic).run(curves.angles, curves.rates)
+    except SimulationFailure:
+        return None
+    found = reactions(rigid.system, run.trajectory, run.joint_angles, run.joint_rates)
+    commands = inverse_commands(character.motors, grid.times, curves.angles, model.motor_values(found.efforts))
+    return np.asarray((commands - curves.angles)[:, leaders(character)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +89,7 @@ class Unknowns:
         basis: Of the offsets.
         motors: Those with unknowns, shape [m].
         coupling: Of all motors to these, shape [M, m].
-        offsets: The offsets that the shot already contains, shape [T, m].
+        offsets: From which the search starts, shape [T, m].
         fixed: Coefficients that change a curve where the shot locks it, shape [P * m].
         bounds: Limits by the name of their quantity.
         continuous: Whether the adjoint is continuous.
@@ -80,8 +106,7 @@ class Unknowns:
 
 def closeness_of(character: Character) -> float:
     """Weight of the squared offsets [m^2/rad^2]."""
-    gives = any(motor.model != PRESCRIBED for motor in character.motors)
-    return CLOSENESS_OF_COMMANDS if gives else CLOSENESS
+    return CLOSENESS_OF_COMMANDS if motors_give(character) else CLOSENESS
 
 
 def knot_spacing(character: Character, options: RunSettings) -> float | None:
@@ -89,15 +114,22 @@ def knot_spacing(character: Character, options: RunSettings) -> float | None:
     return options.knot_spacing or character.retarget.knot_spacing
 
 
-def unknowns(character: Character, animation: Animation, grid: TimeGrid, options: RunSettings) -> Unknowns:
+def unknowns(
+    character: Character, animation: Animation, grid: TimeGrid, options: RunSettings, offsets: Array | None = None
+) -> Unknowns:  # fmt: skip
     """What a search may change.
+
+    Args:
+        offsets: From which it starts, shape [T, m]; None: from those that the shot already contains.
 
     Raises:
         ShotError: No motor may change, or options contradict each other.
     """
     settings, motors = character.retarget, leaders(character)
     coupling = coupling_of(character, motors)
-    kept_ends, offsets = settings.endpoints == "kept", existing_offsets(animation, grid, motors)
+    kept_ends = settings.endpoints == "kept"
+    allowed = FIT if offsets is None else AHEAD
+    offsets = existing_offsets(animation, grid, motors) if offsets is None else offsets
     spacing = knot_spacing(character, options)
     if spacing and not spacing <= grid.end:
         raise ShotError(
@@ -110,7 +142,7 @@ def unknowns(character: Character, animation: Animation, grid: TimeGrid, options
     if spacing:
         breaks = uniform_breaks(grid, spacing)
     else:
-        breaks = breaks_for(grid, kept_ends, offsets) if np.any(offsets) else first_breaks(grid)
+        breaks = breaks_for(grid, kept_ends, offsets, allowed) if np.any(offsets) else first_breaks(grid)
     basis = basis_on(grid, breaks, kept_ends)
     if not basis.count:
         raise ShotError(

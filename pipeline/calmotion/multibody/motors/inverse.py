@@ -1,0 +1,56 @@
+"""Commands under which motors that give would do exactly what ideal ones do, from the efforts that this takes.
+
+They are exact on rigid links, but for damping in gears, and limits that a torque would exceed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calmotion.shot.character import Array
+from calmotion.shot.motor import ON_JOINT, PRESCRIBED, SERVO, Motor, Rotor
+
+_MOST = 0.95  # share of its largest torque that a command asks of a motor
+
+
+def inverse_commands(motors: Sequence[Motor], times: Array, values: Array, efforts: Array) -> Array:
+    """Commands of motors from what their joints should do.
+
+    Args:
+        motors: Ideal ones are commanded what they do.
+        times: Equidistant [s], shape [T].
+        values: Of their joints [rad or m], shape [T, M].
+        efforts: That move the joints so [N m or N], shape [T, M].
+
+    Returns:
+        Shape [T, M].
+    """
+    commands = values.copy()
+    for k, motor in enumerate(motors):
+        if motor.model != PRESCRIBED and motor.position_gain > 0.0:
+            commands[:, k] = _command(motor, times, values[:, k], efforts[:, k])
+    return commands
+
+
+def _command(motor: Motor, times: Array, value: Array, effort: Array) -> Array:
+    own, h = motor.rotor if motor.model == SERVO else Rotor(), float(times[1] - times[0])
+    turned = value + effort / own.gear_stiffness
+    speed = np.gradient(turned, h)
+    friction = own.viscous_friction * speed + own.friction * np.tanh(speed / own.friction_speed)
+    wanted = effort + own.armature * np.gradient(speed, h) + friction
+    if motor.model == SERVO:
+        wanted = np.clip(wanted, -_MOST * motor.max_torque, _MOST * motor.max_torque)
+    lag = motor.velocity_gain / motor.position_gain
+    ahead = wanted / motor.position_gain
+    ahead = ahead + lag * speed if motor.damping_on == ON_JOINT else _relaxed(ahead, h / max(lag, 1e-9 * h))
+    return np.asarray(np.interp(times + motor.delay, times, turned + ahead))
+
+
+def _relaxed(wanted: Array, ratio: float) -> Array:
+    """The solution x of x + x' / ratio = wanted, times in steps, that begins at rest."""
+    found = wanted.copy()
+    for n in range(1, len(wanted)):
+        found[n] = (found[n - 1] + ratio * wanted[n]) / (1.0 + ratio)
+    return found

@@ -1,0 +1,52 @@
+"""Commands of the rigid robot's inverse: motors that give then do what ideal ones do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arms import chain, compiled
+from calmotion.multibody.motors.inverse import inverse_commands
+from calmotion.shot import Motor
+from calmotion.shot.motor import Rotor
+from motor_runs import pitch, run
+
+H = 1e-3
+TIMES = H * np.arange(700)
+WAVE = np.pi * np.clip((TIMES - 0.1) / 0.5, 0.0, 1.0)
+CURVE = (0.4 * np.sin(WAVE) ** 4)[:, None]
+SERVO = {"model": "servo", "rotor": Rotor(0.05, np.inf, 0.0, 0.5, 0.3), "max_torque": 60.0}
+GEAR = {"model": "servo", "rotor": replace(SERVO["rotor"], gear_stiffness=900.0)}
+
+
+@pytest.mark.parametrize(
+    ("kind", "more"),
+    [("joint", {"model": "drive"}), ("error", {"model": "drive"}), ("joint", SERVO), ("error", SERVO), ("joint", GEAR)],
+    ids=["damped drive", "drive", "damped servo", "servo", "gear"],
+)
+def test_motors_on_the_commands_do_what_ideal_ones_do(kind, more):
+    character = chain(1, driven=(0,), length=0.4, mass=0.8)
+    gains = {"position_gain": 150.0, "velocity_gain": 12.0, "damping_on": kind} | more
+    motors = tuple(replace(motor, **gains) for motor in character.motors)
+
+    def performed(character, curve):
+        model = compiled(character)
+        found, loads = run(model, curve, np.gradient(curve, H, axis=0), H)
+        return pitch(found.states), model.motor_values(loads.efforts)
+
+    intended, efforts = performed(character, CURVE)
+    giving = replace(character, motors=motors)
+    followed, _ = performed(giving, inverse_commands(motors, TIMES, CURVE, efforts))
+    lagging, _ = performed(giving, CURVE)
+    off = np.abs(followed - intended).max()
+    assert off < 2e-3 < 0.1 * np.abs(lagging - intended).max()
+
+
+def test_late_motors_are_commanded_earlier_ideal_ones_what_they_do_and_no_motor_more_than_it_has():
+    late = Motor(0, "", "", model="drive", position_gain=100.0, delay=0.05)
+    weak = Motor(1, "", "", model="servo", position_gain=100.0, max_torque=10.0)
+    values = np.column_stack([TIMES, TIMES, 0.0 * TIMES])
+    efforts = np.column_stack([0.0 * TIMES, TIMES, 40.0 + 0.0 * TIMES])
+    found = inverse_commands((late, Motor(2, "", ""), weak), TIMES, values, efforts)
+    assert found[:-60, 0] == pytest.approx(TIMES[:-60] + 0.05)
+    assert np.array_equal(found[:, 1], TIMES)
+    assert found[:, 2] == pytest.approx(0.095)
