@@ -22,7 +22,8 @@ if TYPE_CHECKING:
         simulation_arguments,
         simulation_options,
     )
-    from calmotion.cli.output import FAILED, INTERRUPTED, Output, conclude, notice
+    from calmotion.cli.output import FAILED, INTERRUPTED, Output, conclude, notice, print_error
+    from calmotion.cli.parser import entry
     from calmotion.cli.progress import ProgressDisplay
     from calmotion.cli.quantities import angle, counted, length, measured, quantity_in
     from calmotion.cli.tables import console_on, print_table, say
@@ -38,12 +39,14 @@ __all__ = [
     "console_on",
     "count_of",
     "counted",
+    "entry",
     "json_option",
     "length",
     "measured",
     "notice",
     "opened_shot",
     "plugin_option",
+    "print_error",
     "print_table",
     "progress_display",
     "quantity",
@@ -63,7 +66,8 @@ _HOMES = {
         "report_options", "run_arguments", "run_options", "shot_arguments", "simulation_arguments",
         "simulation_options",
     ),
-    "cli.output": ("FAILED", "INTERRUPTED", "Output", "conclude", "notice"),
+    "cli.output": ("FAILED", "INTERRUPTED", "Output", "conclude", "notice", "print_error"),
+    "cli.parser": ("entry",),
     "cli.progress": ("ProgressDisplay",),
     "cli.quantities": ("angle", "counted", "length", "measured", "quantity_in"),
     "cli.tables": ("console_on", "print_table", "say"),

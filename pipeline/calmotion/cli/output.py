@@ -5,21 +5,23 @@ from __future__ import annotations
 import json
 import logging
 import os
-import shutil
 import sys
-import textwrap
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import IO, Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
+from calmotion.cli.tables import console_on, filled
 from calmotion.errors import ShotError, each, failure_of_machine
 from calmotion.host import Host
 from calmotion.support.memory import was_short
 from calmotion.workflow.plain import plain
 from calmotion.workflow.problems import Problem, RunError
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 FAILED, INTERRUPTED = 1, 130
 
@@ -121,7 +123,7 @@ def conclude(
     report: Mapping[str, Any],
     problems: Sequence[Problem],
     output: Output,
-    show: Callable[[dict[str, Any], TextIO], None] | None = None,
+    show: Callable[[dict[str, Any], Console], None] | None = None,
 ) -> None:
     """Print the report and the problems.
 
@@ -136,7 +138,7 @@ def conclude(
         output.object({**report, **({"error": errors[0], "errors": errors} if errors else {})})
         return
     if report and show:
-        show(dict(report), output.stream)
+        show(dict(report), console_on(output.stream))
     for problem in problems:
         if problem.traceback:
             print(problem.traceback, end="", file=sys.stderr)
@@ -168,29 +170,3 @@ def tell_error(error: ShotError) -> None:
 def notice(text: str, indent: str = "  ") -> None:
     """Print a sentence on stderr, wrapped on a terminal."""
     print(filled(text, sys.stderr, indent), file=sys.stderr, flush=True)
-
-
-def width_of(stream: IO[str]) -> int | None:
-    """Characters of a line on a stream; None in a file, unless COLUMNS gives it, as for other programs."""
-    limited = stream.isatty() or os.environ.get("COLUMNS", "").isdigit()
-    return max(shutil.get_terminal_size().columns, 20) if limited else None
-
-
-def filled(text: str, stream: IO[str], indent: str = "  ") -> str:
-    """A text whose lines are wrapped between words where the stream is a terminal; no word is broken.
-
-    Args:
-        text: One or several lines.
-        stream: Where it will be printed.
-        indent: Before each further line of what is wrapped.
-    """
-    width = width_of(stream)
-    if width is None:
-        return text
-    return "\n".join(
-        textwrap.fill(
-            line, width, subsequent_indent=" " * (len(line) - len(line.lstrip())) + indent,
-            break_long_words=False, break_on_hyphens=False,
-        )
-        for line in text.split("\n")
-    )  # fmt: skip

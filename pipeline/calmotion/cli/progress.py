@@ -9,7 +9,8 @@ import sys
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from calmotion.cli.output import filled, notice
+from calmotion.cli.output import notice
+from calmotion.cli.tables import filled
 from calmotion.host import OperatorResult, Outcome
 from calmotion.workflow.run import Progress as Stage
 

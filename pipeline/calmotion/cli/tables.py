@@ -1,24 +1,53 @@
-"""Tables and sentences of reports for a person."""
+"""Tables and sentences of reports for a person; rich is imported when one is printed."""
 
 from __future__ import annotations
 
+import os
+import shutil
+import textwrap
 from collections.abc import Sequence
-from typing import Literal, TextIO
+from typing import IO, TYPE_CHECKING, Literal, TextIO
 
-from rich import box
-from rich.console import Console
-from rich.measure import Measurement
-from rich.table import Table
-
-from calmotion.cli.output import filled, width_of
 from calmotion.support.naming import distinct_names
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
 
 _FILE_WIDTH = 200  # characters of a line in a file, where nothing needs to be folded
 _SHORTENED = "(… stands for the start of a prim path; --json has whole paths)"
 
 
+def width_of(stream: IO[str]) -> int | None:
+    """Characters of a line on a stream; None in a file, unless COLUMNS gives it, as for other programs."""
+    limited = stream.isatty() or os.environ.get("COLUMNS", "").isdigit()
+    return max(shutil.get_terminal_size().columns, 20) if limited else None
+
+
+def filled(text: str, stream: IO[str], indent: str = "  ") -> str:
+    """A text whose lines are wrapped between words where the stream is a terminal; no word is broken.
+
+    Args:
+        text: One or several lines.
+        stream: Where it will be printed.
+        indent: Before each further line of what is wrapped.
+    """
+    width = width_of(stream)
+    if width is None:
+        return text
+    return "\n".join(
+        textwrap.fill(
+            line, width, subsequent_indent=" " * (len(line) - len(line.lstrip())) + indent,
+            break_long_words=False, break_on_hyphens=False,
+        )
+        for line in text.split("\n")
+    )  # fmt: skip
+
+
 def console_on(stream: TextIO) -> Console:
     """A console on a stream; as wide as the terminal, and wide in a file."""
+    from rich.console import Console
+
     return Console(file=stream, highlight=False, markup=False, emoji=False, width=width_of(stream) or _FILE_WIDTH)
 
 
@@ -44,6 +73,8 @@ def print_table(
     """
     if not rows:
         return
+    from rich.measure import Measurement
+
     console.print(title, style="bold", soft_wrap=True)
     shorter: dict[str, str] = {}
     table = _table(columns, rows, texts, console.width)
@@ -61,6 +92,9 @@ def print_table(
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], texts: int, width: int) -> Table:
     """A table whose texts stay on one line where the words of its numbers then have room."""
+    from rich import box
+    from rich.table import Table
+
     needed = 2 * (len(columns) - 1)
     for number, cells in enumerate(zip(columns, *rows, strict=True)):
         needed += max(len(part) for cell in cells for part in ([cell] if number < texts else cell.split() or [cell]))

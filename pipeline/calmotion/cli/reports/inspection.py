@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import shlex
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 from calmotion.cli.quantities import angle, counted, frequency, length
 from calmotion.cli.reports.left_out import print_left_out
 from calmotion.cli.reports.run import NOTHING_SHAKES, print_notes
-from calmotion.cli.tables import console_on, print_table, say
+from calmotion.cli.tables import print_table, say
 from calmotion.shot.motor import DRIVE, ON_ERROR, ON_JOINT, PRESCRIBED, SERVO
 from calmotion.shot.outputs import ERROR, WARNING
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
+def print_inspection(report: dict[str, Any], console: Console) -> None:
     """Print the content of a shot, or the findings of a check."""
     if "findings" in report:
-        _print_findings(console_on(stream), report)
+        _print_findings(console, report)
     else:
-        _print_contents(console_on(stream), report)
+        _print_contents(console, report)
 
 
 def _print_findings(console: Console, report: dict[str, Any]) -> None:

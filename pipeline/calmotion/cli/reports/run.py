@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from rich.console import Console
 
@@ -13,7 +13,7 @@ from calmotion.cli.quantities import about, angle, length
 from calmotion.cli.reports.feet import print_contacts, print_support
 from calmotion.cli.reports.left_out import print_left_out
 from calmotion.cli.reports.limits import print_limits, print_reason
-from calmotion.cli.tables import console_on, print_table, say
+from calmotion.cli.tables import print_table, say
 from calmotion.shot.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
 
 # What helps where an entry of the error budget is too large.
@@ -190,15 +190,14 @@ def _length_or_failed(metres: float | None) -> str:
     return "failed" if metres is None else length(metres)
 
 
-def print_run(report: dict[str, Any], stream: TextIO, verbose: bool = False) -> None:
+def print_run(report: dict[str, Any], console: Console, verbose: bool = False) -> None:
     """The report of `simulate` or `optimize`: the answer, the files, what needs attention, and the simplifications.
 
     Args:
         report: The report.
-        stream: Where it is printed.
+        console: Where it is printed.
         verbose: Whether the search, the steps, the error budget and the notes are printed as well.
     """
-    console = console_on(stream)
     print_verdict(console, report)
     print_errors(console, report, verbose)
     print_robustness(console, report)

@@ -2,6 +2,7 @@
 
 import io
 
+from calmotion.cli import console_on
 from calmotion.cli.commands.shots import calibrate, excite, refine
 
 PARAMETER = {
@@ -15,7 +16,7 @@ MOTOR |= dict.fromkeys(("range_share", "velocity_share", "acceleration_share", "
 
 def printed(module, report):
     stream = io.StringIO()
-    module._print(report, stream)
+    module._print(report, console_on(stream))
     return stream.getvalue().splitlines()
 
 

@@ -3,6 +3,7 @@
 import io
 
 import pytest
+from calmotion.cli import console_on
 from calmotion.cli.commands.shots.export import _print
 
 TARGET = {
@@ -26,7 +27,7 @@ REPORT = {
 )  # fmt: skip
 def test_the_answer_is_first_and_the_next_step_before_the_numbers(kept, lowest, then):
     stream = io.StringIO()
-    _print(REPORT | {"tolerance_kept": kept, "lowest_rate_hz": lowest}, stream)
+    _print(REPORT | {"tolerance_kept": kept, "lowest_rate_hz": lowest}, console_on(stream))
     lines = stream.getvalue().splitlines()
     keep = "keep" if kept else "do not keep"
     assert lines[0] == f"The commands {keep} the tolerance of 1 mm: playing them costs up to 2 mm."

@@ -2,6 +2,7 @@
 
 import io
 
+from calmotion.cli import console_on
 from calmotion.cli.commands.shows.sequence import _print
 from calmotion.workflow.sequence.run import Repertoire
 from repertoires import member
@@ -10,7 +11,7 @@ from repertoires import member
 def printed(*transitions):
     stream = io.StringIO()
     clips = [member("up", "up", "up"), member("down", "down", "down")]
-    _print(Repertoire("out", clips, transitions, 1.0).report(), stream)
+    _print(Repertoire("out", clips, transitions, 1.0).report(), console_on(stream))
     return stream.getvalue()
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import plugin_option, report_options
+from calmotion.cli import Output, assignments, conclude, counted, notice, plugin_option, report_options, say
 
 if TYPE_CHECKING:
-    from calmotion.cli.output import Output
+    from rich.console import Console
 
 EXAMPLES = (
     ("calmotion import arm.urdf --motion wave.csv -o shot.usda", "a shot of a robot and a motion"),
@@ -51,8 +51,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.cli.options import assignments
-    from calmotion.cli.output import conclude, notice
     from calmotion.host import SettingError
     from calmotion.workflow.importing.robot import import_robot
 
@@ -73,11 +71,8 @@ def run(args: argparse.Namespace, output: Output) -> int:
     return 0
 
 
-def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import counted
-    from calmotion.cli.tables import console_on, say
+def _print(report: dict[str, Any], console: Console) -> None:
 
-    console = console_on(stream)
     besides = " besides links whose material gives their mass" if report["mass_of_material"] else ""
     say(
         console,

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from calmotion.cli.options import json_option
-
-if TYPE_CHECKING:
-    from calmotion.cli.output import Output
+from calmotion.cli import Output, console_on, json_option, print_table, say
 
 EXAMPLES = (("calmotion materials abs", "one material, with its source"),)
 
@@ -52,7 +49,6 @@ def _as_toml(name: str, row: dict[str, Any]) -> str:
 
 
 def _print(rows: dict[str, dict[str, Any]], sources: bool, output: Output) -> None:
-    from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(output.stream)
     cells = [

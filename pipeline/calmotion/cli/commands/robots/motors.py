@@ -7,10 +7,9 @@ import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import json_option
+from calmotion.cli import Output, console_on, json_option, print_table, say
 
 if TYPE_CHECKING:
-    from calmotion.cli.output import Output
     from calmotion.control.motor_types import MotorType
 
 EXAMPLES = (("calmotion motors xm430-w350", "one motor, each value with its source"),)
@@ -90,7 +89,6 @@ def _speed_of(motor: MotorType) -> str:
 
 
 def _print(known: Mapping[str, MotorType], output: Output) -> None:
-    from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(output.stream)
     for group in dict.fromkeys(motor.group for motor in known.values()):
@@ -105,7 +103,6 @@ def _print(known: Mapping[str, MotorType], output: Output) -> None:
 
 
 def _print_one(motor: MotorType, output: Output) -> None:
-    from calmotion.cli.tables import console_on, print_table, say
     from calmotion.control.motor_types import QUANTITIES
 
     console = console_on(output.stream)

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import opened_shot, progress_display, run_arguments, shot_arguments
+from calmotion.cli import (
+    Output,
+    angle,
+    conclude,
+    opened_shot,
+    print_table,
+    progress_display,
+    run_arguments,
+    say,
+    shot_arguments,
+)
 
 if TYPE_CHECKING:
-    from calmotion.cli.output import Output
+    from rich.console import Console
 
 EXAMPLES = (("calmotion rig skinned.usda -o robot.usda", "a robot from a UsdSkel character"),)
 
@@ -21,7 +31,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.cli.output import conclude
     from calmotion.workflow.commands import rig
     from calmotion.workflow.report import rig_report
 
@@ -32,11 +41,8 @@ def run(args: argparse.Namespace, output: Output) -> int:
     return 0
 
 
-def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import angle
-    from calmotion.cli.tables import console_on, print_table, say
+def _print(report: dict[str, Any], console: Console) -> None:
 
-    console = console_on(stream)
     say(
         console,
         f"{report['robot']}: {report['bodies']} bodies, {report['motors']} motors, {report['mass_kg']:.4g} kg; "

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
-from calmotion.cli.parser import entry
-
-if TYPE_CHECKING:
-    from calmotion.cli.output import Output
+from calmotion.cli import Output, entry
 
 WHAT = {
     "work-precision": ("accuracy.work_precision", "error against run time of every setting"),

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import argparse
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from calmotion.cli.options import json_option
+from calmotion.cli import Output, console_on, json_option, print_table
 from calmotion.support.caching.cache_folder import CACHES, cache_folder
-
-if TYPE_CHECKING:
-    from calmotion.cli.output import Output
 
 EXAMPLES = (("calmotion cache info", "how large are the caches?"),)
 ALL = "all"
@@ -88,8 +85,6 @@ def _remove(args: argparse.Namespace, output: Output) -> int:
 
 def _print(title: str, rows: list[dict[str, Any]], output: Output) -> None:
     from rich.filesize import decimal
-
-    from calmotion.cli.tables import console_on, print_table
 
     def shown(key: str, value: Any) -> str:
         return decimal(value) if key.endswith("bytes") else str(value)

@@ -11,15 +11,11 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from calmotion.cli.options import json_option
+from calmotion.cli import Output, console_on, counted, json_option, print_table
 from calmotion.support.caching.cache_folder import cache_folder
 from calmotion.support.files import try_writing
 from calmotion.version import __version__
-
-if TYPE_CHECKING:
-    from calmotion.cli.output import Output
 
 EXAMPLES = (("calmotion doctor", "is everything in its place?"),)
 OK, NOTE, WRONG = "ok", "note", "wrong"
@@ -51,8 +47,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, output: Output) -> int:
     """Print what was found, what is wrong first."""
-    from calmotion.cli.quantities import counted
-    from calmotion.cli.tables import console_on, print_table
 
     findings = sorted(examine(), key=lambda one: (WRONG, NOTE, OK).index(one.state))
     wrong, notes = (sum(one.state == state for one in findings) for state in (WRONG, NOTE))

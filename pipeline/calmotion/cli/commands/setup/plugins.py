@@ -6,10 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import json_option, plugin_option
+from calmotion.cli import Output, json_option, plugin_option
 
 if TYPE_CHECKING:
-    from calmotion.cli.output import Output
     from calmotion.host import Operator, Plugin, Property
 
 
@@ -102,7 +101,7 @@ def _operator(cls: type[Operator]) -> dict[str, Any]:
 
 
 def _print_plugin(plugin: Plugin, output: Output, verbose: bool) -> None:
-    from calmotion.cli.output import filled
+    from calmotion.cli.tables import filled
 
     def tell(line: str) -> None:
         print(filled(line, output.stream, " " * 8), file=output.stream)

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
-from calmotion.cli.options import json_option
-
-if TYPE_CHECKING:
-    from calmotion.cli.output import Output
+from calmotion.cli import Output, json_option
 
 EXAMPLES = (("calmotion warmup", "after an installation or an update"),)
 

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import (
+from calmotion.cli import (
+    Output,
     assignments,
+    conclude,
+    counted,
+    measured,
     opened_shot,
+    print_table,
     progress_display,
     quantity,
+    quantity_in,
+    say,
     shot_arguments,
 )
 
@@ -17,8 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rich.console import Console
-
-    from calmotion.cli.output import Output
 
 EXAMPLES = (
     ("calmotion calibrate shot.usda --recording take.csv -o robot.usda", "markers, encoders"),
@@ -95,7 +100,6 @@ def parameter_arguments(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.cli.output import conclude
     from calmotion.workflow.calibration.calibrate import calibrate
     from calmotion.workflow.exporting.export import with_shot
 
@@ -116,11 +120,8 @@ def _went(row: dict[str, Any]) -> str:
     return "falls" if row["rms"] < row["rms_before"] else "goes"
 
 
-def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import counted, quantity_in
-    from calmotion.cli.tables import console_on, say
+def _print(report: dict[str, Any], console: Console) -> None:
 
-    console = console_on(stream)
     of_robot = [row for row in report["parameters"] if row["of_robot"]]
     told = sum(row["identifiable"] for row in of_robot)
     say(console, f"The recordings tell {told} of {counted(len(of_robot), 'parameter')} of the robot.")
@@ -155,8 +156,6 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
 
 def _print_parameters(console: Console, title: str, parameters: Sequence[dict[str, Any]]) -> None:
     """A table of parameters; nothing without any."""
-    from calmotion.cli.quantities import measured, quantity_in
-    from calmotion.cli.tables import print_table
 
     rows = []
     for row in parameters:

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.commands.shots.calibrate import parameter_arguments, prior_option
-from calmotion.cli.options import (
+from calmotion.cli import (
+    Output,
     assignments,
+    conclude,
     count_of,
+    counted,
+    length,
     opened_shot,
+    print_table,
     progress_display,
     quantity,
+    quantity_in,
+    say,
     shot_arguments,
 )
+from calmotion.cli.commands.shots.calibrate import parameter_arguments, prior_option
 
 if TYPE_CHECKING:
-    from calmotion.cli.output import Output
+    from rich.console import Console
 
 EXAMPLES = (
     ("calmotion excite shot.usda -o test.usda", "accelerometers at the targets, encoders"),
@@ -61,7 +68,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.cli.output import conclude
     from calmotion.workflow.calibration.excite import SENSORS, excite
 
     shot = opened_shot(args)
@@ -76,11 +82,8 @@ def run(args: argparse.Namespace, output: Output) -> int:
     return 0
 
 
-def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import counted, quantity_in
-    from calmotion.cli.tables import console_on, print_table, say
+def _print(report: dict[str, Any], console: Console) -> None:
 
-    console = console_on(stream)
     told = sum(row["identifiable"] for row in report["parameters"])
     say(console, f"A recording of this motion would tell {told} of {counted(len(report['parameters']), 'parameter')}.")
     rows = [
@@ -120,7 +123,6 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
 
 def _collisions(report: dict[str, Any]) -> list[str]:
     """What is known of collisions."""
-    from calmotion.cli.quantities import length
 
     told, unchecked = [], report["unchecked_pairs"]
     if report["clearances"]:

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import (
+from calmotion.cli import (
+    FAILED,
+    Output,
     assignments,
+    conclude,
+    counted,
+    length,
     opened_shot,
+    print_table,
     progress_display,
     quantity,
+    say,
     shot_arguments,
 )
 
 if TYPE_CHECKING:
-    from calmotion.cli.output import Output
+    from rich.console import Console
 
 EXAMPLES = (
     ("calmotion export calm_root.usda --to csv --rate 200Hz", "a table for any controller"),
@@ -68,7 +75,6 @@ def _rate(text: str) -> float:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.cli.output import FAILED, conclude
     from calmotion.workflow.exporting.export import export, with_shot
 
     args.shot = with_shot(args.shot)
@@ -83,11 +89,8 @@ def run(args: argparse.Namespace, output: Output) -> int:
     return FAILED if args.strict and not made.tolerance_kept else 0
 
 
-def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import counted, length
-    from calmotion.cli.tables import console_on, print_table, say
+def _print(report: dict[str, Any], console: Console) -> None:
 
-    console = console_on(stream)
     tolerance, kept, lowest = length(report["tolerance_m"]), report["tolerance_kept"], report["lowest_rate_hz"]
     say(
         console,

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
-from calmotion.cli.options import (
+from calmotion.cli import (
+    FAILED,
+    INTERRUPTED,
+    Output,
+    conclude,
     opened_shot,
     progress_display,
     run_arguments,
@@ -13,9 +16,6 @@ from calmotion.cli.options import (
     simulation_arguments,
     simulation_options,
 )
-
-if TYPE_CHECKING:
-    from calmotion.cli.output import Output
 
 EXAMPLES = (
     ("calmotion inspect shot.usda", "bodies, motors, targets, frequencies"),
@@ -41,7 +41,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.cli.output import FAILED, INTERRUPTED, conclude
     from calmotion.cli.reports.inspection import print_inspection
     from calmotion.workflow.commands import inspect
 

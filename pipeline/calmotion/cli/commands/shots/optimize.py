@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
-from calmotion.cli.options import quantity, run_options, shot_arguments, simulation_options
-
-if TYPE_CHECKING:
-    from calmotion.cli.output import Output
+from calmotion.cli import Output, quantity, run_options, shot_arguments, simulation_options
 
 EXAMPLES = (
     ("calmotion optimize shot.usda -o calm.usda", "the usual case"),

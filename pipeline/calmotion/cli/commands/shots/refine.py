@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.commands.shots.calibrate import parameter_arguments, prior_option
-from calmotion.cli.options import (
+from calmotion.cli import (
+    Output,
     assignments,
+    conclude,
+    length,
+    measured,
     opened_shot,
+    print_table,
     progress_display,
     quantity,
+    quantity_in,
+    say,
     shot_arguments,
 )
+from calmotion.cli.commands.shots.calibrate import parameter_arguments, prior_option
 
 if TYPE_CHECKING:
-    from calmotion.cli.output import Output
+    from rich.console import Console
 
 EXAMPLES = (
     ("calmotion refine take1_root.usda --recording take1.csv -o take2.usda", "better curves for the second one"),
@@ -46,7 +53,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.cli.output import conclude
     from calmotion.workflow.calibration.refine import refine
     from calmotion.workflow.exporting.export import with_shot
 
@@ -62,11 +68,8 @@ def run(args: argparse.Namespace, output: Output) -> int:
     return 0
 
 
-def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import length, measured, quantity_in
-    from calmotion.cli.tables import console_on, print_table, say
+def _print(report: dict[str, Any], console: Console) -> None:
 
-    console = console_on(stream)
     played, expected = (
         max((row[name] for row in report["targets"]), default=0.0)
         for name in ("max_error_played_m", "expected_max_error_m")

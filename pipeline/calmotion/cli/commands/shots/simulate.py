@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
-from calmotion.cli.options import run_options, shot_arguments, simulation_options
-
-if TYPE_CHECKING:
-    from calmotion.cli.output import Output
-
+from calmotion.cli import Output, run_options, shot_arguments, simulation_options
 
 EXAMPLES = (
     ("calmotion simulate shot.usda", "how much does it shake as animated?"),

@@ -6,10 +6,19 @@ import argparse
 import time
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import count_of, run_options, shot_arguments, simulation_options
+from calmotion.cli import (
+    FAILED,
+    Output,
+    count_of,
+    length,
+    notice,
+    print_error,
+    run_options,
+    shot_arguments,
+    simulation_options,
+)
 
 if TYPE_CHECKING:
-    from calmotion.cli.output import Output
     from calmotion.workflow.results import SimulationResult
     from calmotion.workflow.shot import Shot
 
@@ -39,7 +48,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
     Raises:
         SettingError: An option or setting does not fit.
     """
-    from calmotion.cli.output import FAILED, notice, print_error
     from calmotion.cli.run import run_once, shot_to_run
     from calmotion.errors import ShotError
     from calmotion.host import SettingError
@@ -83,7 +91,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 def _tell(result: SimulationResult, report: dict[str, Any], args: argparse.Namespace, output: Output) -> int:
     """Print one line for a run; the exit status that it has alone."""
-    from calmotion.cli.quantities import length
     from calmotion.cli.run import status_of
     from calmotion.workflow.watch import largest_error
 

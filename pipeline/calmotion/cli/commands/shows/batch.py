@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
+from calmotion.cli import FAILED, INTERRUPTED, Output, conclude, counted, length, report_options, say
 from calmotion.cli.commands.shows.forwarding import command_of, extras_of, forwarded, forwarded_options
-from calmotion.cli.options import report_options
 
 if TYPE_CHECKING:
-    from calmotion.cli.output import Output
-
+    from rich.console import Console
 
 # Outcomes in words, where the word of the JSON object says too little.
 SAID = {"kept": "done before, nothing has changed"}
@@ -49,7 +48,6 @@ def worker_count(text: str) -> int:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.cli.output import FAILED, INTERRUPTED, conclude
     from calmotion.cli.progress import ProgressDisplay
     from calmotion.workflow.batch.run import batch
 
@@ -64,11 +62,9 @@ def run(args: argparse.Namespace, output: Output) -> int:
     return 0 if result.successful else FAILED
 
 
-def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import counted, length
-
+def _print(report: dict[str, Any], console: Console) -> None:
     counts = ", ".join(f"{count} {SAID.get(name, name)}" for name, count in report["outcomes"].items())
-    print(f"{counted(len(report['jobs']), 'shot')} in {report['wall_s']:.1f} s: {counts}", file=stream)
+    say(console, f"{counted(len(report['jobs']), 'shot')} in {report['wall_s']:.1f} s: {counts}")
     for job in report["jobs"]:
         line = f"  {job['name']}: {SAID.get(job['outcome'], job['outcome'])}"
         before, after = job.get("max_error_before_m", job.get("max_error_m")), job.get("max_error_after_m")
@@ -78,15 +74,15 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
             line += ", tolerance missed"
         if job["attempts"] > 1:
             line += f", {job['attempts']} attempts"
-        print(line, file=stream)
+        say(console, line)
         if job["problem"]:
             problem = job["problem"]
             place = ".".join(filter(None, (problem.get("path"), problem.get("attribute"))))
-            print(f"    {place + ': ' if place else ''}{problem['problem']}", file=stream)
-            print(f"    log: {job['log']}", file=stream)
-    print(f"report: {report['folder']}/batch.md", file=stream)
+            say(console, f"    {place + ': ' if place else ''}{problem['problem']}")
+            say(console, f"    log: {job['log']}")
+    say(console, f"report: {report['folder']}/batch.md")
     roots = [job["root_layer"] for job in report["jobs"] if job["root_layer"]]
     if roots:
-        print(f"next: open {roots[0]}{' (one for each shot)' if len(roots) > 1 else ''}", file=stream)
+        say(console, f"next: open {roots[0]}{' (one for each shot)' if len(roots) > 1 else ''}")
     if len(roots) < len(report["jobs"]):
-        print("next: the same command runs only what is not done", file=stream)
+        say(console, "next: the same command runs only what is not done")

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
+from calmotion.cli import FAILED, INTERRUPTED, Output, conclude, length, print_table, report_options, say
 from calmotion.cli.commands.shows.batch import worker_count
 from calmotion.cli.commands.shows.forwarding import forwarded, forwarded_options
-from calmotion.cli.options import report_options
 
 if TYPE_CHECKING:
-    from calmotion.cli.output import Output
-
+    from rich.console import Console
 
 EXAMPLES = (("calmotion sequence clips.toml -o build/repertoire", "clips and all transitions between them"),)
 
@@ -32,7 +31,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.cli.output import FAILED, INTERRUPTED, conclude
     from calmotion.cli.progress import ProgressDisplay
     from calmotion.host import SettingError
     from calmotion.workflow.sequence.run import sequence
@@ -50,11 +48,8 @@ def run(args: argparse.Namespace, output: Output) -> int:
     return 0 if found.good else FAILED
 
 
-def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import length
-    from calmotion.cli.tables import console_on, print_table, say
-
-    console, members = console_on(stream), [*report["clips"], *report["transitions"]]
+def _print(report: dict[str, Any], console: Console) -> None:
+    members = [*report["clips"], *report["transitions"]]
     say(console, report["verdict"])
     heads = ("length", "max before", "max after", "may be played")
     for title, rows in (("Clips", report["clips"]), ("Transitions", report["transitions"])):

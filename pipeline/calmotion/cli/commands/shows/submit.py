@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
+from calmotion.cli import Output, conclude, report_options, say
 from calmotion.cli.commands.shows.forwarding import command_of, extras_of, forwarded, forwarded_options
-from calmotion.cli.options import report_options
 
 if TYPE_CHECKING:
-    from calmotion.cli.output import Output
-
+    from rich.console import Console
 
 EXAMPLES = (("calmotion submit shots/*.usda --openjd job.yaml -o /farm/calm", "a task for each shot"),)
 
@@ -25,7 +24,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.cli.output import conclude
     from calmotion.workflow.batch.jobs import jobs_for
     from calmotion.workflow.batch.openjd import write_template
 
@@ -36,8 +34,5 @@ def run(args: argparse.Namespace, output: Output) -> int:
     return 0
 
 
-def _print(report: dict[str, Any], stream: TextIO) -> None:
-    print(
-        f"wrote {report['template']}: {report['tasks']} tasks; try it here: openjd run {report['template']}",
-        file=stream,
-    )
+def _print(report: dict[str, Any], console: Console) -> None:
+    say(console, f"wrote {report['template']}: {report['tasks']} tasks; try it here: openjd run {report['template']}")
