@@ -32,6 +32,22 @@ def test_the_guide_names_what_there_is(calmotion):
     assert len(idnames) > 5 and all(f"    {name}  " in listed for name in idnames)
 
 
+def test_the_command_of_the_guide_runs(calmotion, make_plugin, monkeypatch):
+    import calmotion.cli as shared
+
+    page = GUIDE.read_text().split("### A command of the command line")[1].split("\n### ")[0]
+    names = re.findall(r"`(\w+)", page.split("| --- | --- |")[1].split("\n\n")[0])
+    assert len(names) > 15 and set(names) - {"arguments", "console", "report"} <= set(shared.__all__) | {"show"}
+    entry, source = (re.search(rf"```{language}\n(.*?)```", page, re.DOTALL)[1] for language in ("toml", "python"))
+    folder = make_plugin("speed_watch", "def register(host): ...\ndef unregister(host): ...\n")
+    (folder / "command.py").write_text(source)
+    manifest = folder / "plugin.toml"
+    manifest.write_text(f"{manifest.read_text()}\n{entry}")
+    monkeypatch.setenv("CALMOTION_PLUGINS", str(folder))
+    assert calmotion("speed", "a.usda", "--json").stdout.split() == ["{", '"shot":', '"a.usda"', "}"]
+    assert "list the fastest moments of a shot" in calmotion("--help").stdout
+
+
 @pytest.mark.long
 def test_the_guide_leads_from_an_empty_folder_to_an_installed_wheel(repository, tmp_path):
     wheels = tmp_path / "wheels"
