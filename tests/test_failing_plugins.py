@@ -10,7 +10,7 @@ from small_shots import write_arm
 HEAD = """
     from dataclasses import dataclass
     from calmotion.host import Operator
-    from calmotion.shot import Character
+    from calmotion.model import Character
 
     @dataclass(frozen=True)
     class Mark:

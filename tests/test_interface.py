@@ -28,7 +28,7 @@ def test_the_lazy_names_are_those_for_type_checkers():
 def test_importing_loads_nothing_heavy():
     code = (
         "import sys, calmotion;"
-        "heavy = {'numpy', 'pxr', 'rerun', 'numba', 'scipy', 'calmotion.host', 'calmotion.shot'};"
+        "heavy = {'numpy', 'pxr', 'rerun', 'numba', 'scipy', 'calmotion.host', 'calmotion.model'};"
         "print(sorted(heavy & set(sys.modules)))"
     )
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -123,8 +123,8 @@ def test_an_interrupt_while_a_plugin_loads_ends_the_program_in_one_line(
 
 OPERATOR = """
     from calmotion.host import Operator
-    from calmotion.shot import Character, Animation, Provenance
-    from calmotion.shot.run import Source
+    from calmotion.model import Character, Animation, Provenance
+    from calmotion.model.run import Source
 
     class Read(Operator):
         idname, label, requires, provides = "slow.read", "Read slowly", (Source,), (int,)

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 import synthetic
 from calmotion.host import PluginError
-from calmotion.shot.outputs import CsvFile
-from calmotion.shot.run import OutputPaths
+from calmotion.model.outputs import CsvFile
+from calmotion.model.run import OutputPaths
 from calmotion.testing import beam, check_plugin, host_with, run_operator, small_shot
 
 HEAD = """
     from calmotion.host import Operator, Property
-    from calmotion.shot import Character
+    from calmotion.model import Character
 
     class First(Operator):
         idname, label, provides = "smithy.first", "First", (Character,)

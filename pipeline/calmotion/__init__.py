@@ -16,7 +16,7 @@ from calmotion.version import __version__
 
 if TYPE_CHECKING:
     from calmotion.host.errors import SettingError
-    from calmotion.shot.run import OutputPaths
+    from calmotion.model.run import OutputPaths
     from calmotion.workflow.batch.report import BatchResult, JobResult
     from calmotion.workflow.batch.run import batch
     from calmotion.workflow.calibration.calibrate import CalibratedShot, calibrate

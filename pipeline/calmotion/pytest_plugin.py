@@ -10,7 +10,7 @@ import pytest
 
 if TYPE_CHECKING:
     from calmotion.host import Host
-    from calmotion.shot import Animation, Character
+    from calmotion.model import Animation, Character
 
 
 @pytest.fixture

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.host import Host, Plugin, PluginError, PluginState, Settings
 from calmotion.host.discovery import Location, PluginCommand
 from calmotion.host.manifest import FILE_NAME
-from calmotion.shot import (
+from calmotion.model import (
     WORLD,
     Animation,
     Body,
@@ -26,7 +27,6 @@ from calmotion.shot import (
     TetGeometry,
     Track,
 )
-from calmotion.shot.character import Array, IntArray
 
 LENGTH, WIDTH, DENSITY = 0.4, 0.04, 1200.0
 

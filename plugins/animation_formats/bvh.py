@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.control.commands import LINEAR, Commands, MotorCurves, instants
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array
 from calmotion.simulation.playing.body_poses import body_tree, local_poses, near_turn
 from calmotion.simulation.playing.parallel_frames import (
     ParallelSkeleton,

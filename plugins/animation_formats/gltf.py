@@ -7,9 +7,10 @@ import struct
 from typing import Any
 
 import numpy as np
+from calmotion.arrays import Array, IntArray
 from calmotion.control.commands import LINEAR, Commands, MotorCurves
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array, IntArray, SurfaceMesh
+from calmotion.model.character import SurfaceMesh
 from calmotion.simulation.playing.body_poses import (
     LocalPoses,
     body_tree,

@@ -6,15 +6,21 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
 from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.shot import Animation, Character, FEMeshes, ModelChoices, Result
-from calmotion.shot.character import motors_give
-from calmotion.shot.model_choice import no_flexible_bodies, run_settings, simplified_character
-from calmotion.shot.outputs import SystemModes
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.model import (
+    Animation,
+    Character,
+    FEMeshes,
+    ModelChoices,
+    Result,
+)
+from calmotion.model.character import motors_give
+from calmotion.model.model_choice import no_flexible_bodies, run_settings, simplified_character
+from calmotion.model.outputs import SystemModes
+from calmotion.model.run import OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.tolerance.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
 
 
 class ReduceFlexibleBodies(Operator):
@@ -41,7 +47,7 @@ class ReduceFlexibleBodies(Operator):
         return no_flexible_bodies(data)
 
     def check(self, context: RunContext) -> None:
-        from calmotion.reduction.interfaces.named_surfaces import refuse_named_surfaces
+        from calmotion.mesh.patches.named_surfaces import refuse_named_surfaces
         from calmotion.reduction.soft_bodies import refuse_soft_bodies
 
         character = simplified_character(context.get(Character), context.get(ModelChoices))
@@ -49,7 +55,7 @@ class ReduceFlexibleBodies(Operator):
         refuse_soft_bodies(character)
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.reduction.interfaces.contact_notes import contact_notes
+        from calmotion.mesh.patches.contact_notes import contact_notes
         from calmotion.simulation.bodies import mode_tables, with_elasticity
         from calmotion.simulation.body_reduction import BodyReduction, reduction_for
 
@@ -106,7 +112,7 @@ class FindSystemModes(Operator):
         return None if character is not None and motors_give(character) else no_flexible_bodies(data)
 
     def check(self, context: RunContext) -> None:
-        from calmotion.shot.run import RunSettings
+        from calmotion.model.run import RunSettings
         from calmotion.simulation.inputs.supported import refuse_unsupported
 
         refuse_unsupported(context.get(Character), context.get(Animation), RunSettings(pre_roll=0.0))

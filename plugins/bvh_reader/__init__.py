@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.shot import MotorTracks
-from calmotion.shot.run import Source
+from calmotion.model import MotorTracks
+from calmotion.model.run import Source
 
 
 class ReadMotion(Operator):

@@ -6,10 +6,10 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.host import SettingError, has_no_unit, nearest, parse_quantity
-from calmotion.shot import MotorTracks
-from calmotion.shot.character import Array
+from calmotion.model import MotorTracks
 
 from .bvh import BvhMotion
 

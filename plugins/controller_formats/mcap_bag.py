@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.control.commands import Commands
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array
 from calmotion.support.files import replaced
 
 from .ros2 import commands_of, stamp

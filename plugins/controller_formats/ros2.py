@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.control.commands import CUBIC, LINEAR, QUINTIC, Commands
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array
 from calmotion.support.files import write_text
 
 _REST = 1e-6  # speed that counts as rest [rad/s or m/s]

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.control.commands import HOLD, Commands, MotorCurves
 from calmotion.errors import ShotError, raise_all
-from calmotion.shot.character import Array
 from calmotion.support.files import write_text
 from numpy.typing import NDArray
 

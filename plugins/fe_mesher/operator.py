@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from calmotion.errors import ShotError, raise_all
 from calmotion.host import Operator, Property, RunContext
-from calmotion.shot import Character, FEMeshes, ModelChoices
-from calmotion.shot.model_choice import no_flexible_bodies
-
-from .tetwild import TIME_LIMIT
+from calmotion.mesh.tetrahedralize.tetwild import TIME_LIMIT
+from calmotion.model import Character, FEMeshes, ModelChoices
+from calmotion.model.model_choice import no_flexible_bodies
 
 if TYPE_CHECKING:
-    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
-    from calmotion.shot import Body, FEMesh
-
-    from .body_mesh import MeshOptions, Volume
-    from .sources.twins import Link
+    from calmotion.mesh.patches.interface_patches import AttachmentFrame
+    from calmotion.mesh.sources.twins import Link
+    from calmotion.model import Body, FEMesh
+    from calmotion.tolerance.meshes.body_mesh import MeshOptions, Volume
 
 
 class TetrahedralizeFlexibleBodies(Operator):
@@ -57,11 +55,10 @@ class TetrahedralizeFlexibleBodies(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         """The meshes, in the order of the bodies."""
         # manifold3d takes half a second to load: only for flexible bodies
+        from calmotion.mesh.sources.twins import twin_of
         from calmotion.simulation.bodies import bodies_in_parallel
-
-        from .accuracy import frames_of
-        from .body_mesh import MeshOptions, mesh_of, twin_mesh
-        from .sources.twins import twin_of
+        from calmotion.tolerance.meshes.accurate_mesh import frames_of
+        from calmotion.tolerance.meshes.body_mesh import MeshOptions, mesh_of, twin_mesh
 
         choices = context.get(ModelChoices)
         character = context.get(Character) if choices is None else choices.character
@@ -104,9 +101,9 @@ class TetrahedralizeFlexibleBodies(Operator):
 
 def _link(character: Character, index: int, geometry: FEMesh | Volume) -> Link | None:
     """What decides the mesh of a body; None where its tetrahedra are given."""
-    from .accuracy import frames_of
-    from .body_mesh import Volume
-    from .sources.twins import Link
+    from calmotion.mesh.sources.twins import Link
+    from calmotion.tolerance.meshes.accurate_mesh import frames_of
+    from calmotion.tolerance.meshes.body_mesh import Volume
 
     if not isinstance(geometry, Volume):
         return None
@@ -161,8 +158,8 @@ def _geometries(character: Character, flexible: Sequence[int], options: MeshOpti
     Raises:
         ShotError: What is wrong with any of them.
     """
-    from .accuracy import frames_of
-    from .body_mesh import geometry_of
+    from calmotion.tolerance.meshes.accurate_mesh import frames_of
+    from calmotion.tolerance.meshes.body_mesh import geometry_of
 
     geometries: dict[int, FEMesh | Volume] = {}
     problems = []

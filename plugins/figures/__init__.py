@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import Operator, Property, RunContext, registration
-from calmotion.shot import Animation, Character, Result
-from calmotion.shot.calibration.estimates import Calibration
-from calmotion.shot.outputs import CalibrationFigures, Figures, SystemModes
-from calmotion.shot.run import OutputPaths
+from calmotion.model import Animation, Character, Result
+from calmotion.model.calibration.estimates import Calibration
+from calmotion.model.outputs import CalibrationFigures, Figures, SystemModes
+from calmotion.model.run import OutputPaths
 
 
 class PlotFigures(Operator):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.shot.calibration.estimates import Calibration, ChannelCurves
+from calmotion.model.calibration.estimates import Calibration, ChannelCurves
 from matplotlib.figure import Figure
 
 from .style import AFTER, BEFORE, INTENDED, LIMIT, SMALL, new_figure, save, short, tidy

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from calmotion.shot import Character, Result, Simulation
-from calmotion.shot.motor import measure_of
+from calmotion.model import Character, Result, Simulation
+from calmotion.model.motor import measure_of
 from calmotion.views.playback import sample_motion
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from calmotion.errors import ShotError
-from calmotion.shot import Animation, Character, Result
-from calmotion.shot.outputs import SystemModes
+from calmotion.model import Animation, Character, Result
+from calmotion.model.outputs import SystemModes
 
 from .curves import plot_convergence, plot_errors, plot_motors
 from .filmstrip import draw_filmstrip

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from calmotion.geometry.tetrahedra import Indices
-from calmotion.shot import Motion
-from calmotion.shot.character import Array
+from calmotion.arrays import Array, Indices
+from calmotion.model import Motion
 from calmotion.views.raster import rasterize
 from calmotion.views.rendering import Camera, Mask, View, draw_over_ghost, pose
 from matplotlib.axes import Axes

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.shot import Character
-from calmotion.shot.robust.robots import Robustness
+from calmotion.model import Character
+from calmotion.model.robust.robots import Robustness
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 

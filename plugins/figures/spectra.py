@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.shot import Character, Result
-from calmotion.shot.outputs import SystemModes
+from calmotion.model import Character, Result
+from calmotion.model.outputs import SystemModes
 from calmotion.views.spectrum import error_spectrum, highest_frequency
 from matplotlib.figure import Figure
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.host import Operator, Property, RunContext, registration
-from calmotion.shot import Character, FEMeshes, ModelChoices
-from calmotion.shot.model_choice import no_flexible_bodies, run_settings, simplified_character
-from calmotion.shot.outputs import ModeShapes
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.model import Character, FEMeshes, ModelChoices
+from calmotion.model.model_choice import no_flexible_bodies, run_settings, simplified_character
+from calmotion.model.outputs import ModeShapes
+from calmotion.model.run import OutputPaths, Source
+from calmotion.tolerance.reduced_bodies import ReducedBodies
 
 
 class WriteModeShapes(Operator):

@@ -9,7 +9,7 @@ import numpy as np
 from calmotion.support.files import replaced
 
 if TYPE_CHECKING:
-    from calmotion.reduction.elements.assembly import QuadraticMesh
+    from calmotion.mesh.quadratic import QuadraticMesh
 
 COLUMNS = 4
 _WIDTH = 3.2  # of a panel [inch]

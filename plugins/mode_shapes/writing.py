@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.errors import ShotError
+from calmotion.model import Body
 from calmotion.reduction.damping import modal_damping
 from calmotion.reduction.inertia_integrals import inertia_integrals
-from calmotion.shot import Body
 from calmotion.support.files import replaced, write_text
 from calmotion.support.naming import distinct_names
 

@@ -7,14 +7,31 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.shot import Animation, Character, ModelChoices, Result
-from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, no_flexible_bodies, run_settings
-from calmotion.shot.motor import PRESCRIBED
-from calmotion.shot.outputs import MotorEffects, PlannedStep, ShapedTracks, Verification
-from calmotion.shot.run import LONG_SHOT, OutputPaths, Source
+from calmotion.model import (
+    Animation,
+    Character,
+    ModelChoices,
+    Result,
+)
+from calmotion.model.model_choice import (
+    AUTO,
+    KINDS,
+    OFF,
+    ON,
+    no_flexible_bodies,
+    run_settings,
+)
+from calmotion.model.motor import PRESCRIBED
+from calmotion.model.outputs import (
+    MotorEffects,
+    PlannedStep,
+    ShapedTracks,
+    Verification,
+)
+from calmotion.model.run import LONG_SHOT, OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.tolerance.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
 
 _FORCED = {
     "bodies": "Finite elements of all flexible bodies, or of none",
@@ -52,9 +69,9 @@ class AnalyseShot(Operator):
     )  # fmt: skip
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.accuracy.expected_cost import expected_cost, refuse_unaffordable
-        from calmotion.accuracy.simplification.analysis import analyse
         from calmotion.support.memory import available_memory
+        from calmotion.tolerance.expected_cost import expected_cost, refuse_unaffordable
+        from calmotion.tolerance.simplification.analysis import analyse
 
         source, paths = context.get(Source), context.get(OutputPaths)
         forced = {kind: getattr(context.properties, kind) for kind in KINDS}
@@ -85,7 +102,7 @@ class RefineReduction(Operator):
         return "its plugin cannot repeat the reduction" if reduced is not None and reduced.reduction is None else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.accuracy.converged_reduction import converged_reduction
+        from calmotion.tolerance.converged_reduction import converged_reduction
 
         source, reduction = context.get(Source), context.get(ReducedBodies).reduction
         assert reduction is not None
@@ -120,12 +137,12 @@ class PlanStep(Operator):
         return None if free else f"{reason}, and motors alone determine the motion"
 
     def check(self, context: RunContext) -> None:
-        from calmotion.accuracy.run_checks import check_simulation
+        from calmotion.tolerance.run_checks import check_simulation
 
         check_simulation(context.get(Character), context.get(Animation), run_settings(context.get(Source)))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.accuracy.simulate_to_tolerance import planned_step
+        from calmotion.tolerance.simulate_to_tolerance import planned_step
 
         context.progress(0.0, "simulating the shot as animated")
         options = run_settings(context.get(Source), context.get(ModelChoices))
@@ -169,12 +186,12 @@ class EstimateMotorEffects(Operator):
         return None
 
     def check(self, context: RunContext) -> None:
-        from calmotion.accuracy.run_checks import check_simulation
+        from calmotion.tolerance.run_checks import check_simulation
 
         check_simulation(context.get(Character), context.get(Animation), run_settings(context.get(Source)))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.accuracy.motors.motor_effects import effects_of_gains
+        from calmotion.tolerance.motors.motor_effects import effects_of_gains
 
         context.progress(0.0, "simulating the robot on motors that give")
         options = run_settings(context.get(Source), context.get(ModelChoices))
@@ -209,8 +226,8 @@ class VerifyResult(Operator):
         return NotAsked("no --verify is requested") if source is None or not source.verify else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.accuracy.verification.parts_in_time import Elsewhere
-        from calmotion.accuracy.verification.verify import verify
+        from calmotion.tolerance.verification.parts_in_time import Elsewhere
+        from calmotion.tolerance.verification.verify import verify
 
         shot, shaped, reduced = compiled_in(context.get), context.get(ShapedTracks), context.get(ReducedBodies)
         if shaped is not None:

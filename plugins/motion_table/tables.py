@@ -7,9 +7,9 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot import MotorTracks
-from calmotion.shot.character import Array
+from calmotion.model import MotorTracks
 from calmotion.support.files import refuse_special
 from calmotion.support.memory import available_memory, too_large
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.shot.calibration.recording import (
+from calmotion.model.calibration.recording import (
     ACCELEROMETER,
     ANGLE,
     EFFORT,

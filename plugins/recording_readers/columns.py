@@ -6,8 +6,8 @@ import csv
 from collections.abc import Mapping
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array
 from calmotion.support.naming import nearest
 from calmotion.support.reading import read_text
 

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.errors import ShotError, raise_all
-from calmotion.shot.calibration.recording import (
+from calmotion.model.calibration.recording import (
     ACCELEROMETER,
     ANGLE,
     COMPONENTS,
@@ -18,7 +19,6 @@ from calmotion.shot.calibration.recording import (
     RecordingRequest,
     SensorRecording,
 )
-from calmotion.shot.character import Array
 from calmotion.support.naming import nearest
 from calmotion.support.reading import read_toml
 from calmotion.workflow.calibration.recording_reader import hash_of

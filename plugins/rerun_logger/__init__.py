@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import Operator, Property, RunContext, registration
-from calmotion.shot import Animation, Character, Result
-from calmotion.shot.outputs import Recording, SystemModes
-from calmotion.shot.run import OutputPaths
+from calmotion.model import Animation, Character, Result
+from calmotion.model.outputs import Recording, SystemModes
+from calmotion.model.run import OutputPaths
 
 
 class LogRecording(Operator):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 Color = tuple[int, int, int]
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.shot import Character, Motion, Result
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
+from calmotion.model import Character, Motion, Result
 from calmotion.views.playback import deviations, modes_of
 from numpy.typing import NDArray
 

@@ -12,12 +12,18 @@ from pathlib import Path
 
 import numpy as np
 import rerun as rr
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.host import OperatorResult
-from calmotion.shot import Animation, Character, Motion, Result, Simulation
-from calmotion.shot.character import Array
-from calmotion.shot.motor import measure_of
-from calmotion.shot.outputs import SystemModes
+from calmotion.model import (
+    Animation,
+    Character,
+    Motion,
+    Result,
+    Simulation,
+)
+from calmotion.model.motor import measure_of
+from calmotion.model.outputs import SystemModes
 from calmotion.support.files import replaced
 from calmotion.support.naming import distinct_names
 from calmotion.views.playback import sample_motion

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.host import OperatorResult
-from calmotion.shot import Character, Result, Simulation
-from calmotion.shot.budget import verdict_on
-from calmotion.shot.character import Array
-from calmotion.shot.outputs import SystemModes
+from calmotion.model import Character, Result, Simulation
+from calmotion.model.budget import verdict_on
+from calmotion.model.outputs import SystemModes
 from calmotion.support.naming import distinct_names
 
 SHOWN_MODES = 6

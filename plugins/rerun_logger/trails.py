@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import rerun as rr
-from calmotion.shot import Character, Motion
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
+from calmotion.model import Character, Motion
 from calmotion.views.playback import sample_motion
 from numpy.typing import NDArray
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
+from calmotion.model.outputs import Rig
+from calmotion.model.run import OutputPaths, Source
 from calmotion.rigging.materials import MATERIALS
-from calmotion.shot.outputs import Rig
-from calmotion.shot.run import OutputPaths, Source
 
 
 class RigSkeleton(Operator):

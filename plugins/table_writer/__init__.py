@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, RunContext, registration
-from calmotion.shot import Character, Result
-from calmotion.shot.outputs import CsvFile
-from calmotion.shot.run import OutputPaths
+from calmotion.model import Character, Result
+from calmotion.model.outputs import CsvFile
+from calmotion.model.run import OutputPaths
 
 
 class WriteTable(Operator):
@@ -26,7 +26,7 @@ class WriteTable(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """Write the table; its path."""
-        from calmotion.shot.table import columns
+        from calmotion.model.table import columns
 
         from .table import write_table
 

@@ -6,8 +6,8 @@ import csv
 from collections.abc import Mapping
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array
 from calmotion.support.files import replaced
 
 AT_ONCE = 4096  # rows that are in memory at once

@@ -5,8 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from calmotion.host import Operator, RunContext, registration
-from calmotion.shot import Animation, Character, Findings, MotorTracks, Provenance
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.model import (
+    Animation,
+    Character,
+    Findings,
+    MotorTracks,
+    Provenance,
+)
+from calmotion.model.run import OutputPaths, Source
 
 
 class ReadShot(Operator):
@@ -21,7 +27,7 @@ class ReadShot(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         """The character, its animation and its provenance."""
         # pxr loads in a third of a second: only when a shot is read
-        from calmotion.shot.character import with_ideal_motors
+        from calmotion.model.character import with_ideal_motors
         from calmotion.usd.reading import read_shot
         from calmotion.usd.writing import refuse_inputs
 

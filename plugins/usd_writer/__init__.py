@@ -6,9 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from calmotion.host import Operator, Property, RunContext, registration
-from calmotion.shot import Animation, Character, Provenance, Result
-from calmotion.shot.outputs import WrittenLayer
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.model import (
+    Animation,
+    Character,
+    Provenance,
+    Result,
+)
+from calmotion.model.outputs import WrittenLayer
+from calmotion.model.run import OutputPaths, Source
 
 if TYPE_CHECKING:
     from calmotion.usd.writing import WriteOptions

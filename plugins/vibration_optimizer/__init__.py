@@ -6,16 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
 from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.shot import Animation, Character, ModelChoices, Result
-from calmotion.shot.model_choice import run_settings, simplified_character, with_choices
-from calmotion.shot.outputs import ShapedTracks
-from calmotion.shot.result import is_exceeded, is_reached
-from calmotion.shot.robust.settings import RobustSettings
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.model import (
+    Animation,
+    Character,
+    ModelChoices,
+    Result,
+)
+from calmotion.model.model_choice import run_settings, simplified_character, with_choices
+from calmotion.model.outputs import ShapedTracks
+from calmotion.model.result import is_exceeded, is_reached
+from calmotion.model.robust.settings import RobustSettings
+from calmotion.model.run import OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.tolerance.reduced_bodies import ConvergedReduction, compiled_in
 
 
 def _options(context: RunContext, **more: Any) -> Any:
@@ -25,10 +30,10 @@ def _options(context: RunContext, **more: Any) -> Any:
 
 def _with_budget(context: RunContext, result: Result, **more: float) -> Result:
     """The result with the decisions on the model, its error budget, and the parts of motors and links in its error."""
-    from calmotion.accuracy.error_budget import with_budget
-    from calmotion.accuracy.motors.backlash import with_lost_motion
-    from calmotion.accuracy.motors.motor_effects import with_error_shares
     from calmotion.retargeting.found_curves import best_so_far
+    from calmotion.tolerance.error_budget import with_budget
+    from calmotion.tolerance.motors.backlash import with_lost_motion
+    from calmotion.tolerance.motors.motor_effects import with_error_shares
 
     shot, tolerance = compiled_in(context.get), context.get(Source).settings.tolerance
     try:
@@ -100,14 +105,14 @@ class SimulateShot(Operator):
         return _wrong_command(data, "simulate")
 
     def check(self, context: RunContext) -> None:
-        from calmotion.accuracy.run_checks import check_simulation
+        from calmotion.tolerance.run_checks import check_simulation
 
         character, animation = _input(context)
         if character is not None and animation is not None:
             check_simulation(character, animation, _options(context))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
+        from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
 
         shot, shaped, converged = compiled_in(context.get), context.get(ShapedTracks), context.get(ConvergedReduction)
         if shaped is not None:

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.shot import Animation, Character, Result
-from calmotion.shot.outputs import Video
-from calmotion.shot.run import OutputPaths
+from calmotion.model import Animation, Character, Result
+from calmotion.model.outputs import Video
+from calmotion.model.run import OutputPaths
 
 
 class WriteVideo(Operator):

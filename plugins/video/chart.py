@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 from PIL import Image, ImageDraw, ImageFont
 
 SMOOTH = 3

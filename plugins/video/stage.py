@@ -5,8 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from calmotion.shot import Animation, Character, Motion, Result, Simulation
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
+from calmotion.model import (
+    Animation,
+    Character,
+    Motion,
+    Result,
+    Simulation,
+)
 from calmotion.views.playback import sample_motion
 from calmotion.views.rendering import Camera, Model, View, draw_over_ghost, fit_camera, floor_below, prepare
 from calmotion.views.viewpoint import choose_viewpoint, moving_cloud, near_scenery

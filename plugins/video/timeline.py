@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from calmotion.shot import Result, Simulation
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
+from calmotion.model import Result, Simulation
 
 BEFORE_WORST, AFTER_WORST = 0.30, 0.40  # of the slow motion [s of the shot]
 APPROACH = 0.7  # time in which the camera comes near [s of the video]

@@ -109,7 +109,7 @@ def test_a_robot_of_one_s_own_is_put_over_the_shot(pipeline, tmp_path):
 def test_the_errors_of_a_table_are_read_at_the_frames(tmp_path):
     sys.path.insert(0, str(HERE.parent / "helpers" / "plugins"))
     import synthetic
-    from calmotion.shot.table import columns
+    from calmotion.model.table import columns
 
     result, errors = synthetic.result(), loaded("error_table")
     table, file = columns(synthetic.character(), result), tmp_path / "errors.csv"

@@ -12,15 +12,22 @@ import calmotion.workflow.shot
 import numpy as np
 import pytest
 import synthetic
-from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.cli.main import main
 from calmotion.errors import ShotError
 from calmotion.host.discovery import find_in_folder
 from calmotion.host.registry import Host
-from calmotion.shot import Animation, Character, InputLayer, ModeTable, Provenance, Result
-from calmotion.shot.budget import MESH, BudgetEntry
-from calmotion.shot.outputs import WrittenLayer
-from calmotion.shot.run import OutputPaths, RunSettings, Source
+from calmotion.model import (
+    Animation,
+    Character,
+    InputLayer,
+    ModeTable,
+    Provenance,
+    Result,
+)
+from calmotion.model.budget import MESH, BudgetEntry
+from calmotion.model.outputs import WrittenLayer
+from calmotion.model.run import OutputPaths, RunSettings, Source
+from calmotion.tolerance.reduced_bodies import ReducedBodies
 from fakes import host_of, operator
 from one_hinge import ONE_HINGE
 
@@ -76,7 +83,7 @@ def run(repository, monkeypatch, capfd, tmp_path):
 def test_help_imports_nothing_heavy():
     code = (
         "import sys; from calmotion.cli.main import main; status = main(['--help']);"
-        "heavy = {'numpy', 'pxr', 'rerun', 'numba', 'rich', 'scipy', 'calmotion.shot', 'calmotion_plugins.usd_reader'};"
+        "heavy = {'numpy', 'pxr', 'rerun', 'numba', 'rich', 'scipy', 'calmotion.model', 'calmotion_plugins'};"
         "print(status, sorted(heavy & set(sys.modules)))"
     )
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=_environment())

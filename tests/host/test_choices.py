@@ -42,8 +42,8 @@ def test_a_disabled_plugin_is_not_imported_and_its_operators_are_not_there(envir
 
 def test_missing_requirements_of_a_disabled_plugin_are_reported(environment):
     from calmotion.host import PlanError
-    from calmotion.shot import Character
-    from calmotion.shot.run import Source
+    from calmotion.model import Character
+    from calmotion.model.run import Source
 
     choose("usd_reader", False, environment)
     with pytest.raises(PlanError) as refused:

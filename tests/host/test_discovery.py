@@ -12,7 +12,7 @@ from calmotion.host.discovery import Location, bundled_folder, discover
 EMPTY = "def register(host): ...\ndef unregister(host): ...\n"
 OPERATOR = """
     from calmotion.host import Operator
-    from calmotion.shot import Character
+    from calmotion.model import Character
 
     class Made(Operator):
         idname, label, provides = "made.by_entry_point", "Make", (Character,)

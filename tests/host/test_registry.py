@@ -7,7 +7,7 @@ from fakes import Coal, Iron, Ore, host_of, operator
 
 HEAD = """
     from calmotion.host import Operator
-    from calmotion.shot import Character
+    from calmotion.model import Character
 
     class First(Operator):
         idname, label, provides = "smithy.first", "First", (Character,)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.identification.advice import IDENTIFIABLE, advised
-from calmotion.shot.calibration.recording import ANGLE, MARKER
+from calmotion.model.calibration.recording import ANGLE, MARKER
 from recorded import only, problem_of
 
 

@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 from calmotion import ShotError
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
-from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER
-from calmotion.shot.run import RunSettings
+from calmotion.model.calibration.recording import (
+    ACCELEROMETER,
+    ANGLE,
+    EFFORT,
+    MARKER,
+)
+from calmotion.model.run import RunSettings
 from recorded import BIAS, CLOCKS, LOAD, PLACE, PLASTIC, TRUTH, only
 
 OPTIONS = RunSettings(step=1 / 480)

@@ -9,7 +9,7 @@ from calmotion.identification.measurement import Measurement, measurement_parame
 from calmotion.identification.recordings.clocks import clock_of
 from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import signals_of
-from calmotion.shot.run import RunSettings
+from calmotion.model.run import RunSettings
 from recorded import CLOCKS
 
 OPTIONS = RunSettings(step=1 / 240, integrator="generalized-alpha")

@@ -9,10 +9,10 @@ from calmotion.identification.motor_groups import grouped, of_each_motor
 from calmotion.identification.parameters import Parameter, robot_parameters
 from calmotion.identification.robots import robot_at, robot_with
 from calmotion.identification.signals import signals_of
-from calmotion.shot.calibration.estimates import Estimate
-from calmotion.shot.calibration.recording import ANGLE, Channel, SensorRecording
-from calmotion.shot.motor import DRIVE
-from calmotion.shot.run import RunSettings
+from calmotion.model.calibration.estimates import Estimate
+from calmotion.model.calibration.recording import ANGLE, Channel, SensorRecording
+from calmotion.model.motor import DRIVE
+from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 
 KINDS = ("position_gain", "velocity_gain", "encoder_offset")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from calmotion import ShotError
 from calmotion.identification.parameters import Parameter, robot_parameters
-from calmotion.shot.calibration.estimates import ROBOT_KINDS
-from calmotion.shot.motor import DRIVE, SERVO, Rotor
+from calmotion.model.calibration.estimates import ROBOT_KINDS
+from calmotion.model.motor import DRIVE, SERVO, Rotor
 from calmotion.simulation.compiled_shot import compile_shot
 
 

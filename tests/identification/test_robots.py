@@ -5,9 +5,17 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.identification.robots import robot_with
+from calmotion.model.calibration.estimates import (
+    CENTRE,
+    DAMPING,
+    DELAY,
+    DENSITY,
+    ENCODER_OFFSET,
+    MASS,
+    MODULUS,
+)
+from calmotion.model.motor import DRIVE
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot.calibration.estimates import CENTRE, DAMPING, DELAY, DENSITY, ENCODER_OFFSET, MASS, MODULUS
-from calmotion.shot.motor import DRIVE
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.prepare import pose_modes

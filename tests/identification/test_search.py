@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calmotion import ShotError
 from calmotion.identification import search
-from calmotion.shot.calibration.recording import MARKER
+from calmotion.model.calibration.recording import MARKER
 from recorded import PLASTIC, only, problem_of
 
 

@@ -7,10 +7,15 @@ import pytest
 from calmotion import ShotError
 from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import ends_at_rest, refuse_cyclic, signals_of
-from calmotion.shot import Animation, Track
-from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER
-from calmotion.shot.motor import DRIVE, SERVO, Rotor
-from calmotion.shot.run import RunSettings
+from calmotion.model import Animation, Track
+from calmotion.model.calibration.recording import (
+    ACCELEROMETER,
+    ANGLE,
+    EFFORT,
+    MARKER,
+)
+from calmotion.model.motor import DRIVE, SERVO, Rotor
+from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 
 OPTIONS = RunSettings(step=1 / 240, integrator="generalized-alpha")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from calmotion.linear_algebra.multigrid import WIDTH, Blocks, Level, Multigrid, near_order
 from calmotion.linear_algebra.sparse_solver import SparseSolver
+from calmotion.mesh.bisection import bisected
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.elements.bisection import bisected
 from calmotion.reduction.elements.nesting import prolongation
 
 

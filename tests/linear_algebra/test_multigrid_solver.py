@@ -7,8 +7,8 @@ import pytest
 from calmotion.linear_algebra.multigrid import WIDTH
 from calmotion.linear_algebra.multigrid_solver import MultigridSolver
 from calmotion.linear_algebra.sparse_solver import SparseSolver
+from calmotion.mesh.bisection import bisected
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.elements.bisection import bisected
 from calmotion.reduction.elements.nested_meshes import NestedMeshes
 
 

@@ -9,8 +9,8 @@ import pytest
 import small_shots as shots  # noqa: E402
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
-from calmotion.shot import MotorTracks
-from calmotion.shot.run import Source
+from calmotion.model import MotorTracks
+from calmotion.model.run import Source
 from calmotion.testing import host_with, run_operator
 
 HEAD = """HIERARCHY

@@ -14,7 +14,7 @@ import pytest
 import yaml
 from calmotion.control.commands import ExportRequest, MotorCurves
 from calmotion.errors import ShotError
-from calmotion.shot.curves import commanded_curves
+from calmotion.model.curves import commanded_curves
 from calmotion.testing import host_with, run_operator, small_shot
 
 SERVOS = """

@@ -12,11 +12,11 @@ import pytest
 import synthetic
 from calmotion.errors import ShotError
 from calmotion.host import PluginError
-from calmotion.shot.calibration.estimates import Calibration, ChannelCurves, Estimate
-from calmotion.shot.outputs import SystemModes
-from calmotion.shot.result import OptimizerStep
-from calmotion.shot.robust.robots import Compromise, Robustness
-from calmotion.shot.run import OutputPaths
+from calmotion.model.calibration.estimates import Calibration, ChannelCurves, Estimate
+from calmotion.model.outputs import SystemModes
+from calmotion.model.result import OptimizerStep
+from calmotion.model.robust.robots import Compromise, Robustness
+from calmotion.model.run import OutputPaths
 from calmotion.testing import check_plugin, host_with, run_operator
 from calmotion.views.rendering import fit_camera
 from calmotion.views.spectrum import error_spectrum

@@ -7,8 +7,8 @@ import csv
 import meshio
 import numpy as np
 import pytest
-from calmotion.shot.outputs import ModeShapes
-from calmotion.shot.run import OutputPaths, RunSettings, Source
+from calmotion.model.outputs import ModeShapes
+from calmotion.model.run import OutputPaths, RunSettings, Source
 from calmotion.testing import host_with, small_shot
 
 

@@ -4,10 +4,16 @@ import sys
 
 import pytest
 from calmotion.host import NotAsked
-from calmotion.shot import Character, FEMeshes, ModelChoices, Result, Simplification
-from calmotion.shot.model_choice import ON
-from calmotion.shot.outputs import PlannedStep
-from calmotion.shot.run import OutputPaths, RunSettings, Source
+from calmotion.model import (
+    Character,
+    FEMeshes,
+    ModelChoices,
+    Result,
+    Simplification,
+)
+from calmotion.model.model_choice import ON
+from calmotion.model.outputs import PlannedStep
+from calmotion.model.run import OutputPaths, RunSettings, Source
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.testing import host_with, run_operator, small_shot
 from simplification_shots import clevis_arm, mixed_arm
@@ -89,7 +95,7 @@ def test_of_a_long_shot_an_inspection_simulates_the_busiest_part(host, monkeypat
     shot, seen = mixed_arm(), []
     monkeypatch.setattr(sys.modules[host.operators["accuracy.step"].__module__], "LONG_SHOT", 0.25)
     monkeypatch.setattr(
-        "calmotion.accuracy.simulate_to_tolerance.planned_step",
+        "calmotion.tolerance.simulate_to_tolerance.planned_step",
         lambda shot, options: seen.append(shot) or Simplification("time step 2 ms", "planned"),
     )
     given = [shot.character, shot.animation, compile_shot(shot.character, shot.animation), _source("inspect")]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.host import Host
-from calmotion.shot import MotorTracks
-from calmotion.shot.run import Source
+from calmotion.model import MotorTracks
+from calmotion.model.run import Source
 from calmotion.support import memory
 from calmotion.testing import host_with, run_operator
 

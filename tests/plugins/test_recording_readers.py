@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
-from calmotion.shot.calibration.recording import RecordingRequest, SensorRecording
+from calmotion.model.calibration.recording import RecordingRequest, SensorRecording
 from calmotion.testing import host_with
 from calmotion.workflow.calibration.recordings import measured_prims, read_recordings, requested
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import synthetic
 from calmotion.errors import ShotError
-from calmotion.shot.run import OutputPaths
+from calmotion.model.run import OutputPaths
 from calmotion.testing import host_with, run_operator
 
 

@@ -1,5 +1,5 @@
 import small_shots as shots
-from calmotion.shot.run import Source
+from calmotion.model.run import Source
 from calmotion.testing import host_with, run_operator
 
 

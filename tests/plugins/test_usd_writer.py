@@ -1,8 +1,13 @@
 import small_shots as shots
 from calmotion.host import Host
-from calmotion.shot import Animation, Character, Provenance, Result
-from calmotion.shot.outputs import WrittenLayer
-from calmotion.shot.run import OutputPaths, RunSettings, Source
+from calmotion.model import (
+    Animation,
+    Character,
+    Provenance,
+    Result,
+)
+from calmotion.model.outputs import WrittenLayer
+from calmotion.model.run import OutputPaths, RunSettings, Source
 from calmotion.testing import host_with
 
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import synthetic
 from calmotion import ShotError
-from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies
 from calmotion.host import NotAsked
-from calmotion.shot import Character, Result
-from calmotion.shot.outputs import ShapedTracks, SystemModes, Verification
-from calmotion.shot.result import LimitUse
-from calmotion.shot.run import OutputPaths, RunSettings, Source
+from calmotion.model import Character, Result
+from calmotion.model.outputs import ShapedTracks, SystemModes, Verification
+from calmotion.model.result import LimitUse
+from calmotion.model.run import OutputPaths, RunSettings, Source
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.testing import host_with, run_operator, small_shot
+from calmotion.tolerance.reduced_bodies import ConvergedReduction, ReducedBodies
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.benchmarks.scenes.beam_arm import beam_mesh
+from calmotion.model import FEMesh, FEMeshes, MeshQuality
+from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot import FEMesh, FEMeshes, MeshQuality
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot

@@ -6,12 +6,12 @@ energy that moves about in the shot.
 
 import numpy as np
 from calmotion import ShotError
+from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.integrate import integrate
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward

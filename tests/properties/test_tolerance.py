@@ -1,12 +1,12 @@
 """Whatever is drawn and can be simulated keeps the tolerance that is asked for, by a step that follows from it."""
 
 from calmotion import ShotError
-from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
-from calmotion.accuracy.step_error import distance, frames_of, simulate_at
+from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
+from calmotion.tolerance.step_error import distance, frames_of, simulate_at
 from hypothesis import assume, event, given
 from hypothesis import strategies as st
 from random_shots import linkages, shots

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from calmotion.model import ElasticMaterial, FlexibleSettings, Simplification
 from calmotion.reduction import cache as reduction_cache
 from calmotion.reduction.cache import cache_key, cached_reduction, recomputed
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
-from calmotion.shot import ElasticMaterial, FlexibleSettings, Simplification
 from calmotion.support.caching.cache_folder import CACHES, REDUCTIONS
 
 

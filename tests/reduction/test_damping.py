@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calmotion.model import ElasticMaterial
 from calmotion.reduction.damping import EXACT_MODES, damped, modal_damping
 from calmotion.reduction.reduced_body import Elasticity, Invariants, ReducedBody
-from calmotion.shot import ElasticMaterial
 from scipy.linalg import eigh
 
 MATERIAL = ElasticMaterial("/M", 1e9, 0.3, 1e3, damping_ratio=0.02)

@@ -7,11 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
+from calmotion.model import (
+    Body,
+    FlexibleSettings,
+    MassProperties,
+    SurfaceMesh,
+)
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduce import reduce_body
 from calmotion.reduction.reduced_body import rigid_invariants
-from calmotion.shot import Body, FlexibleSettings, MassProperties, SurfaceMesh
 
 SIZE = (0.6, 0.02, 0.02)
 

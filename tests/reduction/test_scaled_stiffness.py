@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.geometry.tetrahedra import measure_quality
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
+from calmotion.mesh.tetrahedra import measure_quality
+from calmotion.model import Body, FEMesh, FlexibleSettings
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduce import reduce_body
 from calmotion.reduction.scaled_stiffness import with_graded_stiffness, with_scaled_stiffness, with_scaled_strain
-from calmotion.shot import Body, FEMesh, FlexibleSettings
 
 
 @pytest.mark.parametrize("law", ["linear", "stvk", "neohookean"])

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from boxes import box_tets, fe_mesh
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
+from calmotion.model import Body, FlexibleSettings, Frame
 from calmotion.reduction.reduce import reduce_body
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
 from calmotion.reduction.subspace import principal_subspace, projected_body
-from calmotion.shot import Body, FlexibleSettings, Frame
 from law_call import call_neohookean, call_stvk
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from beams import timoshenko_frequencies
-from calmotion.geometry.tetrahedra import oriented_tets
+from calmotion.mesh.tetrahedra import oriented_tets
+from calmotion.model import ElasticMaterial
 from calmotion.reduction.basis.natural_modes import SparseSolver, frequencies, vector_mass
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.shot import ElasticMaterial
 
 SLENDER = np.array([3.5160, 22.0345, 61.6972])
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from beams import pushed_beam, timoshenko_frequencies
-from calmotion.shot import ElasticMaterial
+from calmotion.model import ElasticMaterial
 
 
 @pytest.mark.parametrize(

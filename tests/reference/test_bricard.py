@@ -5,13 +5,21 @@ Each hinge is across the two bars that it joins. By counting it cannot move (one
 
 import numpy as np
 import pytest
+from calmotion.model import (
+    WORLD,
+    Body,
+    Character,
+    Frame,
+    Joint,
+    MassProperties,
+    Target,
+)
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.joint_arrays import body_anchors
 from calmotion.multibody.model.model import compile_model, rigid_body
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot import WORLD, Body, Character, Frame, Joint, MassProperties, Target
 from scipy.spatial.transform import Rotation
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 1], [0, 1, 1], [0, 0, 1]], float)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.geometry.tetrahedra import oriented_tets
+from calmotion.mesh.tetrahedra import oriented_tets
+from calmotion.model import ElasticMaterial
 from calmotion.reduction.basis.natural_modes import frequencies, vector_mass
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.shot import ElasticMaterial
 
 STEEL = ElasticMaterial("/block", 2e11, 0.3, 2900.0)
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from calmotion.model import WORLD
 from calmotion.multibody.analysis.dead_centres import dead_centres
 from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.shot import WORLD
 from mechanisms import mechanism
 
 CRANK, COUPLER, ROCKER, GROUND = 0.3, 0.9, 0.7, 0.8  # Grashof: the crank turns all the way

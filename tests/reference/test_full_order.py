@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from boxes import box_tets
-from calmotion.shot import ElasticMaterial
+from calmotion.model import ElasticMaterial
 from full_order import FullOrder
 from scipy.spatial.transform import Rotation
 from turning_beam import TurningBeam

@@ -12,7 +12,7 @@ from pathlib import Path
 import calmotion as cm
 import numpy as np
 import pytest
-from calmotion.shot.curves import commanded_curves
+from calmotion.model.curves import commanded_curves
 from calmotion.workflow.importing.converters import VARIABLE, converter_python, environment_folder
 
 PROGRAM = Path(__file__).resolve().parents[1] / "helpers" / "reference" / "mujoco_inverse.py"

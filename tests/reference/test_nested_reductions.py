@@ -7,13 +7,13 @@ it moved in the shot, so that their agreement told nothing.
 
 import numpy as np
 import pytest
-from calmotion.accuracy.simulate_to_tolerance import intended_positions
-from calmotion.accuracy.step_error import simulate_at
 from calmotion.benchmarks.accuracy.estimates import drawn
-from calmotion.shot import Animation, Track
-from calmotion.shot.run import RunSettings
+from calmotion.model import Animation, Track
+from calmotion.model.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.tolerance.simulate_to_tolerance import intended_positions
+from calmotion.tolerance.step_error import simulate_at
 from made_shots import soft_linkage_shot
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from boxes import box_tets
+from calmotion.model import ElasticMaterial
 from calmotion.reduction.basis.natural_modes import SparseSolver, frequencies, vector_mass
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.shot import ElasticMaterial
 
 SIDE, THICKNESS = 1.0, 0.02
 STEEL = ElasticMaterial("/Looks/Steel", 2.1e11, 0.3, 7850.0)

@@ -10,12 +10,17 @@ from calmotion.benchmarks.speed.exudyn_arm import LENGTH, MATERIAL, PAYLOAD, RET
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import signals_of
+from calmotion.model import Animation, Joint, Track
+from calmotion.model.calibration.estimates import HIGHER_MODES
+from calmotion.model.calibration.recording import (
+    ACCELEROMETER,
+    MARKER,
+    Channel,
+    SensorRecording,
+)
+from calmotion.model.curves import curve_of
+from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot import Animation, Joint, Track
-from calmotion.shot.calibration.estimates import HIGHER_MODES
-from calmotion.shot.calibration.recording import ACCELEROMETER, MARKER, Channel, SensorRecording
-from calmotion.shot.curves import curve_of
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot

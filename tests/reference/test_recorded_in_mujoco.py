@@ -9,11 +9,16 @@ from calmotion.benchmarks.motors.lumped import simulate_lumped
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import signals_of
-from calmotion.shot import Animation, Target, Track
-from calmotion.shot.calibration.recording import ANGLE, MARKER, Channel, SensorRecording
-from calmotion.shot.curves import curve_of
-from calmotion.shot.motor import Rotor
-from calmotion.shot.run import RunSettings
+from calmotion.model import Animation, Target, Track
+from calmotion.model.calibration.recording import (
+    ANGLE,
+    MARKER,
+    Channel,
+    SensorRecording,
+)
+from calmotion.model.curves import curve_of
+from calmotion.model.motor import Rotor
+from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from boxes import box_tets, hollow_shaft
+from calmotion.model import ElasticMaterial, FlexibleSettings
 from calmotion.reduction.basis.craig_bampton import reduced_basis
 from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.material_laws.large_deflection import large_deflection
 from calmotion.reduction.material_laws.reduced_poses import equilibrium
-from calmotion.shot import ElasticMaterial, FlexibleSettings
 from full_order import FullOrder
 from rigid_patch import pull
 

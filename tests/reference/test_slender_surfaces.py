@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 import trimesh
 from beams import pushed_beam
-from calmotion.accuracy.converged_reduction import converged_reduction
-from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
-from calmotion.accuracy.step_error import frames_of
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
-from calmotion.shot import FEMeshes, SurfaceMesh
-from calmotion.shot.run import RunSettings
+from calmotion.model import FEMeshes, SurfaceMesh
+from calmotion.model.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.testing import host_with, run_operator
+from calmotion.tolerance.converged_reduction import converged_reduction
+from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
+from calmotion.tolerance.step_error import frames_of
 from mesher_links import PLUGIN
 from swung_beam import square_beam, swing
 

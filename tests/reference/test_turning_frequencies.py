@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from calmotion.model import ElasticMaterial
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.assembly import assemble
 from calmotion.multibody.statics.equilibrium import STATIC
-from calmotion.shot import ElasticMaterial
 from scipy.linalg import eig
 from turning_beam import TurningBeam
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import calmotion as cm
 import numpy as np
 import pytest
+from calmotion.model.run import RunSettings
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks

@@ -7,7 +7,7 @@ import pytest
 from calmotion import export, optimize, simulate
 from calmotion.errors import ShotError, each
 from calmotion.host import Outcome
-from calmotion.shot.run import OutputPaths
+from calmotion.model.run import OutputPaths
 from pxr import Gf, UsdGeom, UsdPhysics
 from shot_edits import half_turns
 from small_shots import (

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from calmotion import open_shot
 from calmotion.errors import ShotError
-from calmotion.shot import MotorTracks
+from calmotion.model import MotorTracks
 from calmotion.usd.reading import read_shot
 from pxr import UsdGeom
 from shot_edits import targets

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import chain
-from calmotion.accuracy.motors.backlash import with_lost_motion
 from calmotion.errors import ShotError
+from calmotion.model import Animation, Track
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.avoided_reversals import refuse_without_play
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.windows.plan import window_length
-from calmotion.shot import Animation, Track
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.tolerance.motors.backlash import with_lost_motion
 from posed import ignore_progress
 
 FRAMES = np.arange(61) / 30.0

@@ -5,12 +5,12 @@ import json
 
 import numpy as np
 import pytest
+from calmotion.model.run import RunSettings
 from calmotion.retargeting import checkpoint, search
 from calmotion.retargeting.checkpoint import checkpoint_path, problem_key
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem import adaptive_knots
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.support.caching.verified_files import read_arrays, write_arrays
 from posed import ignore_progress, jerking, make_problem

@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.model import Animation, FreeTrack, Track
+from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.shot import Animation, FreeTrack, Track
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot

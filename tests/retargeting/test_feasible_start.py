@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from calmotion.shot.curves import held_curve
+from calmotion.model.curves import held_curve
 from calmotion.usd.reading import read_shot
 from one_hinge import HINGE, ONE_HINGE
 from scipy.optimize import lsq_linear

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from calmotion.accuracy.integrator_choice import SAFE
 from calmotion.errors import IntegrationError
+from calmotion.model.run import RunSettings
 from calmotion.retargeting import input_run
 from calmotion.retargeting.input_run import OF_SHAKE, with_input_resolved
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.support import interrupts
+from calmotion.tolerance.integrator_choice import SAFE
 from posed import ignore_progress
 
 OPTIONS = RunSettings(tolerance=1e-5)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from calmotion.benchmarks.optimizer.optimizer import make_problem
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.solver.damping_homotopy import FAR, damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.prepare import modes_of, prepare
 from made_shots import soft_linkage_shot
 from posed import ignore_progress

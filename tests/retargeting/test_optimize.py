@@ -5,9 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.model import (
+    Animation,
+    FreeTrack,
+    Track,
+    WeightTrack,
+)
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.shot import Animation, FreeTrack, Track, WeightTrack
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 
@@ -163,7 +168,7 @@ def test_kept_ends_keep_the_first_and_last_pose(arm, animation, bodies):
 
 
 def test_a_rigid_character_needs_no_change(arm, animation):
-    from calmotion.shot import MassProperties
+    from calmotion.model import MassProperties
 
     mass = MassProperties(0.17, np.array([0.16, 0.0, 0.0]), 1e-3 * np.eye(3))
     rigid = dataclasses.replace(

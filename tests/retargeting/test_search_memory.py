@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.accuracy.reduced_bodies import RunMemory
+from calmotion.model import Track
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.shot import Track
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.tolerance.reduced_bodies import RunMemory
 
 OPTIONS = RunSettings(step=1 / 240, tolerance=1e-4)
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from calmotion.accuracy.simulate_to_tolerance import FINDING
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.search_progress import SearchProgress, SuccessiveSearches, share_of_pass
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.tolerance.simulate_to_tolerance import FINDING
 
 
 def fractions(gains, enough=1e-5):

@@ -1,9 +1,9 @@
 """An interrupt after a search keeps what the search found, on a small arm."""
 
 import pytest
+from calmotion.model.run import RunSettings
 from calmotion.retargeting import to_tolerance
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.support import interrupts
 from posed import ignore_progress

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from calmotion.host import open_host
+from calmotion.model.run import RunSettings, Source
 from calmotion.retargeting.problem.offset_basis import make_basis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.shot.run import RunSettings, Source
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion

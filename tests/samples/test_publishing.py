@@ -5,7 +5,7 @@ import json
 
 import calmotion as cm
 import pytest
-from calmotion.shot.run import OutputPaths
+from calmotion.model.run import OutputPaths
 from one_hinge import ONE_HINGE
 
 pytest.importorskip("pyblish.api")

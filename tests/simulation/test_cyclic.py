@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.model import MovingFrame
 from calmotion.multibody.model.moving_markers import pack
-from calmotion.shot import MovingFrame
 from calmotion.simulation.cyclic import eased, refuse_open_loops
 from scipy.spatial.transform import Rotation
 

@@ -2,8 +2,8 @@
 
 import pytest
 from calmotion.errors import IntegrationError, ShotError
+from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import Reason, SimulationFailure
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.open_chains import open_joints
 from calmotion.simulation.prepare import failure_error, prepare

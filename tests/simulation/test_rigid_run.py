@@ -4,8 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.multibody.model.topology import span_tree
-from calmotion.shot import (
+from calmotion.model import (
     Animation,
     Body,
     Character,
@@ -19,6 +18,7 @@ from calmotion.shot import (
     Target,
     Track,
 )
+from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.inputs.time_grid import make_grid
 from calmotion.simulation.rigid_run import highest_frequency, rigid_bodies, shot_load_envelopes
 

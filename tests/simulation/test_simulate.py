@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 from calmotion import ShotError
-from calmotion.shot.run import RunSettings
+from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 

@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 from arms import chain, compiled
+from calmotion.model.motor import Rotor
+from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot.motor import Rotor
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.shot.run import RunSettings
+from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.usd.reading import read_shot

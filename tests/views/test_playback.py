@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import synthetic
-from calmotion.shot import Body, Motion
+from calmotion.model import Body, Motion
 from calmotion.views.playback import (
     carriers,
     deformed_points,

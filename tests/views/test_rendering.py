@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import synthetic
-from calmotion.shot import SurfaceMesh
+from calmotion.model import SurfaceMesh
 from calmotion.views.rendering import (
     View,
     draw,

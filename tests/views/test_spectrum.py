@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.shot import Motion
+from calmotion.model import Motion
 from calmotion.views.spectrum import error_spectrum, highest_frequency
 
 

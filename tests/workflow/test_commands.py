@@ -9,7 +9,7 @@ import threading
 import calmotion as cm
 import numpy as np
 import pytest
-from calmotion.shot.model_choice import KINDS, OFF, ON
+from calmotion.model.model_choice import KINDS, OFF, ON
 from calmotion.workflow.commands import _forced
 from one_hinge import HINGE, ONE_HINGE, TIP
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from calmotion.cli.progress import ProgressDisplay
     from calmotion.workflow.shot import Shot
 
-# Those of `calmotion.shot.model_choice`, written out since `--help` does not import the engine; a test compares them.
+# Those of `calmotion.model.model_choice`, written out since `--help` does not import the engine; a test compares them.
 MEANINGS = {
     "bodies": "rigid bodies in place of flexible ones",
     "turning": "no gyroscopic terms for non-rotating bodies",

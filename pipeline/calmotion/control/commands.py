@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.shot.animation import Animation
-from calmotion.shot.character import Array, Character
-from calmotion.shot.motor import Motor
+from calmotion.arrays import Array
+from calmotion.model.animation import Animation
+from calmotion.model.character import Character
+from calmotion.model.motor import Motor
 
 HOLD, LINEAR, CUBIC, QUINTIC, BEZIER, FOLLOW = "hold", "linear", "cubic", "quintic", "bezier", "follow"
 LOWEST_RATE, HIGHEST_RATE = 1.0, 1e5  # commands a second [Hz]

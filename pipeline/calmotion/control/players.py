@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PPoly
 
+from calmotion.arrays import Array
 from calmotion.control.commands import BEZIER, CUBIC, FOLLOW, HOLD, QUINTIC, SETTLED, Commands, Follower
-from calmotion.shot.character import Array
-from calmotion.shot.curves import Sample
+from calmotion.model.curves import Sample
 
 _CYCLE = 0.002  # between the values of a motion that follows commands [s]; its frequencies are a few hertz
 _PIECES = 16  # of a Bezier curve, each a cubic in time

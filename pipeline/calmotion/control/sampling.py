@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.control.commands import (
     BEZIER,
     CUBIC,
@@ -16,7 +17,6 @@ from calmotion.control.commands import (
     MotorCurves,
     instants,
 )
-from calmotion.shot.character import Array
 
 _SETTLES = 8.0  # lags of a controller after which it stands at its last command
 

@@ -20,7 +20,7 @@ from calmotion.support import interrupts
 from calmotion.support.memory import RESERVE, require_address_space
 
 if TYPE_CHECKING:
-    from calmotion.shot import Simplification
+    from calmotion.model import Simplification
 
 T = TypeVar("T")
 Progress = Callable[[str, float, str], None]
@@ -232,7 +232,7 @@ class Run:
     def left_out(self) -> tuple[Simplification, ...]:
         """What the polls left out, for the report; not an operator whose values another one made, or whose
         output was not requested."""
-        from calmotion.shot import Simplification
+        from calmotion.model import Simplification
 
         made = {cls.idname: all(kind in self.data for kind in cls.provides) for cls in self.plan.operators}
         return tuple(

@@ -63,7 +63,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from calmotion.host import Host, Operator, Property, RunContext
-from calmotion.shot import Animation, Character
+from calmotion.model import Animation, Character
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.identification.advice import IDENTIFIABLE, advised
 from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
@@ -21,9 +22,7 @@ from calmotion.identification.recordings.plausible import refuse_far, refuse_lon
 from calmotion.identification.robots import robot_at, robot_with
 from calmotion.identification.search import HALVINGS, STIFF, Found, profiled, search, step_of
 from calmotion.identification.signals import Signals, ends_at_rest, refuse_cyclic, signals_of
-from calmotion.multibody.failure import SimulationFailure
-from calmotion.multibody.integrators.coefficients import IMPLICIT
-from calmotion.shot.calibration.estimates import (
+from calmotion.model.calibration.estimates import (
     CLOCK_DRIFT,
     CLOCK_OFFSET,
     ROBOT_KINDS,
@@ -32,9 +31,10 @@ from calmotion.shot.calibration.estimates import (
     ChannelFit,
     Estimate,
 )
-from calmotion.shot.calibration.recording import UNITS, SensorRecording
-from calmotion.shot.character import Array
-from calmotion.shot.run import RunSettings
+from calmotion.model.calibration.recording import UNITS, SensorRecording
+from calmotion.model.run import RunSettings
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
 from calmotion.simulation.prepare import failure_error, prepare

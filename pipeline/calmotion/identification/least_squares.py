@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 HUBER = 3.0  # standard deviations: few residuals of a normal distribution are larger
 ENOUGH = 1e-2  # change of z, in standard deviations of its posterior, at which a search ends

@@ -12,14 +12,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.errors import ShotError, raise_all
 from calmotion.identification.parameters import PRIORS, Parameter
 from calmotion.identification.recordings.noise import noise_of
 from calmotion.identification.signals import Signals
-from calmotion.shot import Character
-from calmotion.shot.calibration.estimates import BIAS, CLOCK_DRIFT, CLOCK_OFFSET, PLACE
-from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER, Channel, SensorRecording
-from calmotion.shot.character import Array, BoolArray
+from calmotion.model import Character
+from calmotion.model.calibration.estimates import (
+    BIAS,
+    CLOCK_DRIFT,
+    CLOCK_OFFSET,
+    PLACE,
+)
+from calmotion.model.calibration.recording import (
+    ACCELEROMETER,
+    ANGLE,
+    EFFORT,
+    MARKER,
+    Channel,
+    SensorRecording,
+)
 from calmotion.support.naming import nearest
 
 REST = 0.5  # time before the first frame that counts [s]: the robot rests

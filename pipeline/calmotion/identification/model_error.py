@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.identification.robots import robot_at
 from calmotion.identification.signals import signals_of
@@ -23,7 +24,6 @@ from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.parallel import in_parallel
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.reduction.scaled_stiffness import with_mode_stiffness, with_scaled_stiffness
-from calmotion.shot.character import Array
 
 if TYPE_CHECKING:
     from calmotion.identification.problem import Calibrated

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.identification.parameters import Parameter
-from calmotion.shot import Character
-from calmotion.shot.calibration.estimates import ENCODER_OFFSET, MOTOR_KINDS, Estimate
-from calmotion.shot.character import Array
+from calmotion.model import Character
+from calmotion.model.calibration.estimates import ENCODER_OFFSET, MOTOR_KINDS, Estimate
 
 OWN = 1e-6  # share of the variance that each motor has for itself, so that covariances stay positive
 

@@ -13,8 +13,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.retargeting.robust.scenarios import payload_bodies
-from calmotion.shot.calibration.estimates import (
+from calmotion.model.calibration.estimates import (
     ARMATURE,
     AXES,
     BIAS,
@@ -36,7 +35,13 @@ from calmotion.shot.calibration.estimates import (
     VELOCITY_GAIN,
     VISCOUS_FRICTION,
 )
-from calmotion.shot.motor import DRIVE, PRESCRIBED, SERVO, Motor
+from calmotion.model.motor import (
+    DRIVE,
+    PRESCRIBED,
+    SERVO,
+    Motor,
+)
+from calmotion.retargeting.robust.scenarios import payload_bodies
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.support.naming import nearest
 

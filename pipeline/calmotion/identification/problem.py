@@ -12,15 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.identification.measurement import Measurement
 from calmotion.identification.parameters import Parameter
 from calmotion.identification.robots import robot_at
 from calmotion.identification.signals import Signals, signals_of
+from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.parallel import in_parallel
-from calmotion.shot.character import Array
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.support import interrupts
 

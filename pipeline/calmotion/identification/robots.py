@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.identification.parameters import Parameter
-from calmotion.reduction.reduced_body import Invariants, ReducedBody
-from calmotion.reduction.scaled_stiffness import with_graded_stiffness, with_scaled_density, with_scaled_stiffness
-from calmotion.shot import Body
-from calmotion.shot.calibration.estimates import (
+from calmotion.model import Body
+from calmotion.model.calibration.estimates import (
     ARMATURE,
     CENTRE,
     DAMPING,
@@ -29,8 +28,10 @@ from calmotion.shot.calibration.estimates import (
     VELOCITY_GAIN,
     VISCOUS_FRICTION,
 )
-from calmotion.shot.character import Array, ElasticMaterial
-from calmotion.shot.motor import Motor
+from calmotion.model.character import ElasticMaterial
+from calmotion.model.motor import Motor
+from calmotion.reduction.reduced_body import Invariants, ReducedBody
+from calmotion.reduction.scaled_stiffness import with_graded_stiffness, with_scaled_density, with_scaled_stiffness
 from calmotion.simulation.bodies import with_material_damping
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 

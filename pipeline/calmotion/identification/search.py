@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.identification.least_squares import Solution, chord, loss_of, minimize, posterior, weights_of
 from calmotion.identification.measurement import Measurement, Sensor
@@ -14,10 +15,14 @@ from calmotion.identification.model_error import covariance_of_model
 from calmotion.identification.problem import Calibrated, Measured
 from calmotion.identification.recordings.free_decay import decay_factors
 from calmotion.identification.recordings.noise import correlation_time, least_sigma, spread_of
+from calmotion.model.calibration.estimates import (
+    DAMPING,
+    GEAR_STIFFNESS,
+    MODULUS,
+    POSITION_GAIN,
+)
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.parallel import in_parallel
-from calmotion.shot.calibration.estimates import DAMPING, GEAR_STIFFNESS, MODULUS, POSITION_GAIN
-from calmotion.shot.character import Array
 
 STIFF = (MODULUS, POSITION_GAIN, GEAR_STIFFNESS)  # what decides about frequencies
 TRIED = np.linspace(-2.4, 2.4, 17)  # of all of them at once, in standard deviations of their priors

@@ -9,17 +9,22 @@ import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
 from scipy.spatial.transform import Rotation
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.identification.robots import Robot
+from calmotion.model import Animation
+from calmotion.model.calibration.recording import (
+    ACCELEROMETER,
+    ANGLE,
+    EFFORT,
+    MARKER,
+)
+from calmotion.model.curves import curve_of
+from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import NOWHERE, Reason, SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.motors.drives import joint_values
-from calmotion.shot import Animation
-from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER
-from calmotion.shot.character import Array
-from calmotion.shot.curves import curve_of
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.forward import ForwardRun, run_forward
 from calmotion.simulation.inputs.curves import AT_REST

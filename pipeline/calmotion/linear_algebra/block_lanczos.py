@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.linear_algebra.sparse_solver import Solver
-from calmotion.shot.character import Array
 
 _WIDTH = 8  # vectors of a block
 _CONVERGED = 1e-10  # residual over the eigenvalue of the inverse; the error of the frequency is its square

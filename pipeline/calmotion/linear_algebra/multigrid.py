@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calmotion.arrays import Array, IntArray
 from calmotion.linear_algebra.sparse_solver import SparseSolver
-from calmotion.shot.character import Array, IntArray
 from calmotion.support import interrupts
 from calmotion.support.compilation import kernel
 

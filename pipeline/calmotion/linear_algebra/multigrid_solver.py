@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.linear_algebra.multifrontal import expand
 from calmotion.linear_algebra.multigrid import WIDTH, Blocks, Multigrid
 from calmotion.linear_algebra.sparse_solver import Solver
-from calmotion.shot.character import Array, IntArray
 
 _STEPS = 60  # a dozen are usual
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
-from calmotion.shot.character import Array, BoolArray
+from calmotion.arrays import Array, BoolArray
 
 _LEAF = 48  # largest number of nodes of a piece that is not cut
 _LANDMARKS = 4  # nodes from which distances in the graph are measured

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.linear_algebra.blas_threads import one_blas_thread
-from calmotion.shot.character import Array
 
 _STEPS = 40
 _DEPENDENT = 1e-6  # relative norm of linearly dependent vectors: the step before is nearly in the span of the others

@@ -7,10 +7,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.linear_algebra.multifrontal import MultifrontalCholesky
 from calmotion.linear_algebra.nested_dissection import dissect
-from calmotion.shot.character import Array
 from calmotion.support import interrupts
 
 

@@ -8,13 +8,13 @@ imported when it is first used.
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from calmotion.model.character import WORLD
     from calmotion.multibody.failure import SimulationFailure
     from calmotion.multibody.mechanism import Mechanism
     from calmotion.multibody.model.model import Model
     from calmotion.multibody.model.system import State
     from calmotion.multibody.runs import LinearizedRun, ModelRun, linearize, natural_modes, simulate
     from calmotion.reduction.reduced_body import ReducedBody
-    from calmotion.shot.character import WORLD
 
 __all__ = [
     "WORLD",

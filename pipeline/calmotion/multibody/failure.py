@@ -6,8 +6,8 @@ from enum import StrEnum
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.model.system import State
-from calmotion.shot.character import Array
 
 
 class Reason(StrEnum):

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.analysis.kinematics import (
     of_components,
     of_targets,
@@ -25,7 +26,6 @@ from calmotion.multibody.sensitivity.adjoint import adjoint
 from calmotion.multibody.sensitivity.linearization import Linearization
 from calmotion.multibody.sensitivity.linearization import linearize as linearize_system
 from calmotion.multibody.sensitivity.tangent import tangent
-from calmotion.shot.character import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,9 +17,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from calmotion.model.meshes import (
+    CutPatch,
+    FEMesh,
+    MeshQuality,
+    MissingVolume,
+)
+from calmotion.model.result import Simplification
 from calmotion.reduction.reduced_body import Elasticity, InterfaceStiffness, Invariants, Marker, ReducedBody
-from calmotion.shot.meshes import CutPatch, FEMesh, MeshQuality, MissingVolume
-from calmotion.shot.result import Simplification
 from calmotion.support.caching.cache_folder import REDUCTIONS
 from calmotion.support.caching.caches import key_of, store_arrays, stored_arrays
 from calmotion.support.sources import source_digest

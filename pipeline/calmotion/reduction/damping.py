@@ -11,10 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from calmotion.reduction.elements.assembly import QuadraticMesh
+from calmotion.arrays import Array
+from calmotion.mesh.quadratic import QuadraticMesh
+from calmotion.model.character import ElasticMaterial
 from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, linear_stress
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot.character import Array, ElasticMaterial
 
 EXACT_MODES = 6  # lowest modes: two or three bending pairs, or bending and twist
 SIGNIFICANT = 0.1  # share of the elastic energy of a mode from which a body takes part in it

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.geometry.tetrahedra import Indices
+from calmotion.arrays import Array, Indices, IntArray
+from calmotion.mesh.quadratic import QuadraticMesh
+from calmotion.model.character import ElasticMaterial
 from calmotion.reduction.basis.natural_modes import lowest_modes, shift_of_free, vector_mass
-from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh
+from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import GradientRule
-from calmotion.shot.character import Array, ElasticMaterial, IntArray
 from calmotion.support.compilation import kernel
 
 _AT_ONCE = 2000  # nodes whose fits, or elements whose strains, are in memory

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.reduction.reduced_body import Invariants
-from calmotion.shot.character import Array
 
 
 def inertia_integrals(nodes: Array, mass: Any, modes: Array) -> Invariants:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,23 +7,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.mesh.patches.interface_patches import AttachmentFrame, InterfacePatch, interface_patches
+from calmotion.mesh.patches.rim_error import compliance_error, rim_error
+from calmotion.mesh.quadratic import QuadraticMesh
+from calmotion.model.budget import REDUCTION
+from calmotion.model.character import (
+    DEFAULT_TOLERANCE,
+    Body,
+    ElasticMaterial,
+    SurfaceMesh,
+)
+from calmotion.model.meshes import FEMesh
+from calmotion.model.result import Simplification
 from calmotion.reduction.basis.craig_bampton import Basis, reduced_basis
 from calmotion.reduction.basis.fixed_interface import FixedInterface
 from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.damping import damped, ratio_of_parts
-from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh, assemble
+from calmotion.reduction.elements.assembly import FEModel, assemble
 from calmotion.reduction.elements.embedding import Embedding, embed
 from calmotion.reduction.inertia_integrals import inertia_integrals
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, InterfacePatch, interface_patches
-from calmotion.reduction.interfaces.rim_error import compliance_error, rim_error
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
 from calmotion.reduction.reduced_body import Elasticity, InterfaceStiffness, Marker, ReducedBody
 from calmotion.reduction.scaled_stiffness import with_interface_stiffness
-from calmotion.shot.budget import REDUCTION
-from calmotion.shot.character import DEFAULT_TOLERANCE, Array, Body, ElasticMaterial, SurfaceMesh
-from calmotion.shot.meshes import FEMesh
-from calmotion.shot.result import Simplification
 
 __all__ = ["AttachmentFrame", "LinearModes", "linear_modes", "reduce_body"]
 

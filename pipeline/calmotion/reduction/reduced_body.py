@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.shot.character import Array, MassProperties
-from calmotion.shot.result import Simplification
+from calmotion.arrays import Array
+from calmotion.model.character import MassProperties
+from calmotion.model.result import Simplification
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.reduction.reduced_body import Elasticity, Invariants, ReducedBody
 from calmotion.reduction.subspace import projected_body, projected_law
-from calmotion.shot.character import Array
 
 _SOFTEST = 0.1  # share of a stiffness: a mesh that is off by more is of no use
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from calmotion.errors import ShotError, raise_all
+from calmotion.model import Body, Character
 from calmotion.reduction.material_laws.choice import UNPHYSICAL
-from calmotion.shot import Body, Character
 
 _COMPRESSED = 0.5  # of its length, by which a body is compressed under its own weight, beyond any material
 

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.reduction.reduced_body import Elasticity, Invariants, ReducedBody
-from calmotion.shot.character import Array
 
 
 def principal_subspace(body: ReducedBody, motion: Array, missing: float) -> Array:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.model import Character
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.problem.reversals import reversal_terms, transmitted_by
 from calmotion.retargeting.problem.rigid_approximation import rigid_response
-from calmotion.shot import Character
-from calmotion.shot.character import Array
-from calmotion.shot.run import RunSettings
 
 OPTION = "--avoid-reversals"
 

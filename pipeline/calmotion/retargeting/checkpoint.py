@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import BoolArray, IntArray
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.gauss_newton import Iterate, Search
 from calmotion.retargeting.solver.recycling import Recycled
-from calmotion.shot.character import BoolArray, IntArray
 from calmotion.support.caching.verified_files import DamagedFileError, read_arrays, write_arrays
 from calmotion.support.sources import source_digest
 

@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import csr_matrix, diags, eye, kron, vstack
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.retargeting.problem.adaptive_knots import converted
 from calmotion.retargeting.problem.limits import FIRST_PENALTY, MARGIN
 from calmotion.retargeting.problem.offset_basis import basis_on
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.elastic_program import elastic_minimum
-from calmotion.shot.character import Array, BoolArray
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.motor_limits import Bounds
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from calmotion.arrays import Array
+from calmotion.model import MotorCurve, Result
 from calmotion.retargeting.problem.adaptive_knots import useful_knots
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.simplification.pruning import UNCHANGED
-from calmotion.shot import MotorCurve, Result
-from calmotion.shot.character import Array
 from calmotion.support import interrupts
 
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from calmotion.accuracy.integrator_choice import FAST, SAFE
-from calmotion.accuracy.step_error import CLOSED_GAP, distance, order_of
 from calmotion.errors import ShotError
+from calmotion.model import Result
+from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import tolerance_of
 from calmotion.retargeting.found_curves import best_so_far
-from calmotion.shot import Result
-from calmotion.shot.run import RunSettings
-from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.report import at_instants
 from calmotion.simulation.simulate import simulate_shot
+from calmotion.tolerance.integrator_choice import FAST, SAFE
+from calmotion.tolerance.step_error import CLOSED_GAP, distance, order_of
 
 OF_SHAKE = 0.01  # of the largest error of the input: how well it is told where the tolerance is less
 FINEST = 4  # most steps in one of the search

@@ -8,8 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from calmotion.accuracy.reduced_bodies import DIRECTIONS, RunMemory
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.model import Character, OptimizerStep, Result
+from calmotion.model.robust.robots import Scenario
+from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.retargeting.avoided_reversals import count_reversals, play_of
@@ -25,11 +29,6 @@ from calmotion.retargeting.search import RetargetSearch
 from calmotion.retargeting.search_memory import SearchMemory
 from calmotion.retargeting.simplification.report_rows import search_rows
 from calmotion.retargeting.solver.gauss_newton import Search
-from calmotion.shot import Character, OptimizerStep, Result
-from calmotion.shot.character import Array
-from calmotion.shot.robust.robots import Scenario
-from calmotion.shot.run import RunSettings
-from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.forward import limited_values
@@ -42,6 +41,7 @@ from calmotion.simulation.report import left_out_rows, limit_uses, performed_mot
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import compile_kernels
 from calmotion.simulation.target_errors import IntendedMotion
+from calmotion.tolerance.reduced_bodies import DIRECTIONS, RunMemory
 
 
 def _progress_of(search: Search) -> tuple[OptimizerStep, ...]:

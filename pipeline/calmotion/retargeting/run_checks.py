@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from calmotion.accuracy.run_checks import check_simulation
+from calmotion.model import Animation, Character
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.avoided_reversals import refuse_without_play
 from calmotion.retargeting.optimize import refuse_other_integrators
 from calmotion.retargeting.problem.posing import unknowns
 from calmotion.retargeting.robust.retarget import uncertainties_of
 from calmotion.retargeting.windows.plan import window_length
-from calmotion.shot import Animation, Character
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.tolerance.run_checks import check_simulation
 
 
 def check_search(character: Character, animation: Animation, options: RunSettings) -> None:

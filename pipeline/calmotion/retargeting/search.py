@@ -7,6 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray
+from calmotion.model import Animation, Character
+from calmotion.model.model_choice import OFF
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.checkpoint import Checkpoint
 from calmotion.retargeting.feasible_start import onto_limits, widen_unavoidable, with_moving_end
 from calmotion.retargeting.problem.adaptive_knots import converted, refined_breaks
@@ -28,10 +32,6 @@ from calmotion.retargeting.simplification.report_rows import FINER, PRUNED
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.retargeting.solver.recycling import Recycled
-from calmotion.shot import Animation, Character
-from calmotion.shot.character import Array, BoolArray
-from calmotion.shot.model_choice import OFF
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.gauss_newton import Search
 from calmotion.retargeting.solver.preconditioner import Preconditioner
 from calmotion.retargeting.solver.recycling import Recycled
-from calmotion.shot.character import Array, IntArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,25 @@ from pathlib import Path
 
 import numpy as np
 
-from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun
-from calmotion.accuracy.reduced_bodies import SUBSPACES, TIME_STEP, RunMemory
-from calmotion.accuracy.simulate_to_tolerance import (
+from calmotion.model import OptimizerStep, Result, Track
+from calmotion.model.model_choice import OFF
+from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import tolerance_of
+from calmotion.multibody.parallel import at_once
+from calmotion.retargeting.found_curves import best_so_far
+from calmotion.retargeting.input_run import with_input_resolved
+from calmotion.retargeting.optimize import optimize_shot, refuse_other_integrators
+from calmotion.retargeting.robust.retarget import retarget_robustly
+from calmotion.retargeting.search_progress import SuccessiveSearches
+from calmotion.retargeting.simplification.idle_motors import ENOUGH
+from calmotion.retargeting.windows.optimize import optimize_windows
+from calmotion.retargeting.windows.plan import window_length
+from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.simulation.inputs.open_chains import refused_gap
+from calmotion.simulation.simulate import Progress
+from calmotion.tolerance.pod_subspace import ProjectedShot, ReferenceRun
+from calmotion.tolerance.reduced_bodies import SUBSPACES, TIME_STEP, RunMemory
+from calmotion.tolerance.simulate_to_tolerance import (
     FINDING,
     HELD,
     allowed_by_subspaces,
@@ -26,8 +42,13 @@ from calmotion.accuracy.simulate_to_tolerance import (
     with_modes,
     with_subspaces,
 )
-from calmotion.accuracy.step_choice import FIRST, LAST, allowed_step_error, chooses_step
-from calmotion.accuracy.step_error import (
+from calmotion.tolerance.step_choice import (
+    FIRST,
+    LAST,
+    allowed_step_error,
+    chooses_step,
+)
+from calmotion.tolerance.step_error import (
     StepRun,
     distance,
     frames_of,
@@ -35,22 +56,6 @@ from calmotion.accuracy.step_error import (
     order_of,
     simulate_at,
 )
-from calmotion.multibody.parallel import at_once
-from calmotion.retargeting.found_curves import best_so_far
-from calmotion.retargeting.input_run import with_input_resolved
-from calmotion.retargeting.optimize import optimize_shot, refuse_other_integrators
-from calmotion.retargeting.robust.retarget import retarget_robustly
-from calmotion.retargeting.search_progress import SuccessiveSearches
-from calmotion.retargeting.simplification.idle_motors import ENOUGH
-from calmotion.retargeting.windows.optimize import optimize_windows
-from calmotion.retargeting.windows.plan import window_length
-from calmotion.shot import OptimizerStep, Result, Track
-from calmotion.shot.model_choice import OFF
-from calmotion.shot.run import RunSettings
-from calmotion.shot.tolerance import tolerance_of
-from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.simulation.inputs.open_chains import refused_gap
-from calmotion.simulation.simulate import Progress
 
 MARGIN, MOST = 0.8, 3  # safety factor of a new step, and most searches
 FIRST_STEP = 0.2  # of the shake: the error that the step of the first search may have

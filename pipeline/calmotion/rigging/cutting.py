@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.geometry.closed_surfaces import close
-from calmotion.geometry.tetrahedra import surface_volume
-from calmotion.shot.character import Array, IntArray
+from calmotion.arrays import Array, IntArray
+from calmotion.mesh.surfaces.closed_surfaces import close
+from calmotion.mesh.tetrahedra import surface_volume
 
 _FLAT = 1e-7  # volume of a negligible piece, of that of all pieces
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 _STARTS = 6  # starting points of the search
 

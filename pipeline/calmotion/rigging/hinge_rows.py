@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from calmotion.arrays import Array
 from calmotion.rigging.hinge_pairs import hinge_pair, least_residual
-from calmotion.shot.character import Array
 
 _STEPS, _SMALL = 60, 1e-13
 STILL = 1e-6  # largest rotation of a body that does not rotate [rad]

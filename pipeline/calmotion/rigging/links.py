@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.rigging.cutting import cut_skin
 from calmotion.rigging.hinge_rows import HingeRow, hinges_for
-from calmotion.shot.character import Array, IntArray
 
 Piece = tuple[Array, IntArray]  # points [n, 3] and triangles [m, 3]
 _WORDS = re.compile(r"hand|wrist|palm|foot|ankle|head", re.IGNORECASE)

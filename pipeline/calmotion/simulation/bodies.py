@@ -8,19 +8,25 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from calmotion.errors import ShotError
+from calmotion.model import (
+    Body,
+    Character,
+    FEMeshes,
+    ModeTable,
+    Skin,
+)
+from calmotion.model.character import ElasticMaterial, with_ideal_motors, with_settings
+from calmotion.model.meshes import FEMesh
+from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.model.joint_arrays import BodyAnchors
 from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import Tree, span_tree
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Body, Character, FEMeshes, ModeTable, Skin
-from calmotion.shot.character import ElasticMaterial, with_ideal_motors, with_settings
-from calmotion.shot.meshes import FEMesh
-from calmotion.shot.tolerance import tolerance_of
 
 if TYPE_CHECKING:
+    from calmotion.mesh.patches.interface_patches import AttachmentFrame
     from calmotion.reduction.full_order.full_models import FullModels, Member
-    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
     from calmotion.reduction.reduce import LinearModes
 
 Found = TypeVar("Found")
@@ -163,7 +169,7 @@ def full_model_of(character: Character, mesh: FEMesh, anchors: BodyAnchors) -> M
 
 def fem_anchors(character: Character, body: Body, anchors: BodyAnchors) -> list[AttachmentFrame]:
     """The anchors of a flexible body as finite elements take them."""
-    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+    from calmotion.mesh.patches.interface_patches import AttachmentFrame
 
     joints, targets = character.joints, character.targets
     paths = [joints[k].prim_path for k in anchors.joints] + [targets[k].path for k in anchors.targets]

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.model import Animation, Character, FEMeshes
+from calmotion.model.character import with_settings
+from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import body_anchors
 from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Animation, Character, FEMeshes
-from calmotion.shot.character import with_settings
-from calmotion.shot.run import RunSettings
-from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.bodies import bodies_in_parallel, full_model_of, reduce_bodies
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.simulation.prepare import grid_of
@@ -87,7 +87,7 @@ class BodyReduction:
         Raises:
             ShotError: A body that cannot be reduced.
         """
-        from calmotion.reduction.mesh_refinement import refined_for_loads
+        from calmotion.tolerance.meshes.mesh_refinement import refined_for_loads
 
         assert self.meshes is not None and self.loads is not None
         anchors, models = body_anchors(self.character, self._tree), self._models()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from calmotion.shot import Animation, Character, Track
+from calmotion.model import Animation, Character, Track
 
 if TYPE_CHECKING:
     from calmotion.multibody.model.model import Model

@@ -8,7 +8,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, Slerp
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.model import Animation, Character, Track
+from calmotion.model.curves import CLOSED, cycle_gap
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.trajectory import Trajectory, copy_of_instant
@@ -17,9 +20,6 @@ from calmotion.multibody.model.model import Model, start_angles
 from calmotion.multibody.model.moving_markers import rooted
 from calmotion.multibody.model.system import State
 from calmotion.multibody.sensitivity.periodic import Monodromy, find_periodic_motion
-from calmotion.shot import Animation, Character, Track
-from calmotion.shot.character import Array
-from calmotion.shot.curves import CLOSED, cycle_gap
 from calmotion.simulation.inputs.roots import root_at
 
 EASE = 1.0  # in which the loop gets up to speed, before one of it leads to a first guess [s]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
 from calmotion.multibody.analysis.reactions import Reactions, reactions
 from calmotion.multibody.integrators.integrate import integrate
@@ -13,7 +14,6 @@ from calmotion.multibody.integrators.trajectory import Trajectory
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, start_angles
 from calmotion.multibody.model.system import State
-from calmotion.shot.character import Array, IntArray
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.delays import CommandDelay
@@ -58,7 +58,7 @@ def run_forward(
         angles, rates: Of the motors, shape [T, M] [rad, rad/s].
         h: Step [s].
         world: Moving roots, see `roots.sample_roots`.
-        integrator: One of `calmotion.shot.run.INTEGRATORS`.
+        integrator: One of `calmotion.model.run.INTEGRATORS`.
         steady: Finds the motions of a shot that loops.
     """
     joint_angles, joint_rates = followed(model, angles, rates, h, steady is not None)

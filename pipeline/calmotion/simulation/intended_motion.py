@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.multibody.analysis.kinematics import rigid_poses, set_rotors, target_frames
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, moves_freely, rigid_model
 from calmotion.multibody.model.system import State, allocate_state
 from calmotion.multibody.statics.equilibrium import equilibrium
-from calmotion.shot.character import Array, BoolArray
 from calmotion.simulation.simulator import Simulator
 from calmotion.simulation.target_errors import IntendedMotion
 

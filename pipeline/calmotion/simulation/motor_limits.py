@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.shot.character import Array, BoolArray, Character
-from calmotion.shot.motor import SERVO
+from calmotion.arrays import Array, BoolArray
+from calmotion.model.character import Character
+from calmotion.model.motor import SERVO
 
 QUANTITIES = ("position", "velocity", "acceleration", "effort")
 

@@ -6,15 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import IntegrationError, ShotError
+from calmotion.model import Animation, Character
+from calmotion.model.character import contact_joints
+from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.deflection import largest_deflection
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.failure import NOWHERE, Reason, SimulationFailure
 from calmotion.multibody.model.model import Model
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Animation, Character
-from calmotion.shot.character import Array, contact_joints
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.contacts import sample_world
 from calmotion.simulation.inputs.curves import needed_pre_roll, sample_tracks

@@ -7,13 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from calmotion.arrays import Array
+from calmotion.model import (
+    LimitUse,
+    Motion,
+    Simplification,
+    Simulation,
+)
 from calmotion.multibody.analysis.dead_centres import dead_centres
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.analysis.unheld_joints import unheld_joints
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
-from calmotion.shot import LimitUse, Motion, Simplification, Simulation
-from calmotion.shot.character import Array
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.time_grid import TimeGrid

@@ -7,8 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calmotion.geometry.makeup import makeup_of
-from calmotion.geometry.mesh_mass import mass_of_tets
+from calmotion.arrays import Array
+from calmotion.mesh.parts.makeup import makeup_of
+from calmotion.mesh.parts.mesh_mass import mass_of_tets
+from calmotion.model import Animation, Character, FEMeshes
+from calmotion.model.character import with_ideal_motors
 from calmotion.multibody.analysis import kinematics
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
@@ -16,8 +19,6 @@ from calmotion.multibody.model.model import Model, body_anchors, compile_model, 
 from calmotion.multibody.model.topology import Tree, chain_members
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Animation, Character, FEMeshes
-from calmotion.shot.character import Array, with_ideal_motors
 from calmotion.simulation.forward import AT_ONCE, ForwardRun, reactions_at, run_forward
 from calmotion.simulation.inputs.contacts import sample_world
 from calmotion.simulation.inputs.curves import sample_tracks

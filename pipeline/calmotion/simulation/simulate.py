@@ -7,12 +7,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.model import Result, Track
+from calmotion.model.character import contact_joints
+from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.shot import Result, Track
-from calmotion.shot.character import Array, contact_joints
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
@@ -46,7 +47,7 @@ def shape_tracks(shot: CompiledShot, options: RunSettings, kind: str, cutoff: fl
     """The shot's tracks through an input shaper or a filter, sampled at the steps of its simulation.
 
     Args:
-        kind: One of `calmotion.shot.run.SHAPERS`.
+        kind: One of `calmotion.model.run.SHAPERS`.
         cutoff: Of the low-pass filter, over the lowest frequency.
 
     Raises:

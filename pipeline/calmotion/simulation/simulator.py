@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.analysis.kinematics import target_frames
 from calmotion.multibody.integrators.simulation import simulate_from
 from calmotion.multibody.integrators.workspace import Workspace
@@ -15,7 +16,6 @@ from calmotion.multibody.sensitivity.continuous_adjoint import continuous_adjoin
 from calmotion.multibody.sensitivity.linearization import Linearization, linearize
 from calmotion.multibody.sensitivity.periodic import Monodromy, periodic_adjoint, periodic_tangent
 from calmotion.multibody.sensitivity.tangent import tangent
-from calmotion.shot.character import Array, IntArray
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import ForwardRun, followed, run_forward
 from calmotion.simulation.inputs.delays import CommandDelay

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array
+from calmotion.model import WeightTrack
 from calmotion.multibody.analysis.kinematics import of_components, of_targets, target_jacobians
 from calmotion.multibody.kernels.so3 import inverse_right_jacobian, logarithm, matrix_of
 from calmotion.multibody.model.model import Model
-from calmotion.shot import WeightTrack
-from calmotion.shot.character import Array
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.support.compilation import allocating_kernel
 

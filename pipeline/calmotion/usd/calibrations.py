@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calmotion.shot.calibration.known_factors import KnownFactors
+from calmotion.model.calibration.known_factors import KnownFactors
 from calmotion.usd import stages
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calmotion.shot.character import Array, IntArray
+from calmotion.arrays import Array, IntArray
 
 if TYPE_CHECKING:
     from pxr import Gf, Sdf, Vt

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError, raise_all
-from calmotion.shot import InputLayer
+from calmotion.model import InputLayer
 from calmotion.support.foreign_files import remedy_for
 from calmotion.support.naming import nearest_name
 from calmotion.usd import schemas

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array, Frame
+from calmotion.model.character import Frame
 
 _HUGE = 1e30
 _AFFINE = 1e-9

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array
 
 if TYPE_CHECKING:
     from pxr import Usd

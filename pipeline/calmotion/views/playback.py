@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calmotion.shot.character import Array, Body
-from calmotion.shot.result import Motion, Skin
+from calmotion.arrays import Array
+from calmotion.model.character import Body
+from calmotion.model.result import Motion, Skin
 
 
 def sample_motion(motion: Motion, times: Array) -> Motion:

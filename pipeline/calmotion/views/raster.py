@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calmotion.shot.character import Array, IntArray
+from calmotion.arrays import Array, IntArray
 from calmotion.support.compilation import kernel
 
 

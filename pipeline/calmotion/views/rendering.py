@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calmotion.shot.character import Array, Character, IntArray
-from calmotion.shot.result import Motion, Skin
+from calmotion.arrays import Array, IntArray
+from calmotion.model.character import Character
+from calmotion.model.result import Motion, Skin
 from calmotion.views.playback import deformed_points, modes_of, rotation_matrices
 from calmotion.views.raster import Hits, rasterize
 from calmotion.views.shading import split_at_creases

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.shot.character import Array, IntArray
+from calmotion.arrays import Array, IntArray
 
 CREASE = np.cos(np.radians(40.0))
 

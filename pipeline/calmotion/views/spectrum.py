@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.shot.character import Array
-from calmotion.shot.result import Motion
+from calmotion.arrays import Array
+from calmotion.model.result import Motion
 from calmotion.views.playback import sample_motion
 
 NEGLIGIBLE = 3e-4  # of the largest amplitude

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.shot.character import Array, Character, IntArray
-from calmotion.shot.result import Motion, Skin
+from calmotion.arrays import Array, IntArray
+from calmotion.model.character import Character
+from calmotion.model.result import Motion, Skin
 from calmotion.views.playback import deformed_points, modes_of, rotation_matrices, world_points
 
 SIDE = np.radians(38.0)

@@ -6,10 +6,10 @@ import os
 from collections.abc import Callable, Sequence
 
 from calmotion.host import OperatorResult, SettingError, Settings, merge, quantity_of
-from calmotion.shot.model_choice import KINDS, OFF, ON
-from calmotion.shot.outputs import Rig, Verification
-from calmotion.shot.result import Result
-from calmotion.shot.run import OutputPaths, RunSettings, Source
+from calmotion.model.model_choice import KINDS, OFF, ON
+from calmotion.model.outputs import Rig, Verification
+from calmotion.model.result import Result
+from calmotion.model.run import OutputPaths, RunSettings, Source
 from calmotion.workflow.inspection import Inspection, wanted_of
 from calmotion.workflow.results import OptimizationResult, SimulationResult
 from calmotion.workflow.run import Hooks, Progress, carry_out
@@ -210,7 +210,7 @@ def _opened(shot: Shot | Path) -> Shot:
 
 
 def _wanted(verify: bool) -> tuple[type, ...]:
-    from calmotion.shot import Character
+    from calmotion.model import Character
 
     return (Character, Result, *((Verification,) if verify else ()))
 

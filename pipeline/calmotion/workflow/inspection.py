@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.errors import ShotError
 from calmotion.host import HostError, Run, Settings, parse_quantity
-from calmotion.shot import (
+from calmotion.model import (
     Animation,
     Body,
     Character,
@@ -25,9 +24,15 @@ from calmotion.shot import (
     Simplification,
     Track,
 )
-from calmotion.shot.motor import SERVO, measure_of
-from calmotion.shot.outputs import ModeShapes, MotorEffects, PlannedStep, SystemModes
-from calmotion.shot.run import WINDOW_OVERLAP, RunSettings
+from calmotion.model.motor import SERVO, measure_of
+from calmotion.model.outputs import (
+    ModeShapes,
+    MotorEffects,
+    PlannedStep,
+    SystemModes,
+)
+from calmotion.model.run import WINDOW_OVERLAP, RunSettings
+from calmotion.tolerance.reduced_bodies import ReducedBodies
 from calmotion.version import __version__
 from calmotion.workflow.problems import Problem
 from calmotion.workflow.report import left_out_row, operator_row
@@ -156,8 +161,8 @@ def _expected(
     character: Character, animation: Animation, modes: SystemModes | None, settings: Settings | None
 ) -> dict[str, Any]:  # fmt: skip
     """What `optimize` is expected to take: windows, memory and time; of the order of the real ones."""
-    from calmotion.accuracy.expected_cost import expected_cost
     from calmotion.retargeting.windows.plan import overlap_time, plan_windows, window_length
+    from calmotion.tolerance.expected_cost import expected_cost
 
     options, given = RunSettings(), (settings or {}).get("retarget.optimize", {}).get("window")
     if given is not None:

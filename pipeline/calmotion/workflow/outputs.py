@@ -7,9 +7,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from calmotion.host import Host, SettingError
-from calmotion.shot import Character, Provenance
-from calmotion.shot.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
-from calmotion.shot.run import OutputPaths
+from calmotion.model import Character, Provenance
+from calmotion.model.outputs import (
+    CsvFile,
+    Figures,
+    Recording,
+    Video,
+    WrittenLayer,
+)
+from calmotion.model.run import OutputPaths
 from calmotion.support.files import try_writing
 
 _NAMES = (("-o", "layer"), ("--csv", "csv"), ("--rrd", "rrd"), ("--figures", "figures"), ("--video", "video"),

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.shot import Character, Motion
-from calmotion.shot.character import WORLD, Array
+from calmotion.arrays import Array
+from calmotion.model import Character, Motion
+from calmotion.model.character import WORLD
 from calmotion.simulation.standing.held_feet import HeldFoot, held_feet, unlike_ground
 from calmotion.simulation.standing.soles import STANDS, centres_of_pressure, margins, points_of, sole_of
 

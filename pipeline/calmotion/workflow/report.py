@@ -1,4 +1,4 @@
-"""What a run reports: the object of `--json`, from the values of `calmotion.shot`."""
+"""What a run reports: the object of `--json`, from the values of `calmotion.model`."""
 
 from __future__ import annotations
 
@@ -8,14 +8,29 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.host import OperatorResult, Run
-from calmotion.shot import Character, LimitUse, Result, Simplification, Simulation
-from calmotion.shot.budget import Verdict, verdict_on
-from calmotion.shot.character import Array, motors_give
-from calmotion.shot.motor import measure_of
-from calmotion.shot.outputs import CsvFile, Figures, Recording, Rig, Verification, Video, WrittenLayer
-from calmotion.shot.result import is_exceeded
-from calmotion.shot.run import Source
+from calmotion.model import (
+    Character,
+    LimitUse,
+    Result,
+    Simplification,
+    Simulation,
+)
+from calmotion.model.budget import Verdict, verdict_on
+from calmotion.model.character import motors_give
+from calmotion.model.motor import measure_of
+from calmotion.model.outputs import (
+    CsvFile,
+    Figures,
+    Recording,
+    Rig,
+    Verification,
+    Video,
+    WrittenLayer,
+)
+from calmotion.model.result import is_exceeded
+from calmotion.model.run import Source
 from calmotion.support.memory import peak_memory
 from calmotion.version import __version__
 from calmotion.workflow.reactions import contact_rows, reaction_rows

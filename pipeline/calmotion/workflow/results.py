@@ -10,11 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calmotion.shot import Character, Result, Simulation
-from calmotion.shot.character import Array
-from calmotion.shot.outputs import CsvFile, Figures, Recording, Verification, Video, WrittenLayer
-from calmotion.shot.run import OutputPaths
-from calmotion.shot.table import columns, read_only
+from calmotion.arrays import Array
+from calmotion.model import Character, Result, Simulation
+from calmotion.model.outputs import (
+    CsvFile,
+    Figures,
+    Recording,
+    Verification,
+    Video,
+    WrittenLayer,
+)
+from calmotion.model.run import OutputPaths
+from calmotion.model.table import columns, read_only
 from calmotion.workflow.exporting.result_files import no_input
 from calmotion.workflow.run import Outcome, again
 
@@ -92,7 +99,7 @@ class SimulationResult:
 
     Attributes:
         shot: The shot.
-        result: Everything that the engine computed, see `calmotion.shot.Result`.
+        result: Everything that the engine computed, see `calmotion.model.Result`.
         interrupted: Whether the user or `cancel` stopped the run.
         problems: Outputs that failed although the result is there.
     """
@@ -181,7 +188,7 @@ class SimulationResult:
         return report
 
     def columns(self) -> dict[str, Array]:
-        """The columns of `--csv` by name, each of shape [T]; see `calmotion.shot.table.columns`."""
+        """The columns of `--csv` by name, each of shape [T]; see `calmotion.model.table.columns`."""
         return columns(self._character, self.result)
 
     def table(self) -> Any:
@@ -295,7 +302,7 @@ class SimulationResult:
         """
         from dataclasses import replace
 
-        from calmotion.shot.run import Source
+        from calmotion.model.run import Source
 
         source, chosen = self._outcome.require(Source), {"on": on, "workers": workers or 0}
         return again(

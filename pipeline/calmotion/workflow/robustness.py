@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.shot import Result
-from calmotion.shot.robust.robots import CURVES
+from calmotion.model import Result
+from calmotion.model.robust.robots import CURVES
 
 
 def robustness_row(result: Result, target: int) -> dict[str, Any]:

@@ -9,8 +9,13 @@ from typing import Any, TypeVar
 
 from calmotion.errors import ShotError
 from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, merge, nearest
-from calmotion.shot import Character, Provenance
-from calmotion.shot.run import INTEGRATORS, SHAPERS, OutputPaths, Source
+from calmotion.model import Character, Provenance
+from calmotion.model.run import (
+    INTEGRATORS,
+    SHAPERS,
+    OutputPaths,
+    Source,
+)
 from calmotion.support import interrupts
 from calmotion.support.foreign_files import remedy_for
 from calmotion.workflow.outputs import files_of, prepare_outputs, refuse_layers, refuse_other_types, requested_files
@@ -237,7 +242,7 @@ def _refuse_unreadable_motion(source: Source, host: Host) -> None:
     Raises:
         SettingError: None does.
     """
-    from calmotion.shot import MotorTracks
+    from calmotion.model import MotorTracks
 
     readers = host.providers(MotorTracks)
     if source.motion is not None and all(cls.poll({Source: source}) is not None for cls in readers):

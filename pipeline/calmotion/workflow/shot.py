@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import TypeVar
 
 from calmotion.host import Host, Reuse, Settings, merge, open_host, read_assignment, read_settings_file
-from calmotion.shot import Animation, Character, Provenance
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.model import Animation, Character, Provenance
+from calmotion.model.run import OutputPaths, Source
 from calmotion.workflow.problems import problems_of, value_of
 
 T = TypeVar("T")

@@ -9,14 +9,22 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from calmotion.host import Operator
-from calmotion.shot import Animation, Character, FEMeshes, ModelChoices, Provenance, Result, Track
-from calmotion.shot.model_choice import run_settings, simplified_character
-from calmotion.shot.run import Source
+from calmotion.model import (
+    Animation,
+    Character,
+    FEMeshes,
+    ModelChoices,
+    Provenance,
+    Result,
+    Track,
+)
+from calmotion.model.model_choice import run_settings, simplified_character
+from calmotion.model.run import Source
 from calmotion.workflow.shot import Shot
 
 if TYPE_CHECKING:
-    from calmotion.accuracy.reduced_bodies import RunMemory
     from calmotion.reduction.load_envelope import LoadEnvelope
+    from calmotion.tolerance.reduced_bodies import RunMemory
     from calmotion.workflow.results import SimulationResult
 
 SMALL = 0.05  # of the largest component of a load: a component of that size may appear
@@ -97,8 +105,8 @@ class Watch:
 
     def _reuse(self, cls: type[Operator], data: Mapping[type, Any]) -> Sequence[object] | None:
         """What an operator would make, where it is known from the last run."""
-        from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies
         from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
+        from calmotion.tolerance.reduced_bodies import ConvergedReduction, ReducedBodies
 
         last, made = self._last, cls.provides
         if not last or Character not in data or any(kind not in last for kind in made):
@@ -123,9 +131,9 @@ class Watch:
 
     def _bodies_do(self, character: Character, data: Mapping[type, Any], reduction: Any) -> bool:
         """Whether the reduced bodies of the last run do for the motion."""
-        from calmotion.accuracy.converged_reduction import SHARE
-        from calmotion.shot.tolerance import tolerance_of
+        from calmotion.model.tolerance import tolerance_of
         from calmotion.simulation.body_reduction import load_envelopes
+        from calmotion.tolerance.converged_reduction import SHARE
 
         if reduction is None or reduction.loads is None or data.get(FEMeshes) is not self._last.get(FEMeshes):
             return False
@@ -138,7 +146,7 @@ class Watch:
 
     def _with_last_changes(self, animation: Animation) -> Animation:
         """The animation, whose current curves have the changes that the last search found."""
-        from calmotion.shot.curves import held_curve
+        from calmotion.model.curves import held_curve
 
         result, before = self._last.get(Result), self._last[Animation]
         if result is None or result.after is None or not _same_times(animation, before):
@@ -171,14 +179,14 @@ def _growth(load: LoadEnvelope, reduced: LoadEnvelope) -> float:
 
 
 def _error_of_reduction(data: Mapping[type, Any]) -> float:
-    from calmotion.accuracy.reduced_bodies import ConvergedReduction
+    from calmotion.tolerance.reduced_bodies import ConvergedReduction
 
     return data[ConvergedReduction].error_m if ConvergedReduction in data else 0.0
 
 
 def _memory(data: Mapping[type, Any]) -> RunMemory | None:
     """What runs with the same bodies leave to each other."""
-    from calmotion.accuracy.reduced_bodies import ConvergedReduction
+    from calmotion.tolerance.reduced_bodies import ConvergedReduction
 
     found: ConvergedReduction | None = data.get(ConvergedReduction)
     return None if found is None else found.memory
@@ -186,7 +194,7 @@ def _memory(data: Mapping[type, Any]) -> RunMemory | None:
 
 def _parts(data: Mapping[type, Any]) -> list[str]:
     """What a run of a shot could take over from the one before, of those that took time."""
-    from calmotion.accuracy.reduced_bodies import DIRECTIONS, SUBSPACES, TIME_STEP
+    from calmotion.tolerance.reduced_bodies import DIRECTIONS, SUBSPACES, TIME_STEP
 
     if FEMeshes not in data or not data[FEMeshes].meshes:
         return []

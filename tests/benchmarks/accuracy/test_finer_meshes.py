@@ -3,8 +3,8 @@
 import pytest
 from calmotion.benchmarks.accuracy.reference_bench import with_more_nodes
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
-from calmotion.reduction.elements.assembly import quadratic_mesh
-from calmotion.shot.run import RunSettings
+from calmotion.mesh.quadratic import quadratic_mesh
+from calmotion.model.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for
 
 

@@ -4,12 +4,12 @@ import csv
 import json
 
 import pytest
-from calmotion.accuracy.step_error import distance
 from calmotion.benchmarks.accuracy import reference_bench, work_precision, work_precision_points
 from calmotion.benchmarks.accuracy.reference_bench import Bench
 from calmotion.benchmarks.accuracy.work_precision_points import chosen_points, forward_points
 from calmotion.benchmarks.common.shots import Unreduced
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
+from calmotion.tolerance.step_error import distance
 
 
 @pytest.fixture(scope="module")

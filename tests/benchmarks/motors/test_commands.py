@@ -8,8 +8,8 @@ import pytest
 from arms import chain
 from calmotion import ShotError
 from calmotion.benchmarks.motors.commands import ALLOWED, beginning, compare, main, with_rigid_bodies
-from calmotion.shot import Animation, Track
-from calmotion.shot.motor import Rotor
+from calmotion.model import Animation, Track
+from calmotion.model.motor import Rotor
 from calmotion.simulation.compiled_shot import compile_shot
 from pxr import UsdPhysics
 from small_shots import ELBOW, SHOULDER, write_arm

@@ -7,10 +7,20 @@ import pytest
 from arms import chain, frame
 from calmotion import ShotError
 from calmotion.benchmarks.motors.lumped import lumped_mjcf, simulate_lumped
-from calmotion.shot import Animation, Body, Character, FlexibleSettings, Joint, MassProperties, Motor, Target, Track
-from calmotion.shot.character import ElasticMaterial
-from calmotion.shot.motor import Follows, Rotor
-from calmotion.shot.run import RunSettings
+from calmotion.model import (
+    Animation,
+    Body,
+    Character,
+    FlexibleSettings,
+    Joint,
+    MassProperties,
+    Motor,
+    Target,
+    Track,
+)
+from calmotion.model.character import ElasticMaterial
+from calmotion.model.motor import Follows, Rotor
+from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 

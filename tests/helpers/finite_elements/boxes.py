@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.geometry.tetrahedra import measure_quality, oriented_tets
-from calmotion.shot import FEMesh
+from calmotion.mesh.tetrahedra import measure_quality, oriented_tets
+from calmotion.model import FEMesh
 
 
 def box_tets(counts, size, origin=(0.0, 0.0, 0.0)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from boxes import box_tets, conical_quadrature, fe_mesh
-from calmotion.shot import ElasticMaterial, Frame
+from calmotion.model import ElasticMaterial, Frame
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 

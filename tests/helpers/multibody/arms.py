@@ -1,9 +1,17 @@
 """Small characters for tests: pendulums and planar arms, rigid."""
 
 import numpy as np
+from calmotion.model import (
+    Body,
+    Character,
+    Frame,
+    Joint,
+    MassProperties,
+    Motor,
+    Target,
+)
 from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot import Body, Character, Frame, Joint, MassProperties, Motor, Target
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 Z_TO_Y = np.array([np.cos(np.pi / 4), -np.sin(np.pi / 4), 0.0, 0.0])  # joint axis z along the body's y

@@ -6,8 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 from calmotion.benchmarks.scenes.beam_arm import IDENTITY, LIFTS
-from calmotion.shot import Body, Character, Frame, Joint, MassProperties, Motor, Target
-from calmotion.shot.character import WORLD
+from calmotion.model import (
+    Body,
+    Character,
+    Frame,
+    Joint,
+    MassProperties,
+    Motor,
+    Target,
+)
+from calmotion.model.character import WORLD
 
 _ANGLE = "drive:angular:physics:targetPosition"
 _HEAVY, _SMALL = 0.4, 1e-3 * np.eye(3)

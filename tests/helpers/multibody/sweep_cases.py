@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+from calmotion.model import Motor
+from calmotion.model.motor import Rotor
 from calmotion.multibody.analysis.kinematics import set_rotors, system_poses
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, allocate_state
 from calmotion.multibody.motors.drives import GivingMotor, add_motors
-from calmotion.shot import Motor
-from calmotion.shot.motor import Rotor
 from particles import nonlinear, particle_system, without_rotation
 from scipy.spatial.transform import Rotation
 

@@ -8,7 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from calmotion.shot import Body, Character, ElasticMaterial, FEMeshes, FlexibleSettings, Frame, SurfaceMesh
+from calmotion.mesh.repair import closed_solid
+from calmotion.model import (
+    Body,
+    Character,
+    ElasticMaterial,
+    FEMeshes,
+    FlexibleSettings,
+    Frame,
+    SurfaceMesh,
+)
 from calmotion.testing import run_operator
 
 PLUGIN = Path(__file__).resolve().parents[3] / "plugins" / "fe_mesher"
@@ -47,8 +56,8 @@ def run(host, *bodies, **properties):
     return meshes.meshes
 
 
-def solid(package, *surfaces):
-    return package("repair").closed_solid(surfaces, "/Arm/link")
+def solid(*surfaces):
+    return closed_solid.closed_solid(surfaces, "/Arm/link")
 
 
 def links_of(shared_data, *names):

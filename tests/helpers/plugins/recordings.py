@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import synthetic
-from calmotion.shot.run import OutputPaths
+from calmotion.model.run import OutputPaths
 from calmotion.testing import host_with, run_operator
 
 PLUGIN = Path(__file__).resolve().parents[3] / "plugins" / "rerun_logger"

@@ -6,7 +6,7 @@ A fixed base, a box link that turns about z and bends by one mode (x / L)^2 alon
 from __future__ import annotations
 
 import numpy as np
-from calmotion.shot import (
+from calmotion.model import (
     WORLD,
     Animation,
     Body,

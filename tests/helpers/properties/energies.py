@@ -6,13 +6,13 @@ Both follow from inertia integrals, elastic laws and multipliers, none from the 
 from __future__ import annotations
 
 import numpy as np
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.kernels import inertia
 from calmotion.multibody.kernels.components import component_of
 from calmotion.multibody.kernels.so3 import matrix_of
 from calmotion.multibody.kernels.work import Work, allocate_work
 from calmotion.multibody.model.system import LINEAR, STVK, State, System
-from calmotion.shot.character import Array, IntArray
 from calmotion.simulation.forward import ForwardRun
 
 

@@ -12,8 +12,7 @@ from unittest.mock import patch
 import four_bar
 import numpy as np
 from calmotion.benchmarks.scenes.beam_arm import beam_mesh, quintic
-from calmotion.multibody.model.topology import span_tree
-from calmotion.shot import (
+from calmotion.model import (
     WORLD,
     Animation,
     Body,
@@ -31,7 +30,8 @@ from calmotion.shot import (
     Target,
     Track,
 )
-from calmotion.shot.run import RunSettings
+from calmotion.model.run import RunSettings
+from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot

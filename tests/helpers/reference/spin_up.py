@@ -1,7 +1,7 @@
 """The spin-up beam of Simo and Vu-Quoc (On the dynamics of flexible beams under large motions, 1986)."""
 
 import numpy as np
-from calmotion.shot import ElasticMaterial
+from calmotion.model import ElasticMaterial
 from turning_beam import TurningBeam
 
 LENGTH, EA, EI, PER_LENGTH = 10.0, 2.8e7, 1.4e4, 1.2

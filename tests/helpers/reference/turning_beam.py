@@ -5,14 +5,22 @@ from __future__ import annotations
 import numpy as np
 from arms import Z_TO_Y, frame
 from boxes import box_tets, fe_mesh
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
+from calmotion.model import (
+    Body,
+    Character,
+    FlexibleSettings,
+    Joint,
+    MassProperties,
+    Motor,
+    Target,
+)
 from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import span_tree
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.reduce import reduce_body
-from calmotion.shot import Body, Character, FlexibleSettings, Joint, MassProperties, Motor, Target
 
 
 class TurningBeam:

@@ -2,14 +2,14 @@
 
 # From the lowest floor to the highest; rooms of one floor do not know each other.
 FLOORS = (
-    ("errors", "public_names", "version"),
+    ("arrays", "errors", "public_names", "version"),
     ("support",),
-    ("shot",),
-    ("geometry", "linear_algebra", "views", "control"),
+    ("model",),
+    ("mesh", "linear_algebra", "views", "control"),
     ("reduction", "rigging"),
     ("multibody", "usd"),
     ("simulation",),
-    ("accuracy",),
+    ("tolerance",),
     ("retargeting",),
     ("identification",),
     ("host",),

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.multibody.model.topology import span_tree
-from calmotion.shot import (
+from calmotion.model import (
     Animation,
     Body,
     Character,
@@ -19,6 +18,7 @@ from calmotion.shot import (
     Target,
     Track,
 )
+from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.bodies import reduce_bodies
 
 LENGTH = 0.32

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.benchmarks.scenes.beam_arm import IDENTITY, LIFTS, beam_mesh
-from calmotion.shot import (
+from calmotion.model import (
     Animation,
     Body,
     Character,
@@ -20,7 +21,7 @@ from calmotion.shot import (
     Target,
     Track,
 )
-from calmotion.shot.character import WORLD, Array
+from calmotion.model.character import WORLD
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 

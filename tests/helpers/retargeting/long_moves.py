@@ -2,7 +2,7 @@
 
 import numpy as np
 from arm_fixtures import ease
-from calmotion.shot import Animation, Track
+from calmotion.model import Animation, Track
 
 
 def long_moves(seconds, rate=24.0, seed=1):

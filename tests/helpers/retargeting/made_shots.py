@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
-from calmotion.shot.run import RunSettings
+from calmotion.model.run import RunSettings
 from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.simulation.simulate import simulate_shot
 from linkage_arm import SOFT, linkage_arm, performance

@@ -3,12 +3,12 @@
 import dataclasses
 
 import numpy as np
+from calmotion.model import Animation, Track
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import make_basis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.shot import Animation, Track
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion, static_motion

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from calmotion.host import Operator, registration
-from calmotion.shot import Character
+from calmotion.model import Character
 
 
 @dataclass(frozen=True)

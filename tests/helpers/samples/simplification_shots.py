@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.benchmarks.scenes.beam_arm import IDENTITY, LIFTS, beam_arm, beam_mesh, quintic, shot_of
-from calmotion.shot import (
+from calmotion.model import (
     Animation,
     Body,
     Character,
@@ -23,7 +24,7 @@ from calmotion.shot import (
     TetGeometry,
     Track,
 )
-from calmotion.shot.character import WORLD, Array
+from calmotion.model.character import WORLD
 
 _ANGLE, _LENGTH = "drive:angular:physics:targetPosition", "drive:linear:physics:targetPosition"
 _SIDE = np.roll(np.array([0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)]), 1)  # z to x: a slider's axis along x

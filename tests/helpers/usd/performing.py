@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.shot import MotorCurve, Result, Simulation, Track
-from calmotion.shot.run import RunSettings
+from calmotion.model import (
+    MotorCurve,
+    Result,
+    Simulation,
+    Track,
+)
+from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.prepare import prepare

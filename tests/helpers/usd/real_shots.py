@@ -9,9 +9,9 @@ from pathlib import Path
 
 from calmotion.errors import ShotError, each
 from calmotion.host import open_host
-from calmotion.shot import Character
-from calmotion.shot.outputs import Rig
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.model import Character
+from calmotion.model.outputs import Rig
+from calmotion.model.run import OutputPaths, Source
 from calmotion.usd import dependencies
 
 LOADS, RIGGED, REFUSED = "loads", "loads as a robot", "refused"

@@ -6,9 +6,9 @@ from itertools import product
 import numpy as np
 import pytest
 from calmotion.identification.excitation.clearance import FAR, Clearance, Points
-from calmotion.shot import Animation, Track
-from calmotion.shot.character import SurfaceMesh
-from calmotion.shot.run import RunSettings
+from calmotion.model import Animation, Track
+from calmotion.model.character import SurfaceMesh
+from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 
 OPTIONS = RunSettings(step=1 / 240, pre_roll=0.0)

@@ -8,9 +8,9 @@ from calmotion.errors import ShotError
 from calmotion.identification.excitation import design
 from calmotion.identification.excitation.design import ExcitationSettings, excite_shot
 from calmotion.identification.excitation.waveforms import bounds_of, family_of
-from calmotion.shot.calibration.excitation import PlannedSensor
-from calmotion.shot.calibration.recording import ACCELEROMETER, EFFORT
-from calmotion.shot.run import RunSettings
+from calmotion.model.calibration.excitation import PlannedSensor
+from calmotion.model.calibration.recording import ACCELEROMETER, EFFORT
+from calmotion.model.run import RunSettings
 from recorded import LOAD, MOTOR
 
 SENSORS = (PlannedSensor(ACCELEROMETER, LOAD, 0.1, 200.0), PlannedSensor(EFFORT, MOTOR, 0.02, 100.0))
@@ -54,8 +54,8 @@ def test_a_calibration_has_the_promised_standard_deviations(recorded_shot, found
     from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
     from calmotion.identification.robots import robot_with
     from calmotion.identification.signals import signals_of
-    from calmotion.shot import Animation, Track
-    from calmotion.shot.calibration.recording import Channel, SensorRecording
+    from calmotion.model import Animation, Track
+    from calmotion.model.calibration.recording import Channel, SensorRecording
 
     tracks = (Track(found.times, found.values[:, 0]),)
     shot = dataclasses.replace(recorded_shot, animation=Animation(found.times, tracks, tracks))

@@ -10,9 +10,15 @@ from calmotion.identification.measurement import Measurement, measurement_parame
 from calmotion.identification.parameters import robot_parameters
 from calmotion.identification.problem import Calibrated
 from calmotion.identification.robots import robot_with
-from calmotion.shot import Animation, Track
-from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, MARKER, Channel, SensorRecording
-from calmotion.shot.run import RunSettings
+from calmotion.model import Animation, Track
+from calmotion.model.calibration.recording import (
+    ACCELEROMETER,
+    ANGLE,
+    MARKER,
+    Channel,
+    SensorRecording,
+)
+from calmotion.model.run import RunSettings
 from recorded import LOAD, MOTOR, PLASTIC
 
 AFTER, OPTIONS = 0.5, RunSettings(step=1 / 240, pre_roll=0.0, integrator="generalized-alpha")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion.identification.recordings.free_decay import decay_factors, strongest_mode
-from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE
-from calmotion.shot.run import RunSettings
+from calmotion.model.calibration.recording import ACCELEROMETER, ANGLE
+from calmotion.model.run import RunSettings
 from recorded import LOAD, PLASTIC, only, problem_of, recordings_of
 
 TIMES = np.arange(0.0, 1.0, 1.0 / 400.0)

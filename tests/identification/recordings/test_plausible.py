@@ -8,8 +8,8 @@ from calmotion import ShotError
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion.identification.recordings.plausible import refuse_far, refuse_long, refuse_still
 from calmotion.identification.signals import signals_of
-from calmotion.shot.calibration.recording import MARKER
-from calmotion.shot.run import RunSettings
+from calmotion.model.calibration.recording import MARKER
+from calmotion.model.run import RunSettings
 
 OPTIONS = RunSettings(step=1 / 240, integrator="generalized-alpha")
 

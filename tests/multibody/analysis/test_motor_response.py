@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, shot_of
+from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.motor_response import motor_responses
 from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.kernels.markers import WORLD_MARKER
 from calmotion.multibody.model.model import rigid_model
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_tracks

@@ -3,6 +3,14 @@
 import numpy as np
 import pytest
 from arms import chain, compiled, frame
+from calmotion.model import (
+    Body,
+    Character,
+    Joint,
+    MassProperties,
+    Motor,
+    Target,
+)
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.integrators.simulation import simulate
@@ -10,7 +18,6 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.joint_arrays import body_anchors
 from calmotion.multibody.model.model import compile_model, rigid_body
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot import Body, Character, Joint, MassProperties, Motor, Target
 from scipy.spatial.transform import Rotation
 
 H = 1e-3

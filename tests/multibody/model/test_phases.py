@@ -6,6 +6,15 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.errors import IntegrationError
+from calmotion.model import (
+    Body,
+    Character,
+    Frame,
+    Joint,
+    MassProperties,
+)
+from calmotion.model.run import RunSettings
+from calmotion.model.standing.contact import Contact
 from calmotion.multibody.analysis.kinematics import rigid_state, target_jacobians
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.integrators.integrate import integrate
@@ -15,9 +24,6 @@ from calmotion.multibody.model.model import body_anchors, compile_model, rigid_b
 from calmotion.multibody.model.moving_markers import pack
 from calmotion.multibody.model.phases import RESTARTED, changes, held_contacts, phases_of, without_contacts
 from calmotion.multibody.sensitivity.linearization import linearize
-from calmotion.shot import Body, Character, Frame, Joint, MassProperties
-from calmotion.shot.run import RunSettings
-from calmotion.shot.standing.contact import Contact
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks

@@ -6,6 +6,13 @@ import numpy as np
 import pytest
 from arms import Z_TO_Y, chain, compiled, frame
 from calmotion.errors import ShotError
+from calmotion.model import (
+    Body,
+    Character,
+    Joint,
+    MassProperties,
+    Motor,
+)
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.analysis.reactions import reactions, transmitted
@@ -14,7 +21,6 @@ from calmotion.multibody.model.model import rigid_model
 from calmotion.multibody.motors.drives import GivingMotor, add_motors, giving_motors
 from calmotion.multibody.runs import simulate
 from calmotion.multibody.statics.equilibrium import equilibrium
-from calmotion.shot import Body, Character, Joint, MassProperties, Motor
 from motor_runs import pitch, run, smooth
 from particles import particle_system
 from scipy.integrate import solve_ivp

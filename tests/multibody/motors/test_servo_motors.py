@@ -5,10 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import chain, compiled, frame
+from calmotion.model import (
+    Body,
+    Character,
+    Joint,
+    MassProperties,
+    Motor,
+)
+from calmotion.model.motor import Rotor
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.motors.servos import motor_effort
-from calmotion.shot import Body, Character, Joint, MassProperties, Motor
-from calmotion.shot.motor import Rotor
 from motor_runs import pitch, run, smooth
 from scipy.integrate import solve_ivp
 

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 from arms import chain, compiled
+from calmotion.model.character import WORLD
 from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import start_angles
 from calmotion.multibody.statics.equilibrium import equilibrium, linearize
-from calmotion.shot.character import WORLD
 from mechanisms import mechanism
 from particles import particle_system
 from sweep_cases import rigid_start

@@ -3,6 +3,16 @@
 import numpy as np
 import pytest
 from arms import chain, compiled
+from calmotion.model import (
+    WORLD,
+    Body,
+    Character,
+    Frame,
+    Joint,
+    MassProperties,
+    Motor,
+    Target,
+)
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
@@ -16,7 +26,6 @@ from calmotion.multibody.statics.regularized_statics import (
     solve_statics,
     solve_statics_transposed,
 )
-from calmotion.shot import WORLD, Body, Character, Frame, Joint, MassProperties, Motor, Target
 from dense import dense_matrix, free_sliders, join, multipliers, split
 from neutral_hinges import push_rod, turning
 from scipy.spatial.transform import Rotation

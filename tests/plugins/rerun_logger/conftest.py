@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 import synthetic
-from calmotion.shot.outputs import Recording
+from calmotion.model.outputs import Recording
 from recordings import read_recording, write
 
 

@@ -14,7 +14,7 @@ import rerun as rr
 import synthetic
 from calmotion.errors import ShotError
 from calmotion.host import PluginError
-from calmotion.shot.run import OutputPaths
+from calmotion.model.run import OutputPaths
 from calmotion.testing import check_plugin, host_with, run_operator
 from recordings import PLUGIN, write
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import synthetic
-from calmotion.shot.outputs import SystemModes
-from calmotion.shot.run import OutputPaths
+from calmotion.model.outputs import SystemModes
+from calmotion.model.run import OutputPaths
 from calmotion.testing import host_with, run_operator
 from recordings import PLUGIN, read_recording, write
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calmotion.model import FlexibleSettings
 from calmotion.reduction.basis.craig_bampton import reduced_basis, rigid_patch
 from calmotion.reduction.basis.fixed_interface import FixedInterface, ritz_modes
 from calmotion.reduction.basis.natural_modes import SparseSolver, frequencies, vector_mass
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.elements.embedding import embed
 from calmotion.reduction.load_envelope import LoadEnvelope
-from calmotion.shot import FlexibleSettings
 from scipy.sparse import bmat, csr_matrix, identity
 
 TIP = np.array([0.6, 0.0, 0.0])

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calmotion.model import FlexibleSettings
 from calmotion.reduction.basis.craig_bampton import mode_signs, reduced_basis, rigid_patch
 from calmotion.reduction.basis.natural_modes import SparseSolver, frequencies, vector_mass
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.shot import FlexibleSettings
 
 TIP = np.array([0.6, 0.0, 0.0])
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from calmotion.model import FlexibleSettings
 from calmotion.reduction.basis.fixed_interface import FixedInterface, ritz_modes
 from calmotion.reduction.basis.static_loads import unit_accelerations
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.shot import FlexibleSettings
 
 
 @pytest.fixture(scope="module")

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from boxes import box_tets
+from calmotion.model import FlexibleSettings
 from calmotion.reduction.basis.craig_bampton import reduced_basis
 from calmotion.reduction.basis.modal_derivatives import Support, extended_basis, modal_derivatives
 from calmotion.reduction.basis.natural_modes import vector_mass
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, strain_gram
 from calmotion.reduction.material_laws.reduced_poses import equilibrium
-from calmotion.shot import FlexibleSettings
 
 LENGTH, THICKNESS = 0.6, 0.02
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from boxes import box_tets
+from calmotion.model import ElasticMaterial
 from calmotion.reduction.basis.natural_modes import SparseSolver, frequencies, lowest_modes, vector_mass
 from calmotion.reduction.discretization_error import clamped_modes
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.shot import ElasticMaterial
 
 
 @pytest.fixture(scope="module")

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from calmotion.mesh.bisection import bisected
 from calmotion.reduction.basis import nested_interface_modes
 from calmotion.reduction.basis.fixed_interface import FixedInterface
 from calmotion.reduction.basis.natural_modes import lowest_modes
 from calmotion.reduction.basis.nested_interface_modes import improved
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.elements.bisection import bisected
 
 LENGTH, LIMIT = 0.3, 1e3
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from boxes import quadratic_shapes
-from calmotion.geometry.tetrahedra import surface_area
-from calmotion.reduction.elements.assembly import assemble, quadratic_mesh, quadratic_nodes
+from calmotion.mesh.quadratic import quadratic_mesh, quadratic_nodes
+from calmotion.mesh.tetrahedra import surface_area
+from calmotion.reduction.elements.assembly import assemble
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from boxes import box_tets, conical_quadrature
+from calmotion.model import ElasticMaterial
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.elements.elastic_forms import (
     GradientRule,
@@ -12,7 +13,6 @@ from calmotion.reduction.elements.elastic_forms import (
     second_order_force,
     strain_gram,
 )
-from calmotion.shot import ElasticMaterial
 
 MATERIAL = ElasticMaterial("/Looks/Any", 3.0, 0.3, 1.0)
 LAME, MU = lame_constants(3.0, 0.3)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from calmotion.mesh.quadratic import quadratic_mesh
 from calmotion.reduction.elements import embedding
-from calmotion.reduction.elements.assembly import quadratic_mesh
 
 
 @pytest.fixture(scope="module")

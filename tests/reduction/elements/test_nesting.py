@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.reduction.elements.assembly import assemble, quadratic_mesh
-from calmotion.reduction.elements.bisection import bisected
+from calmotion.mesh.bisection import bisected
+from calmotion.mesh.quadratic import quadratic_mesh
+from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.elements.nesting import prolongation
 from scipy.sparse import identity
 

@@ -7,11 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.geometry.tetrahedra import measure_quality
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
+from calmotion.mesh.tetrahedra import measure_quality
+from calmotion.model import (
+    Body,
+    FEMesh,
+    FlexibleSettings,
+    MassProperties,
+)
 from calmotion.reduction.full_order import full_models as module
 from calmotion.reduction.full_order.full_models import FullModels, Member
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
-from calmotion.shot import Body, FEMesh, FlexibleSettings, MassProperties
 
 
 @pytest.fixture

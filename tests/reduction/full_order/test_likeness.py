@@ -6,11 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.geometry.tetrahedra import measure_quality
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
+from calmotion.mesh.tetrahedra import measure_quality
+from calmotion.model import (
+    Body,
+    FEMesh,
+    FlexibleSettings,
+    Frame,
+)
 from calmotion.reduction.full_order.likeness import turn_between
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.reduce import full_body, reduce_body
-from calmotion.shot import Body, FEMesh, FlexibleSettings, Frame
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 MIRROR = np.diag([1.0, -1.0, 1.0])

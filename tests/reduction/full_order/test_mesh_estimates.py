@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.geometry.tetrahedra import measure_quality
+from calmotion.mesh.bisection import bisected
+from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches
+from calmotion.mesh.tetrahedra import measure_quality
+from calmotion.model import Body, FEMesh, FlexibleSettings
 from calmotion.reduction.discretization_error import clamped_modes
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.elements.bisection import bisected
 from calmotion.reduction.full_order import mesh_estimates
 from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
 from calmotion.reduction.full_order.nested_modes import NestedModes
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
-from calmotion.shot import Body, FEMesh, FlexibleSettings
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion.linear_algebra import multigrid
+from calmotion.mesh.bisection import bisected
 from calmotion.reduction.discretization_error import clamped_modes, element_errors
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.elements.bisection import bisected
 from calmotion.reduction.full_order import nested_modes
 from calmotion.reduction.full_order.nested_modes import NestedModes
 

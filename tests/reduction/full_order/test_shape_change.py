@@ -6,16 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.geometry.grids.missing_volume import missing_volume
-from calmotion.geometry.nearby_triangles import NearbyTriangles
-from calmotion.geometry.tetrahedra import boundary_triangles, measure_quality
+from calmotion.mesh.grids.missing_volume import missing_volume
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
+from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles
+from calmotion.mesh.tetrahedra import boundary_triangles, measure_quality
+from calmotion.model import Body, FEMesh, FlexibleSettings
 from calmotion.reduction.full_order.mesh_estimates import frequency_estimate, load_estimate
 from calmotion.reduction.full_order.mesh_extrapolation import Estimate, by_shape
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.load_envelope import LoadEnvelope
-from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies, refined_for_loads, with_own_stiffness
 from calmotion.reduction.reduce import linear_modes
-from calmotion.shot import Body, FEMesh, FlexibleSettings
+from calmotion.tolerance.meshes.mesh_refinement import (
+    Effort,
+    refined_for_frequencies,
+    refined_for_loads,
+    with_own_stiffness,
+)
 
 SIZE, MORE = (0.3, 0.04, 0.03), (0.0, 0.0, 4e-4)  # too thin by 1.3%
 

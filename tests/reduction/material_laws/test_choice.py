@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from boxes import box_tets
 from calmotion.errors import ShotError
+from calmotion.model import ElasticMaterial, FlexibleSettings
 from calmotion.reduction.basis.craig_bampton import reduced_basis
 from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import choose_law, deflection_of, work_of_loads
-from calmotion.shot import ElasticMaterial, FlexibleSettings
 
 LENGTH, PAYLOAD = 0.6, 0.2
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from boxes import box_tets
 from calmotion.errors import ShotError
+from calmotion.model import FlexibleSettings
 from calmotion.multibody.kernels.neohookean import JOIN
 from calmotion.reduction.basis.craig_bampton import reduced_basis
 from calmotion.reduction.basis.modal_derivatives import Support, extended_basis
@@ -17,7 +18,6 @@ from calmotion.reduction.material_laws.cubature import (
     neohookean_cubature,
     neohookean_stress,
 )
-from calmotion.shot import FlexibleSettings
 from law_call import call_neohookean
 
 

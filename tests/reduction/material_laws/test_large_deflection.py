@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from boxes import box_tets, fe_mesh
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
+from calmotion.model import Body, FlexibleSettings, Frame
 from calmotion.reduction.reduce import reduce_body
-from calmotion.shot import Body, FlexibleSettings, Frame
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 

@@ -4,6 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model import WeightTrack
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem import adaptive_knots
 from calmotion.retargeting.problem.adaptive_knots import (
@@ -16,8 +18,6 @@ from calmotion.retargeting.problem.adaptive_knots import (
 )
 from calmotion.retargeting.problem.offset_basis import basis_on, make_basis, uniform_breaks
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
-from calmotion.shot import WeightTrack
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.time_grid import make_grid
 from posed import FINE_FRAMES, ignore_progress, jerking, make_problem

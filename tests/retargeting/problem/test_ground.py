@@ -6,12 +6,12 @@ from __future__ import annotations
 import calmotion as cm
 import numpy as np
 import pytest
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.kept_feet import keep_feet
 from calmotion.retargeting.problem import ground
 from calmotion.retargeting.problem.ground import GROUND, SPEED, ground_bounds, with_ground_rows
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.motor_limits import Bounds

@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem.limits import MARGIN, LimitTerms
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.motor_limits import motor_bounds
 from posed import ignore_progress

@@ -4,8 +4,8 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from calmotion.model import Track
 from calmotion.retargeting.problem.offset_basis import basis_on, make_basis
-from calmotion.shot import Track
 from calmotion.simulation.inputs.curves import sample_curves, sample_tracks
 from calmotion.simulation.inputs.time_grid import make_grid
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 from arms import chain
+from calmotion.model import Animation, Track
+from calmotion.model.motor import Rotor
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem import posing
 from calmotion.retargeting.problem.posing import CLOSENESS, CLOSENESS_OF_COMMANDS, closeness_of
-from calmotion.shot import Animation, Track
-from calmotion.shot.motor import Rotor
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from posed import ignore_progress
 

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies, with_elasticity
 from calmotion.simulation.body_reduction import load_envelopes
 from linkage_arm import linkage_arm, performance
@@ -135,7 +135,7 @@ def test_static_start_follows_the_curves(arm, bodies, animation):
 
 
 def test_weights_that_change_in_time_weigh_each_instant(arm, bodies, animation):
-    from calmotion.shot import WeightTrack
+    from calmotion.model import WeightTrack
 
     track = WeightTrack(1, False, np.array([0.5, 1.0]), np.array([0.0, 2.0]))
     problem = make_problem(arm, bodies, dataclasses.replace(animation, weights=(track,)))

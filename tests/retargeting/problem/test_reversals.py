@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calmotion.model.motor import Rotor
 from calmotion.retargeting.avoided_reversals import count_reversals, play_of
 from calmotion.retargeting.problem.reversals import REVERSAL, reversal_terms, wanted_sides
-from calmotion.shot.motor import Rotor
 from posed import make_problem
 
 H = 1 / 240

@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model.robust.robots import Scenario
 from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.robust.scenarios import shot_of
-from calmotion.shot.robust.robots import Scenario
 from calmotion.simulation.compiled_shot import compile_shot
 from posed import make_problem
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.robust.choice import (
     NEAR,
     REACH,
@@ -13,7 +14,6 @@ from calmotion.retargeting.robust.choice import (
 )
 from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import scenario_at, uncertain_parameters
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 
 OPTIONS = RunSettings(step=1 / 120)

@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.model.robust.settings import RobustSettings, Uncertainty
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.run_checks import check_search
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
-from calmotion.shot.robust.settings import RobustSettings, Uncertainty
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.workflow.robustness import robustness_report, robustness_row
 from posed import ignore_progress, looped

@@ -1,9 +1,9 @@
 """The robots of scenarios in a problem."""
 
 import numpy as np
+from calmotion.model.robust.robots import Scenario
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.robust.robots import robots_of
-from calmotion.shot.robust.robots import Scenario
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.prepare import prepare
 from posed import make_problem

@@ -4,6 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model.calibration.known_factors import KnownFactors
+from calmotion.model.motor import DRIVE
+from calmotion.model.robust.robots import Scenario
+from calmotion.model.robust.settings import Uncertainty
 from calmotion.reduction.damping import damped
 from calmotion.retargeting.robust.scenarios import (
     payload_bodies,
@@ -13,10 +17,6 @@ from calmotion.retargeting.robust.scenarios import (
     shot_of,
     uncertain_parameters,
 )
-from calmotion.shot.calibration.known_factors import KnownFactors
-from calmotion.shot.motor import DRIVE
-from calmotion.shot.robust.robots import Scenario
-from calmotion.shot.robust.settings import Uncertainty
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.prepare import pose_modes
 

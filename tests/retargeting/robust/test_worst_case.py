@@ -4,18 +4,18 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.accuracy.simulate_to_tolerance import found_tracks
+from calmotion.model.robust.robots import Scenario
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.robust import worst_case as module
 from calmotion.retargeting.robust.choice import chosen_scenarios
 from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import uncertain_parameters
 from calmotion.retargeting.robust.worst_case import WorstCase
-from calmotion.shot.robust.robots import Scenario
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.prepare import prepare
+from calmotion.tolerance.simulate_to_tolerance import found_tracks
 from posed import ignore_progress, looped
 
 OPTIONS = RunSettings(step=1 / 120)

@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.accuracy.simplification.analysis import analyse
+from calmotion.model.model_choice import ON
+from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
 from calmotion.retargeting import to_tolerance
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.simplification.idle_motors import idle_motors
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
-from calmotion.shot.model_choice import ON
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.body_reduction import load_envelopes
 from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.tolerance.simplification.analysis import analyse
 from posed import ignore_progress
 from simplification_shots import arm_with_head
 

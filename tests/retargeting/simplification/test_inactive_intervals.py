@@ -4,6 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model import Animation, FreeTrack, Track
+from calmotion.model.budget import SEARCH_SHARE
+from calmotion.model.run import RunSettings
 from calmotion.retargeting import search
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem import adaptive_knots
@@ -16,9 +19,6 @@ from calmotion.retargeting.simplification.inactive_intervals import (
     inactive_coefficients,
     inactive_intervals,
 )
-from calmotion.shot import Animation, FreeTrack, Track
-from calmotion.shot.budget import SEARCH_SHARE
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulator import Simulator
 from posed import ignore_progress, jerking, looped, make_problem

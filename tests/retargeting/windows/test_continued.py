@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model.motor import DRIVE
+from calmotion.model.run import RunSettings
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.retargeting.windows.continued import Beginning, ContinuedSimulator, needed_instants
 from calmotion.retargeting.windows.parts import part_of
-from calmotion.shot.motor import DRIVE
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_curves

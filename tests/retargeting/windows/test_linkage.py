@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.windows.optimize import optimize_windows
-from calmotion.shot.run import RunSettings
 from made_shots import soft_linkage_shot
 from posed import ignore_progress
 

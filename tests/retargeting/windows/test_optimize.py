@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model import FreeTrack, Track
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.windows.optimize import optimize_windows
 from calmotion.retargeting.windows.store import windows_path
-from calmotion.shot import FreeTrack, Track
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from long_moves import animation_of, long_moves

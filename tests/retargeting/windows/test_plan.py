@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
+from calmotion.model.budget import SEARCH_SHARE
+from calmotion.model.robust.settings import RobustSettings
+from calmotion.model.run import LONG_SHOT, WINDOW, RunSettings
 from calmotion.retargeting.windows.plan import EXACT, FEWEST, least_gain, overlap_time, plan_windows, window_length
-from calmotion.shot.budget import SEARCH_SHARE
-from calmotion.shot.robust.settings import RobustSettings
-from calmotion.shot.run import LONG_SHOT, WINDOW, RunSettings
 
 
 @pytest.mark.parametrize("seconds", [3.0, 61.0, 62.5, 75.0, 600.0])

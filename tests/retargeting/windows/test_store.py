@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model.run import RunSettings
 from calmotion.multibody.model.system import State
 from calmotion.retargeting.windows.continued import Beginning
 from calmotion.retargeting.windows.plan import plan_windows
 from calmotion.retargeting.windows.store import WindowStore, window_keys, windows_path
-from calmotion.shot.run import RunSettings
 from long_moves import animation_of, long_moves
 
 OPTIONS = RunSettings(tolerance=1e-3)

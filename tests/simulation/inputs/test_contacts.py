@@ -6,9 +6,9 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
+from calmotion.model.run import RunSettings
+from calmotion.model.standing.contact import Contact
 from calmotion.retargeting.windows.plan import window_length
-from calmotion.shot.run import RunSettings
-from calmotion.shot.standing.contact import Contact
 from calmotion.simulation.inputs.contacts import held_steps
 from calmotion.simulation.inputs.time_grid import make_grid
 from steppers import ROBOT, write_stepper

@@ -3,8 +3,8 @@
 import dataclasses
 
 import numpy as np
-from calmotion.shot import Animation, Track
-from calmotion.shot.curves import held_curve
+from calmotion.model import Animation, Track
+from calmotion.model.curves import held_curve
 from calmotion.simulation.inputs.excerpts import busiest, later
 
 

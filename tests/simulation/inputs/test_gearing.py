@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model import Follows, Track
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem.posing import pose
-from calmotion.shot import Follows, Track
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.inputs.gearing import coupling_of, leaders

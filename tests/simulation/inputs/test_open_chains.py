@@ -4,11 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.accuracy.simplification.analysis import analyse
-from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.errors import IntegrationError, ShotError
-from calmotion.retargeting.optimize import optimize_shot
-from calmotion.shot import (
+from calmotion.model import (
     WORLD,
     Animation,
     Body,
@@ -22,9 +19,12 @@ from calmotion.shot import (
     Target,
     Track,
 )
-from calmotion.shot.run import RunSettings
+from calmotion.model.run import RunSettings
+from calmotion.retargeting.optimize import optimize_shot
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
+from calmotion.tolerance.simplification.analysis import analyse
+from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
 from posed import ignore_progress
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])

@@ -2,12 +2,20 @@
 
 import numpy as np
 import pytest
+from calmotion.model import (
+    Body,
+    Character,
+    Frame,
+    Joint,
+    MassProperties,
+    Motor,
+    Target,
+)
+from calmotion.model.animation import MovingFrame
 from calmotion.multibody.analysis.kinematics import rigid_poses
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot import Body, Character, Frame, Joint, MassProperties, Motor, Target
-from calmotion.shot.animation import MovingFrame
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import needed_pre_roll
 from calmotion.simulation.inputs.roots import root_tracks, sample_roots

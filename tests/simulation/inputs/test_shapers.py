@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.shot import Track
+from calmotion.model import Track
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.inputs.shapers import best_delay, delay, impulses, shaped
 from calmotion.simulation.inputs.time_grid import make_grid

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.errors import IntegrationError, ShotError
-from calmotion.shot import RetargetSettings
-from calmotion.shot.run import RunSettings
+from calmotion.model import RetargetSettings
+from calmotion.model.run import RunSettings
 from calmotion.simulation.inputs.supported import refuse_fast_motors, refuse_half_turns, refuse_unsupported
 from calmotion.simulation.inputs.time_grid import make_grid
 

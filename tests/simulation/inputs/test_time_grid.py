@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.shot import Track
+from calmotion.model import Track
 from calmotion.simulation.inputs.curves import sample_curves, sample_tracks
 from calmotion.simulation.inputs.time_grid import make_grid
 

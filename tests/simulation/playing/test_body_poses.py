@@ -8,7 +8,7 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.shot import Animation, Character, Provenance
+from calmotion.model import Animation, Character, Provenance
 from calmotion.simulation.playing.body_poses import body_tree, local_poses, motor_values, near_turn
 from calmotion.simulation.playing.parallel_frames import euler_angles, parallel_skeleton
 from calmotion.workflow.exporting.controller_files import curves_of

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion.control.commands import CUBIC, LINEAR, Commands, MotorCurves, instants
-from calmotion.shot import Track
-from calmotion.shot.curves import commanded_curves
-from calmotion.shot.run import RunSettings
+from calmotion.model import Track
+from calmotion.model.curves import commanded_curves
+from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.playing.playback import Playback
 from calmotion.simulation.simulate import simulate_shot

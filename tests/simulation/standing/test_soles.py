@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.shot import Body, Frame, SurfaceMesh
+from calmotion.model import Body, Frame, SurfaceMesh
 from calmotion.simulation.standing.soles import centres_of_pressure, margins, points_of, sole_of
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -7,8 +7,8 @@ import functools
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
+from calmotion.model import MotorTracks
 from calmotion.rigging.materials import MATERIALS
-from calmotion.shot import MotorTracks
 from calmotion.usd.importing.robot_layer import FlexibleLinks, RobotOptions, robot_layer
 from calmotion.usd.reading.shot import read_shot
 from converted_arm import CONVERTED, ELBOW, FORE, MIMIC, PAN, UPPER

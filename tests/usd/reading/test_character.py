@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.shot import WORLD
+from calmotion.model import WORLD
 from calmotion.usd.reading import read_shot
 from pxr import Gf, UsdGeom, UsdPhysics
 from small_shots import (

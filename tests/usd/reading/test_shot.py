@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.shot import WORLD
+from calmotion.model import WORLD
 from calmotion.usd.reading import read_shot
 from calmotion.usd.transforms import rotation_from_quaternion
 from small_shots import FRAMES, make_flexible, write_arm

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.shot import Frame
+from calmotion.model import Frame
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.reading.topology import bridges, common_path, components, distances, leaves
 

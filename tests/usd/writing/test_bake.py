@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calmotion.shot import Skin
+from calmotion.model import Skin
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import read_shot

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.shot.calibration.estimates import Calibration, Estimate
+from calmotion.model.calibration.estimates import Calibration, Estimate
 from calmotion.usd import stages
 from calmotion.usd.reading import read_shot
 from calmotion.usd.writing.calibration import write_calibration

@@ -6,7 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calmotion.shot import Animation, Motor, MotorCurve, Track
+from calmotion.model import (
+    Animation,
+    Motor,
+    MotorCurve,
+    Track,
+)
 from calmotion.usd.clock import Clock
 from calmotion.usd.writing.curves import NEAR, attribute_spec, author_curves, curve_values, sample_times
 from pxr import Sdf
@@ -34,7 +39,7 @@ def test_samples_are_at_least_as_dense_as_requested_and_contain_the_frames(rate,
 
 
 def test_between_frames_a_curve_is_what_its_frames_are_read_back_as():
-    from calmotion.shot.curves import interpolate
+    from calmotion.model.curves import interpolate
 
     times = sample_times(FRAMES, 240.0)
     read_back = interpolate(Track(FRAMES, CURVE.frame_values), 0.5)
@@ -44,7 +49,7 @@ def test_between_frames_a_curve_is_what_its_frames_are_read_back_as():
 
 def test_what_is_authored_between_frames_is_kept_where_the_frames_alone_would_lose_it():
     """The curvature of the track jumps at 0.1 s, between two frames, and in the rest it is smooth."""
-    from calmotion.shot.curves import held_curve
+    from calmotion.model.curves import held_curve
 
     times = np.linspace(0.0, 0.5, 241)
     kinked = Track(times, 0.1 * times**2 + 20.0 * np.maximum(times - 0.1, 0.0) ** 2)

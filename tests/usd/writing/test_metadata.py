@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from calmotion import __version__
-from calmotion.shot import InputLayer, Provenance
+from calmotion.model import InputLayer, Provenance
 from calmotion.usd import stages
 from calmotion.usd.writing.metadata import author_origin, author_stage_metadata
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.shot import Motion
+from calmotion.model import Motion
 from calmotion.usd.writing.motions import simulated_motion
 
 

@@ -9,8 +9,8 @@ import os
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.shot import Track
-from calmotion.shot.curves import held_curve
+from calmotion.model import Track
+from calmotion.model.curves import held_curve
 from calmotion.usd.reading import read_shot
 from calmotion.usd.writing import WriteOptions, write_result
 from performing import performed, result_with, tracks_of, worst_gap

@@ -4,8 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calmotion.shot import Animation, Motor, MotorCurve, Track
-from calmotion.shot.curves import curve_of
+from calmotion.model import (
+    Animation,
+    Motor,
+    MotorCurve,
+    Track,
+)
+from calmotion.model.curves import curve_of
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.motors.tracks import read_track

@@ -3,8 +3,8 @@
 import json
 
 import numpy as np
-from calmotion.shot.calibration.estimates import Calibration, ChannelFit, Estimate
-from calmotion.shot.outputs import WrittenLayer
+from calmotion.model.calibration.estimates import Calibration, ChannelFit, Estimate
+from calmotion.model.outputs import WrittenLayer
 from calmotion.workflow.calibration.report import calibration_report
 
 

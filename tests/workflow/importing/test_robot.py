@@ -127,7 +127,7 @@ def test_frames_are_those_of_an_even_motion(times, expected):
 
 
 def _tracks(times):
-    from calmotion.shot import MotorTracks
+    from calmotion.model import MotorTracks
 
     return MotorTracks("a.csv", np.asarray(times, float), {})
 

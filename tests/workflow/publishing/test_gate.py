@@ -5,7 +5,7 @@ import shutil
 
 import calmotion as cm
 import pytest
-from calmotion.shot.run import OutputPaths
+from calmotion.model.run import OutputPaths
 from one_hinge import ONE_HINGE
 
 STRICT = ONE_HINGE.replace('def Xform "Robot"', 'def PhysicsScene "Scene"\n{\n}\n\ndef Xform "Robot"')

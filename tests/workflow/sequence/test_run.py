@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.shot.curves import held_curve
+from calmotion.model.curves import held_curve
 from calmotion.workflow.sequence.run import Repertoire, sequence
 from calmotion.workflow.shot import Shot
 from repertoires import member

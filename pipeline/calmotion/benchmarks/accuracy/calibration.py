@@ -25,8 +25,8 @@ from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import finish, resumed_rows, say, write_rows
 from calmotion.benchmarks.scenes.recorded_arm import recorded_arm
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
-from calmotion.shot.calibration.estimates import HIGHER_MODES
-from calmotion.shot.run import RunSettings
+from calmotion.model.calibration.estimates import HIGHER_MODES
+from calmotion.model.run import RunSettings
 
 WITHIN = 1.96  # standard deviations of a 95% interval
 GRADED = 5e-4  # prior of `higher_modes`: what the mesh of `recorded_arm` has of it, 2e-4 to 6e-4 over 5 bending modes

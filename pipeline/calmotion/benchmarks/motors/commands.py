@@ -23,16 +23,21 @@ from pathlib import Path
 
 import numpy as np
 
-from calmotion.accuracy.motors.motor_effects import with_gains_used
+from calmotion.arrays import Array
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.motors.lumped import STEP, simulate_lumped
 from calmotion.benchmarks.motors.original import simulate_original
 from calmotion.errors import ShotError
+from calmotion.model import (
+    Animation,
+    Character,
+    Result,
+    Track,
+)
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.shot import Animation, Character, Result, Track
-from calmotion.shot.character import Array
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
+from calmotion.tolerance.motors.motor_effects import with_gains_used
 
 ALLOWED = 0.1  # of the error of commands for ideal motors
 TOLD = 0.1  # of that error in MuJoCo, by which Calmotion may be off

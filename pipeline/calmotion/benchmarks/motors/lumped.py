@@ -17,9 +17,15 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot.character import WORLD, Array, Character, Frame, Joint
-from calmotion.shot.motor import ON_ERROR, PRESCRIBED, Motor
+from calmotion.model.character import (
+    WORLD,
+    Character,
+    Frame,
+    Joint,
+)
+from calmotion.model.motor import ON_ERROR, PRESCRIBED, Motor
 
 STEP = 1e-4  # of MuJoCo's implicit integrator [s]
 _KINDS = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from calmotion.arrays import Array
 from calmotion.benchmarks.motors.lumped import STEP, PlayedMotion, mujoco_module
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array, Character
+from calmotion.model.character import Character
 
 _SETTLES = 20.0  # longest time in which the robot comes to rest at its first commands [s]
 _REST = 1e-6  # [rad/s or m/s]

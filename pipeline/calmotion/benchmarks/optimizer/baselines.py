@@ -14,15 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.benchmarks.common.parsers import bench_parser, output_options, shots_argument
 from calmotion.benchmarks.common.shots import SAMPLES, load
 from calmotion.benchmarks.common.tables import show
 from calmotion.benchmarks.optimizer.optimizer import make_problem
+from calmotion.model.run import SHAPERS, RunSettings
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import minimize
-from calmotion.shot.character import Array
-from calmotion.shot.run import SHAPERS, RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.shapers import best_delay, delay, shaped

@@ -16,14 +16,14 @@ from pathlib import Path
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.benchmarks.common.parsers import bench_parser, output_options, shots_argument
 from calmotion.benchmarks.common.shots import SAMPLES, load
 from calmotion.benchmarks.common.tables import show
 from calmotion.benchmarks.common.timing import median_time
 from calmotion.benchmarks.optimizer.optimizer import make_problem
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.shot.character import Array
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.prepare import prepare
 

@@ -17,18 +17,18 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize as quasi_newton
 
+from calmotion.arrays import Array
 from calmotion.benchmarks.common.parsers import bench_parser, output_options, shots_argument
 from calmotion.benchmarks.common.shots import SAMPLES, load
 from calmotion.benchmarks.common.tables import show
 from calmotion.benchmarks.common.timing import median_time
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, make_basis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.posing import CLOSENESS, SMOOTHNESS
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
-from calmotion.shot.character import Array
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion

@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from calmotion.geometry.tetrahedra import oriented_tets
-from calmotion.shot import (
+from calmotion.arrays import Array, IntArray
+from calmotion.mesh.tetrahedra import oriented_tets
+from calmotion.model import (
     Animation,
     Body,
     Character,
@@ -23,7 +24,6 @@ from calmotion.shot import (
     Target,
     Track,
 )
-from calmotion.shot.character import Array, IntArray
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 LIFTS = np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0])  # joint axis z along -y: a positive angle lifts the arm

@@ -15,13 +15,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from calmotion.geometry.distances import triangle_parts
+from calmotion.arrays import Array
+from calmotion.mesh.surfaces.distances import triangle_parts
+from calmotion.model import Character
+from calmotion.model.character import Body
+from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.kinematics import rigid_poses
 from calmotion.multibody.model.model import moves_freely
 from calmotion.multibody.model.topology import Tree
-from calmotion.shot import Character
-from calmotion.shot.character import Array, Body
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.prepare import prepare

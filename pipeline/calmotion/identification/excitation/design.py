@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.identification.advice import IDENTIFIABLE
 from calmotion.identification.calibrate import simulable
@@ -28,14 +29,19 @@ from calmotion.identification.motor_groups import grouped
 from calmotion.identification.parameters import DEFAULT, Parameter, robot_parameters
 from calmotion.identification.problem import Calibrated
 from calmotion.identification.signals import Signals, refuse_cyclic
+from calmotion.model import Animation, Track
+from calmotion.model.calibration.estimates import ROBOT_KINDS
+from calmotion.model.calibration.excitation import (
+    Clear,
+    Excitation,
+    MotorUse,
+    PlannedSensor,
+    Predicted,
+)
+from calmotion.model.calibration.recording import COMPONENTS, Channel, SensorRecording
+from calmotion.model.motor import SERVO
+from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import SimulationFailure
-from calmotion.shot import Animation, Track
-from calmotion.shot.calibration.estimates import ROBOT_KINDS
-from calmotion.shot.calibration.excitation import Clear, Excitation, MotorUse, PlannedSensor, Predicted
-from calmotion.shot.calibration.recording import COMPONENTS, Channel, SensorRecording
-from calmotion.shot.character import Array
-from calmotion.shot.motor import SERVO
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.prepare import pose_modes
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 AT_RANDOM = 0.3  # of the tries: points that have nothing to do with one another
 CHANGE, GROWN, SHRUNK = 0.6, 1.5, 0.85  # first size of a change, and its factors after a success and a failure

@@ -13,10 +13,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from calmotion.arrays import Array
 from calmotion.identification.excitation.waveforms import Family
 from calmotion.identification.problem import Calibrated
-from calmotion.shot.calibration.estimates import CLOCK_DRIFT, CLOCK_OFFSET
-from calmotion.shot.character import Array
+from calmotion.model.calibration.estimates import CLOCK_DRIFT, CLOCK_OFFSET
 
 LEAD = 12  # frames before the middle of the pulse: there its spline is below 1e-5 of its height
 SHAPE = np.array([1.0, 4.0, 6.0, 4.0, 1.0]) / 6.0  # of a pulse at its frames: nothing at half of the frame rate

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
-from calmotion.shot import Animation, Character
-from calmotion.shot.character import Array, IntArray
-from calmotion.shot.curves import curve_of
+from calmotion.model import Animation, Character
+from calmotion.model.curves import curve_of
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
 
 TONES = 5

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.identification.recordings.noise import noise_of
 from calmotion.identification.signals import Signals
-from calmotion.shot import Character
-from calmotion.shot.calibration.recording import ANGLE, EFFORT, SensorRecording
-from calmotion.shot.character import Array
+from calmotion.model import Character
+from calmotion.model.calibration.recording import ANGLE, EFFORT, SensorRecording
 
 STEP = 0.01  # between clocks that are tried first [s]
 SAMPLES = 600  # of a channel that are compared, at most

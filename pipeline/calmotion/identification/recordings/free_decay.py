@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import decimate
 
+from calmotion.arrays import Array
 from calmotion.identification.measurement import Measurement, Sensor
 from calmotion.identification.signals import Signals
-from calmotion.shot.calibration.recording import ACCELEROMETER, MARKER
-from calmotion.shot.character import Array
+from calmotion.model.calibration.recording import ACCELEROMETER, MARKER
 
 ORDER = 8  # exponentials: four modes, or fewer and noise
 FASTEST, MOST, FEWEST = 400.0, 400, 40  # samples in a second, and most and fewest samples that are used

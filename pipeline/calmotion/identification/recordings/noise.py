@@ -6,7 +6,7 @@ from math import comb
 
 import numpy as np
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 ORDER = 5  # of the differences, which a smooth signal has little of
 TO_SIGMA = 1.4826  # median of absolute values to the standard deviation, for a normal distribution

@@ -8,9 +8,9 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.identification.signals import Signals
-from calmotion.shot import Character
-from calmotion.shot.calibration.recording import ANGLE, MARKER, SensorRecording
-from calmotion.shot.tolerance import reach
+from calmotion.model import Character
+from calmotion.model.calibration.recording import ANGLE, MARKER, SensorRecording
+from calmotion.model.tolerance import reach
 
 LONGEST = 200.0  # of a recording, over the length of the shot: all places of the shot in it are tried
 LEAST = 0.02  # motion of the channel that moves most, over that of the robot of the shot

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 NEAR = 0.1  # fraction of its median below which a margin is that of a dead centre
 

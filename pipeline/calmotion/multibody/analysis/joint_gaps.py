@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.integrators.trajectory import Trajectory, copy_of_instant
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.system import System
 from calmotion.multibody.statics.equilibrium import linearize
-from calmotion.shot.character import Array
 
 
 class OpenJoint(NamedTuple):

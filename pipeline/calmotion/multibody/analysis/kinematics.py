@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.kernels.components import ComponentMarker
 from calmotion.multibody.kernels.markers import MarkerWork, allocate_marker, marker_jacobian, marker_values
 from calmotion.multibody.kernels.so3 import matrix_of, quaternion_of
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.model.moving_markers import rooted
 from calmotion.multibody.model.system import State, System, allocate_state
-from calmotion.shot.character import Array, IntArray
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import allocating_kernel, kernel
 

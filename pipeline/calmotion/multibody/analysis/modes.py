@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cholesky, eigh, null_space, solve_triangular, svd
 
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.sliders import LENGTH, slides_freely
@@ -12,7 +13,6 @@ from calmotion.multibody.model.model import Model
 from calmotion.multibody.model.phases import system_held
 from calmotion.multibody.model.system import State, System
 from calmotion.multibody.statics.equilibrium import equilibrium, linearize
-from calmotion.shot.character import Array, IntArray
 
 _SINGULAR = 1e8  # condition of the rows of a joint for its child, beyond which they do not tell all six coordinates
 

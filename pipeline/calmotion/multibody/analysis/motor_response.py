@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.linear_solver.closed_chains import factor_closed_chains, solve_system
@@ -12,7 +13,6 @@ from calmotion.multibody.model.model import Model
 from calmotion.multibody.model.phases import system_held
 from calmotion.multibody.model.system import System, allocate_state
 from calmotion.multibody.statics.equilibrium import linearize
-from calmotion.shot.character import Array, IntArray
 
 
 def motor_responses(

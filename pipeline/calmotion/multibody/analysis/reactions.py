@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.integrators.trajectory import Inputs, Trajectory, instant_of
 from calmotion.multibody.kernels.joints import joint_kinematics
 from calmotion.multibody.kernels.sliders import slides_freely
@@ -14,7 +15,6 @@ from calmotion.multibody.kernels.work import Work, allocate_work
 from calmotion.multibody.linear_solver.closed_chains import copy_rows
 from calmotion.multibody.model.system import State, System
 from calmotion.multibody.motors.servos import rotor_effort
-from calmotion.shot.character import Array
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel
 

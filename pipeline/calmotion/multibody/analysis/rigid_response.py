@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.analysis.kinematics import target_jacobians
 from calmotion.multibody.analysis.motor_response import motor_responses
 from calmotion.multibody.model.model import Model
-from calmotion.shot.character import Array, IntArray
 
 
 @dataclass(frozen=True, eq=False)

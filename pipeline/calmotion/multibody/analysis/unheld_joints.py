@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.model.joint_arrays import rotation_matrix
 from calmotion.multibody.model.model import Model, moves_freely, start_angles
 from calmotion.multibody.model.topology import chain_members
-from calmotion.shot.character import Array
 
 _SMALL = 1e-6  # stiffness over weight times length that counts as none
 

@@ -12,9 +12,9 @@ backwards as constant, velocities as zero.
 
 from __future__ import annotations
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.so3 import inverse_right_jacobian, right_jacobian, right_jacobian_derivative
 from calmotion.multibody.model.system import Instants, System
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel, shared_kernel
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import IntegrationError
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators import radau, runge_kutta
@@ -23,7 +24,6 @@ from calmotion.multibody.model.phases import has_contacts
 from calmotion.multibody.model.system import State, System
 from calmotion.multibody.motors.between_instants import hermite_drive, stage_inputs
 from calmotion.multibody.statics.equilibrium import equilibrium
-from calmotion.shot.character import Array
 
 DIVERGED = 1e6  # velocity [m/s, rad/s]
 

@@ -14,9 +14,9 @@ integrators in multibody dynamics, 2010.
 
 from __future__ import annotations
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.so3 import inverse_right_jacobian
 from calmotion.multibody.model.system import Instants, Integrator, State, System
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 

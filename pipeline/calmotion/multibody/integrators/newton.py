@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.integrators import bdf2, newmark
 from calmotion.multibody.integrators.predictor import predict, remember_missed
 from calmotion.multibody.integrators.workspace import Scratch, Workspace
@@ -32,7 +33,6 @@ from calmotion.multibody.model.system import (
     State,
     System,
 )
-from calmotion.shot.character import Array
 from calmotion.support.compilation import NO, YES, inlined_kernel, kernel, shared_kernel
 
 CONVERGED, SINGULAR, NOT_CONVERGED = 0, 1, 2

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.multibody.integrators.integrate import integrate
@@ -17,7 +18,6 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.moving_markers import rooted
 from calmotion.multibody.model.phases import has_contacts
 from calmotion.multibody.model.system import State, System
-from calmotion.shot.character import Array
 
 NEEDED = 2  # instants before a step that its formulas read; what else they remember is in the workspace
 

@@ -6,9 +6,9 @@ predictions are as good as those of a cubic through four instants, and need no i
 
 from __future__ import annotations
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.so3 import turn
 from calmotion.multibody.model.system import State, System
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel, shared_kernel
 
 MISSED = 3  # row of a scratch's memory

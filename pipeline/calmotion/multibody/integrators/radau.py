@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.assembly import assemble
@@ -28,7 +29,6 @@ from calmotion.multibody.kernels.so3 import (
 from calmotion.multibody.linear_solver.index1 import VELOCITY_ROWS
 from calmotion.multibody.model.system import JOINT_ROWS, State, System, allocate_state
 from calmotion.multibody.motors.between_instants import Drive, stage_inputs
-from calmotion.shot.character import Array
 
 _ROOT = np.sqrt(6.0)
 NODES = np.array([(4.0 - _ROOT) / 10.0, (4.0 + _ROOT) / 10.0, 1.0])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from calmotion.arrays import Array
 from calmotion.multibody.integrators import newton
 from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.multibody.integrators.predictor import MISSED
@@ -18,7 +19,6 @@ from calmotion.multibody.kernels.so3 import logarithm, matrix_of
 from calmotion.multibody.model.moving_markers import between
 from calmotion.multibody.model.system import Instants, State, System, allocate_state
 from calmotion.multibody.statics.consistent_start import instant_before
-from calmotion.shot.character import Array
 
 PARTS = (4, 16, 64, 256)
 

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.integrators.trajectory import instant_of
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.so3 import inverse_right_jacobian, turn
 from calmotion.multibody.linear_solver.closed_chains import copy_rows
 from calmotion.multibody.linear_solver.index1 import accelerations
 from calmotion.multibody.model.system import State, System, allocate_state
-from calmotion.shot.character import Array
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import inlined_kernel, kernel
 

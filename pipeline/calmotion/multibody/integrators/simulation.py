@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.failure import NOWHERE, Reason, SimulationFailure
 from calmotion.multibody.integrators import bdf2, newton
 from calmotion.multibody.integrators.coefficients import IMPLICIT
@@ -30,7 +31,6 @@ from calmotion.multibody.model.phases import EULER, Phase, phases_of, still, sys
 from calmotion.multibody.model.system import Instants, Integrator, State, System
 from calmotion.multibody.statics.consistent_start import initial_acceleration, instant_before
 from calmotion.multibody.statics.equilibrium import equilibrium
-from calmotion.shot.character import Array
 from calmotion.support.compilation import NO, kernel
 
 

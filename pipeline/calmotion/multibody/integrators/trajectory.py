@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.model.system import Instants, State
-from calmotion.shot.character import Array
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel
 

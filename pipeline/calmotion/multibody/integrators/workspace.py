@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.work import Work, allocate_work
 from calmotion.multibody.linear_solver.step_matrix import (
     Border,
@@ -16,7 +17,6 @@ from calmotion.multibody.linear_solver.step_matrix import (
     step_matrix,
 )
 from calmotion.multibody.model.system import JOINT_ROWS, Blocks, State, System, allocate_blocks, allocate_state
-from calmotion.shot.character import Array
 from calmotion.support.by_reference import by_reference
 
 

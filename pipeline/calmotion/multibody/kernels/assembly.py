@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import ComponentMotion, component_of, law_of, marker_of
 from calmotion.multibody.kernels.constant_inertia import (
     nonrotating_mass_matrix,
@@ -31,7 +32,6 @@ from calmotion.multibody.kernels.stvk import stvk_forces
 from calmotion.multibody.kernels.work import Work
 from calmotion.multibody.model.system import Blocks, Integrator, State, System
 from calmotion.multibody.motors.servos import servo_rows
-from calmotion.shot.character import Array
 from calmotion.support.compilation import inlined_kernel, kernel, shared_kernel
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.finite_rotation import LINEAR_BODY
 from calmotion.multibody.model.system import System
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 

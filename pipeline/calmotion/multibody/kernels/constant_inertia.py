@@ -16,10 +16,10 @@ same s and the mass matrix is symmetric.
 
 from __future__ import annotations
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import Component, ComponentMotion
 from calmotion.multibody.kernels.inertia import rigid_mass_matrix
 from calmotion.multibody.kernels.work import Work
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import math
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.so3 import exponential, right_jacobian, right_jacobian_derivative
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 LINEAR_BODY = 0

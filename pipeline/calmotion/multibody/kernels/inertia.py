@@ -13,9 +13,9 @@ and omega that the seed omits).
 
 from __future__ import annotations
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import Component, ComponentMotion
 from calmotion.multibody.kernels.work import Work
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel, shared_kernel
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import marker_of
 from calmotion.multibody.kernels.joints import add_skew, firmness, is_hinge
 from calmotion.multibody.kernels.markers import MarkerWork, marker_velocity_jacobian
@@ -14,7 +15,6 @@ from calmotion.multibody.kernels.sliders import (
 )
 from calmotion.multibody.kernels.work import Work
 from calmotion.multibody.model.system import Blocks, Integrator, System
-from calmotion.shot.character import Array
 from calmotion.support.compilation import inlined_kernel, kernel, shared_kernel
 
 

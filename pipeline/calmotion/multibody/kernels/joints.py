@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import marker_of
 from calmotion.multibody.kernels.markers import (
     MarkerWork,
@@ -35,7 +36,6 @@ from calmotion.multibody.kernels.sliders import (
 )
 from calmotion.multibody.kernels.work import Work
 from calmotion.multibody.model.system import Integrator, State, System
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel, shared_kernel
 
 

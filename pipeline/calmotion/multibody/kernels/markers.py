@@ -18,10 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import ComponentMarker
 from calmotion.multibody.kernels.finite_rotation import interface_rotation, interface_rotation_derivative
 from calmotion.multibody.kernels.so3 import cross
-from calmotion.shot.character import Array
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel, shared_kernel
 

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import math
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import ElasticLaw
 from calmotion.multibody.kernels.work import LawWork
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel, shared_kernel
 
 JOIN = 0.2  # volume ratio below which the logarithm is continued as a parabola; `fem.cubature` does the same

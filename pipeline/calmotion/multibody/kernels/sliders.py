@@ -12,9 +12,9 @@ by the length, which no other term of the tree's equations contains.
 
 from __future__ import annotations
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.markers import MarkerWork
 from calmotion.multibody.model.system import JOINT_ROWS, System
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel, shared_kernel
 
 LENGTH = 2

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 from calmotion.support.compilation import allocating_kernel, kernel
 
 _SMALL = 1e-2  # below this squared angle the four-term series are exact to rounding

@@ -15,9 +15,9 @@ energy. As pairs are bilinear, J + b dz'/du is J at u + b v.
 
 from __future__ import annotations
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import ElasticLaw
 from calmotion.multibody.kernels.work import LawWork
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel, shared_kernel
 
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.markers import WORLD_MARKER, MarkerWork, allocate_marker
 from calmotion.multibody.model.system import JOINT_ROWS, System
-from calmotion.shot.character import Array
 from calmotion.support.by_reference import by_reference
 
 

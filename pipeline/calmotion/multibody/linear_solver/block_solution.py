@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.linear_solver.elimination import place
 from calmotion.multibody.linear_solver.step_matrix import UNKNOWNS, StepMatrix
 from calmotion.multibody.model.system import JOINT_ROWS, System
-from calmotion.shot.character import Array, IntArray
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel, shared_kernel
 

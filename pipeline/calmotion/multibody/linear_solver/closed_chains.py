@@ -13,13 +13,13 @@ least norm. The transposed system uses the same matrices.
 
 from __future__ import annotations
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.sliders import has_row
 from calmotion.multibody.linear_solver.block_solution import closing_rows, solve_tree, subtract_border
 from calmotion.multibody.linear_solver.elimination import solve, solve_transposed
 from calmotion.multibody.linear_solver.pseudo_inverse import pseudo_inverse
 from calmotion.multibody.linear_solver.step_matrix import UNKNOWNS, Border, SolutionScratch, StepMatrix
 from calmotion.multibody.model.system import JOINT_ROWS, System
-from calmotion.shot.character import Array
 from calmotion.support.compilation import inlined_kernel, kernel, shared_kernel
 
 

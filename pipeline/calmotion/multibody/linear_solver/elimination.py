@@ -11,10 +11,10 @@ frame is fixed to it at its joint, so that the joint's rows are zero at the elas
 
 from __future__ import annotations
 
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.kernels.sliders import has_row
 from calmotion.multibody.linear_solver.step_matrix import StepMatrix
 from calmotion.multibody.model.system import JOINT_ROWS, Blocks, System
-from calmotion.shot.character import Array, IntArray
 from calmotion.support.compilation import kernel, shared_kernel
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.integrators.newton import solve_correction
 from calmotion.multibody.integrators.workspace import Scratch, Workspace
 from calmotion.multibody.kernels.assembly import assemble
@@ -20,7 +21,6 @@ from calmotion.multibody.linear_solver.closed_chains import copy_rows, factor_cl
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.least_multipliers import least_multipliers
 from calmotion.multibody.model.system import JOINT_ROWS, Blocks, Integrator, State, System
-from calmotion.shot.character import Array
 from calmotion.support.compilation import NO, YES, inlined_kernel, shared_kernel
 
 VELOCITY_ROWS = Integrator(velocity=0.0, acceleration=0.0, gamma=1.0, alpha=0.0)

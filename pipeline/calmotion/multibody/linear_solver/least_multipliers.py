@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.sliders import has_row
 from calmotion.multibody.linear_solver.step_matrix import UNKNOWNS, Border
 from calmotion.multibody.model.system import JOINT_ROWS, System
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel, shared_kernel
 
 

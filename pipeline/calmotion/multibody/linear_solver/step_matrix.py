@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.linear_solver.pseudo_inverse import Decomposition, allocate_decomposition
 from calmotion.multibody.model.system import JOINT_ROWS, Blocks, CountArray, System
-from calmotion.shot.character import Array, IntArray
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel
 

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
+from calmotion.model.character import WORLD, Character, Frame
 from calmotion.multibody.kernels.so3 import matrix_of
 from calmotion.multibody.model.topology import Tree
 from calmotion.reduction.reduced_body import Marker, ReducedBody
-from calmotion.shot.character import WORLD, Array, Character, Frame, IntArray
 
 # constraint rows of a joint without a motor
 _ROWS = {"fixed": 6, "revolute": 5, "spherical": 3, "prismatic": 5, "floating": 0}

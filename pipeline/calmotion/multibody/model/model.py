@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray, IntArray
+from calmotion.model.character import Body, Character
+from calmotion.model.motor import PRESCRIBED, Motor
 from calmotion.multibody.model.joint_arrays import BodyAnchors, JointArrays, body_anchors, joint_arrays, rotation_matrix
 from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, System, components, coordinate_units
 from calmotion.multibody.model.topology import Tree, span_tree
 from calmotion.multibody.motors.drives import add_motors, giving_motors
 from calmotion.reduction.reduced_body import Marker, ReducedBody, rigid_invariants
-from calmotion.shot.character import Array, Body, BoolArray, Character, IntArray
-from calmotion.shot.motor import PRESCRIBED, Motor
 
 
 @dataclass(frozen=True, eq=False)

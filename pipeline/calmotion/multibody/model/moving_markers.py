@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.markers import WORLD_MARKER
-from calmotion.shot.character import Array
 
 
 def pack(positions: Array, velocities: Array, spins: Array, matrices: Array) -> Array:

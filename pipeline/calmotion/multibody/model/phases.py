@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.multibody.model.system import State, System
-from calmotion.shot.character import Array, BoolArray, IntArray
 
 EULER = 1.5  # length of a BDF2 step that equals a backward Euler step, over the length of that
 RESTARTED = 2  # steps after a change

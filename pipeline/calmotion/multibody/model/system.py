@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from calmotion.shot.character import Array, BoolArray, IntArray
+from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.support.by_reference import by_reference
 
 CountArray = NDArray[np.int64]  # the type of Python's integers in a kernel, so that it is compiled once for both

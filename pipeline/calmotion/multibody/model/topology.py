@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from calmotion.arrays import IntArray
 from calmotion.errors import ShotError
-from calmotion.shot.character import WORLD, Character, IntArray
+from calmotion.model.character import WORLD, Character
 
 _FREEDOM = {"fixed": 1, "revolute": 2, "spherical": 3, "prismatic": 4, "floating": 6}
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 Drive = Callable[[Array], tuple[Array, Array, Array]]
 

@@ -25,10 +25,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
+from calmotion.model.motor import (
+    ON_ERROR,
+    PRESCRIBED,
+    SERVO,
+    Motor,
+    Rotor,
+)
 from calmotion.multibody.model.system import LINEAR, System
-from calmotion.shot.character import Array, IntArray
-from calmotion.shot.motor import ON_ERROR, PRESCRIBED, SERVO, Motor, Rotor
 
 
 class GivingMotor(NamedTuple):

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 
+from calmotion.arrays import Array
 from calmotion.multibody.model.system import (
     FRICTION,
     FRICTION_SPEED,
@@ -31,7 +32,6 @@ from calmotion.multibody.model.system import (
     State,
     System,
 )
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel, shared_kernel
 
 _LEAST = 1e-6  # distance of the limits, of the largest torque

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.so3 import exponential, inverse_right_jacobian, right_jacobian
 from calmotion.multibody.linear_solver.closed_chains import solve_system_transposed
 from calmotion.multibody.linear_solver.step_matrix import matrix_at
@@ -25,7 +26,6 @@ from calmotion.multibody.sensitivity.sweep import (
     parts_of,
 )
 from calmotion.multibody.statics.regularized_statics import solve_statics_transposed
-from calmotion.shot.character import Array
 from calmotion.support.compilation import inlined_kernel, kernel
 
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.kernels.sliders import has_row
 from calmotion.multibody.kernels.so3 import exponential, inverse_right_jacobian, right_jacobian
 from calmotion.multibody.linear_solver.block_solution import BlockSolution, add, allocate_block_solution, solve_block
@@ -20,7 +21,6 @@ from calmotion.multibody.sensitivity.linearization import Linearization
 from calmotion.multibody.sensitivity.linearized_steps import LinearizedSteps
 from calmotion.multibody.sensitivity.sweep import SweepScratch, Window, allocate_sweep, parts_of
 from calmotion.multibody.statics.regularized_statics import solve_statics
-from calmotion.shot.character import Array, IntArray
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import inlined_kernel, kernel
 

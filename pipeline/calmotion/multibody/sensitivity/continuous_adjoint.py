@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.linear_solver.closed_chains import solve_system_transposed
 from calmotion.multibody.linear_solver.step_matrix import matrix_at
 from calmotion.multibody.model.system import System
@@ -33,7 +34,6 @@ from calmotion.multibody.sensitivity.sweep import (
     window_of,
 )
 from calmotion.multibody.statics.regularized_statics import solve_statics_transposed
-from calmotion.shot.character import Array
 from calmotion.support.compilation import inlined_kernel, kernel
 
 

@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.bdf2 import position_to_velocity, velocities
@@ -36,7 +37,6 @@ from calmotion.multibody.sensitivity.linearized_steps import (
 )
 from calmotion.multibody.statics.equilibrium import STATIC
 from calmotion.multibody.statics.regularized_statics import regularize
-from calmotion.shot.character import Array
 from calmotion.support.compilation import YES, inlined_kernel, kernel
 from calmotion.support.memory import available_memory
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.linear_solver.step_matrix import UNKNOWNS, StepMatrix, matrices_between
 from calmotion.multibody.model.system import JOINT_ROWS, System
-from calmotion.shot.character import Array
 from calmotion.support.by_reference import by_reference
 
 

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.simulation import simulate_on
 from calmotion.multibody.integrators.trajectory import Trajectory, copy_of_instant
@@ -34,7 +35,6 @@ from calmotion.multibody.sensitivity.perturbation import (
     perturbed,
     tangent_from,
 )
-from calmotion.shot.character import Array
 
 CONVERGED = 1e-12  # distance of end and start of a periodic motion, in `System.unit`
 ROUNDING = 1e-8  # acceptable distance where rounding prevents convergence, likewise

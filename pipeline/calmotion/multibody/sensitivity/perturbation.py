@@ -6,13 +6,13 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.so3 import logarithm, matrix_of, turn
 from calmotion.multibody.model.system import State, System
 from calmotion.multibody.sensitivity.adjoint import sweep_adjoint
 from calmotion.multibody.sensitivity.linearization import Linearization
 from calmotion.multibody.sensitivity.sweep import allocate_memory
 from calmotion.multibody.sensitivity.tangent import sweep_tangent
-from calmotion.shot.character import Array
 
 
 @dataclass(frozen=True, eq=False)

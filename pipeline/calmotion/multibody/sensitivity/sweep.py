@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.sliders import has_row
 from calmotion.multibody.linear_solver.step_matrix import SolutionScratch, allocate_solution
 from calmotion.multibody.model.phases import EULER, phases_of
 from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.multibody.sensitivity.linearization import Linearization
 from calmotion.multibody.sensitivity.linearized_steps import LinearizedSteps, steps_between
-from calmotion.shot.character import Array
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel
 

@@ -7,12 +7,12 @@ follows from the equations of motion with the constraints differentiated once mo
 
 from __future__ import annotations
 
+from calmotion.arrays import Array
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.so3 import turn
 from calmotion.multibody.linear_solver.index1 import accelerations
 from calmotion.multibody.model.system import State, System
-from calmotion.shot.character import Array
 
 
 def initial_acceleration(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.newton import correct, largest_entry, rounding_floor, worst_component
 from calmotion.multibody.integrators.workspace import Workspace
@@ -13,7 +14,6 @@ from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.least_multipliers import least_multipliers
 from calmotion.multibody.model.system import Integrator, State, System, allocate_state
 from calmotion.multibody.statics.regularized_statics import regularize
-from calmotion.shot.character import Array
 
 STATIC = Integrator(velocity=0.0, acceleration=0.0, gamma=0.0, alpha=1.0)
 TOLERANCE = 3e-11  # of a correction, in `System.unit`

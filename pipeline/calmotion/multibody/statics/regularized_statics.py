@@ -16,11 +16,11 @@ so much farther than others that redundant constraints could not be detected.
 
 from __future__ import annotations
 
+from calmotion.arrays import Array
 from calmotion.multibody.kernels.sliders import LENGTH, slides_freely
 from calmotion.multibody.linear_solver.closed_chains import copy_rows, solve_system, solve_system_transposed
 from calmotion.multibody.linear_solver.step_matrix import SolutionScratch, StepMatrix
 from calmotion.multibody.model.system import System
-from calmotion.shot.character import Array
 from calmotion.support.compilation import NO, YES, kernel, shared_kernel
 
 REGULARIZATION = 1e-2  # stiffness over inertia [1/s^2]

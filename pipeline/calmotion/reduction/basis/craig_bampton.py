@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.linear_algebra.blas_threads import one_blas_thread
+from calmotion.model.character import FlexibleSettings
 from calmotion.reduction.basis.fixed_interface import FixedInterface, frequency_limit, mode_signs, ritz_modes
 from calmotion.reduction.basis.residual_flexibility import (
     StaticModel,
@@ -22,9 +24,8 @@ from calmotion.reduction.basis.residual_flexibility import (
 )
 from calmotion.reduction.basis.static_loads import ACCELERATIONS, peak_loads, unit_accelerations
 from calmotion.reduction.elements.assembly import FEModel
-from calmotion.reduction.interfaces.rigid_patch import rigid_patch
+from calmotion.reduction.elements.rigid_patch import rigid_patch
 from calmotion.reduction.load_envelope import LoadEnvelope, load_direction_envelope
-from calmotion.shot.character import Array, BoolArray, FlexibleSettings, IntArray
 
 __all__ = ["Basis", "mode_signs", "reduced_basis", "rigid_patch"]
 

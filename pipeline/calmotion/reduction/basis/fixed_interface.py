@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.geometry.tetrahedra import Indices
+from calmotion.arrays import Array, Indices, IntArray
 from calmotion.linear_algebra.sparse_solver import Solver, SparseSolver, turned
+from calmotion.model.character import FlexibleSettings
 from calmotion.reduction.basis.natural_modes import lowest_modes, vector_mass
 from calmotion.reduction.basis.nested_interface_modes import Begun, CoarserBody
 from calmotion.reduction.basis.residual_flexibility import residual_vectors
 from calmotion.reduction.basis.static_loads import ACCELERATIONS, UNIFORM, unit_accelerations
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.nested_meshes import NestedMeshes
-from calmotion.reduction.interfaces.rigid_patch import rigid_patch
-from calmotion.shot.character import Array, FlexibleSettings, IntArray
+from calmotion.reduction.elements.rigid_patch import rigid_patch
 
 _DEPENDENT = 1e-12  # mass of a combination of columns of unit mass below which they are linearly dependent
 _FEWEST = 4  # least number of fixed-interface modes: two bending pairs, or bending and twist of a plate

@@ -18,14 +18,16 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.linear_algebra.blas_threads import one_blas_thread
+from calmotion.model.character import ElasticMaterial
 from calmotion.reduction.basis.craig_bampton import Basis, mode_signs
 from calmotion.reduction.basis.fixed_interface import FixedInterface
 from calmotion.reduction.basis.natural_modes import vector_mass
 from calmotion.reduction.basis.nested_interface_modes import CoarserBody
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, second_order_force
-from calmotion.reduction.interfaces.patch_rotation import (
+from calmotion.reduction.elements.patch_rotation import (
     shape_changes,
     spring_rows,
     springs,
@@ -33,7 +35,6 @@ from calmotion.reduction.interfaces.patch_rotation import (
     squares,
     stiffness_of,
 )
-from calmotion.shot.character import Array, ElasticMaterial, IntArray
 from calmotion.support import interrupts
 
 NEGLIGIBLE = 1e-3  # square root of the negligible share of the largest strain energy among the derivatives

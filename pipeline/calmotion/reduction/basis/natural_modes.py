@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.geometry.tetrahedra import Indices
+from calmotion.arrays import Array, Indices
 from calmotion.linear_algebra.block_lanczos import lowest_by_lanczos
 from calmotion.linear_algebra.sparse_solver import Solver, SparseSolver
 from calmotion.reduction.elements.assembly import FEModel
-from calmotion.shot.character import Array
 
 __all__ = ["SparseSolver", "frequencies", "lowest_modes", "vector_mass"]
 

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.linear_algebra.multigrid_solver import MultigridSolver
 from calmotion.linear_algebra.sparse_solver import Solver, SparseSolver
-from calmotion.reduction.elements.assembly import QuadraticMesh
+from calmotion.mesh.quadratic import QuadraticMesh
 from calmotion.reduction.elements.nested_meshes import NestedMeshes
-from calmotion.shot.character import Array, BoolArray
 
 _FACTORISED = 60_000  # nodes up to which factors take no more time than a multigrid cycle for all the columns
 # Relative energy of the error of a solution without factors: the mesh leaves a hundred times as much. Static responses

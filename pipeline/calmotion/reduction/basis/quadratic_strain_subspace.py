@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.reduction.basis.craig_bampton import Basis
 from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import GradientRule, gradient_gram
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import amplitudes
-from calmotion.shot.character import Array
 
 _BOUND = 20.0  # the bound over the error at the targets (measured: 20 to 1000)
 _SHARE = 0.25  # of the tolerance that this error may take

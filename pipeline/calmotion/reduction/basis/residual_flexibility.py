@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.shot.character import Array, BoolArray
+from calmotion.arrays import Array, BoolArray
 
 _ROUNDING = 1e-19  # of the work of a load: rounding of the static response
 

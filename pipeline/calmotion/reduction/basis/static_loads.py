@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.reduction.load_envelope import LoadEnvelope
-from calmotion.shot.character import Array
 
 ACCELERATIONS = 12  # leading entries of `peak_loads`, before those of wrenches
 OVERSHOOT = 2.0  # deflection by a sudden load over the static one

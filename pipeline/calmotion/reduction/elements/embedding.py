@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.geometry.tetrahedra import Indices, face_normals, tet_volumes
-from calmotion.reduction.elements.assembly import QuadraticMesh
-from calmotion.shot.character import Array, IntArray
+from calmotion.arrays import Array, Indices, IntArray
+from calmotion.mesh.quadratic import QuadraticMesh
+from calmotion.mesh.tetrahedra import face_normals, tet_volumes
 
 _CANDIDATES = 24  # nearest elements of a point, by their centers
 _ALL_PAIRS = 2_000_000  # largest number of pairs of point and element for an exhaustive search

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 from calmotion.support.compilation import kernel
 
 Strain = tuple[float, float, float, float, float, float]  # entries 00, 11, 22, 12, 02, 01

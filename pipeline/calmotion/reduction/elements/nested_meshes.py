@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import BoolArray, IntArray
 from calmotion.linear_algebra.multigrid import Blocks, Level, Multigrid, near_order
 from calmotion.linear_algebra.sparse_solver import SparseSolver
-from calmotion.reduction.elements.assembly import QuadraticMesh
+from calmotion.mesh.quadratic import QuadraticMesh
 from calmotion.reduction.elements.nesting import prolongation
-from calmotion.shot.character import BoolArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.reduction.elements.assembly import QuadraticMesh
-from calmotion.shot.character import Array, BoolArray, IntArray
+from calmotion.arrays import Array, BoolArray, IntArray
+from calmotion.mesh.quadratic import QuadraticMesh
 
 _CANDIDATES = (8, 64, 4096)  # nearest tetrahedra that are searched for one that contains a point
 _INSIDE, _ZERO = 1e-7, 1e-9  # rounding of barycentric coordinates

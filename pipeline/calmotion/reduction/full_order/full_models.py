@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from calmotion.model.character import Body
+from calmotion.model.meshes import FEMesh
 from calmotion.reduction.cache import cache_key
-from calmotion.shot.character import Body
-from calmotion.shot.meshes import FEMesh
 
 if TYPE_CHECKING:
-    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+    from calmotion.mesh.patches.interface_patches import AttachmentFrame
     from calmotion.reduction.reduce import FullBody
 
 _KEPT = 60_000_000  # numbers in factors of full models, half a gigabyte

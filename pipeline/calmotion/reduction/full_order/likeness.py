@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.reduction.basis.natural_modes import vector_mass
 from calmotion.reduction.reduce import FullBody
-from calmotion.shot.character import Array
 
 _SAME = 1e-9  # of the size: distance of nodes that are the same
 _EQUAL = 1e-9  # relative difference of products with matrices that are the same

@@ -7,17 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
+from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches
+from calmotion.mesh.quadratic import QuadraticMesh
+from calmotion.model.character import Body, Frame
+from calmotion.model.meshes import CutPatch, FEMesh, MissingVolume
 from calmotion.reduction.discretization_error import clamped_modes, element_errors, errors_and_form
-from calmotion.reduction.elements.assembly import QuadraticMesh, assemble
+from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.full_order.mesh_extrapolation import Estimate
 from calmotion.reduction.full_order.nested_modes import NestedModes
 from calmotion.reduction.full_order.shape_change import shape_forms
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.material_laws.choice import amplitudes
 from calmotion.reduction.reduce import LinearModes
-from calmotion.shot.character import Array, Body, Frame, IntArray
-from calmotion.shot.meshes import CutPatch, FEMesh, MissingVolume
 
 _MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
 ALGEBRAIC = 3e-5  # relative error of the squares of frequencies whose mesh is wrong by a hundred times that and more

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 _GAIN = 1.2  # least ratio of estimates that are compared
 _USUAL = 0.55  # error over the estimate of it, mostly

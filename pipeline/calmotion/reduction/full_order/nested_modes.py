@@ -10,14 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.linear_algebra.multifrontal import expand
 from calmotion.linear_algebra.multigrid import WIDTH
 from calmotion.linear_algebra.preconditioned_modes import improved_modes
 from calmotion.linear_algebra.sparse_solver import SparseSolver
+from calmotion.mesh.quadratic import QuadraticMesh
 from calmotion.reduction.basis.natural_modes import lowest_modes, vector_mass
-from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh
+from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.nested_meshes import NestedMeshes
-from calmotion.shot.character import Array, BoolArray, IntArray
 
 _FEW = 300  # free nodes of meshes that are factorised each by itself
 

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.reduction.elements.assembly import QuadraticMesh
+from calmotion.arrays import Array
+from calmotion.mesh.quadratic import QuadraticMesh
+from calmotion.model.character import ElasticMaterial
+from calmotion.model.meshes import MissingVolume
 from calmotion.reduction.elements.elastic_forms import linear_stress
 from calmotion.reduction.elements.embedding import embed
-from calmotion.shot.character import Array, ElasticMaterial
-from calmotion.shot.meshes import MissingVolume
 
 _AT_ONCE = 4000  # places whose strains are in memory
 

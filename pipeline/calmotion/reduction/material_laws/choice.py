@@ -17,13 +17,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.model.character import ElasticMaterial
 from calmotion.reduction.basis.craig_bampton import Basis
 from calmotion.reduction.basis.modal_derivatives import Support, modal_derivatives
 from calmotion.reduction.basis.static_loads import OVERSHOOT
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.load_envelope import LoadEnvelope
-from calmotion.shot.character import Array, ElasticMaterial
 
 _MODES = 4  # the lowest modes, which make nearly all of a deflection
 _LARGE_STRAIN = 0.1  # below, the bound of the loads is too pessimistic to require a nonlinear material

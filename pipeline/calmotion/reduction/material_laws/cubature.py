@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.model.character import ElasticMaterial
 from calmotion.reduction.basis.craig_bampton import Basis
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, strain_gram
 from calmotion.reduction.material_laws.reduced_poses import equilibrium_poses
-from calmotion.shot.character import Array, ElasticMaterial
 
 # Relative error of the forces over the training poses, each coordinate scaled by its stiffness. Bending forces are
 # small differences of large stretch forces: 1e-3 gives an error of 5% in the deflection of a link, this value 0.1%.

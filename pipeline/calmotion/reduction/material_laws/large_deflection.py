@@ -7,16 +7,17 @@ from functools import partial
 
 import numpy as np
 
+from calmotion.arrays import Array
+from calmotion.model.character import DEFAULT_TOLERANCE, ElasticMaterial
 from calmotion.reduction.basis.craig_bampton import Basis
 from calmotion.reduction.basis.modal_derivatives import NEGLIGIBLE, Support, extended_basis
 from calmotion.reduction.basis.quadratic_strain_subspace import QuadraticStrainSubspace, quadratic_strain_subspace
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, strain_gram
-from calmotion.reduction.interfaces.patch_rotation import spring_rows, springs, stiffer
+from calmotion.reduction.elements.patch_rotation import spring_rows, springs, stiffer
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import work_of_loads
 from calmotion.reduction.reduced_body import Elasticity
-from calmotion.shot.character import DEFAULT_TOLERANCE, Array, ElasticMaterial
 
 PAIRED_MODES = 16  # largest number of modes with derivatives
 _NEGLIGIBLE_ENERGY = 1e-3  # share of the derivatives' strain energy, times the tolerance over the body's size

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.reduction.basis.craig_bampton import Basis
-from calmotion.shot.character import Array
 
 _LARGEST = 0.25  # largest deflection of the poses, of the body's size
 _VIBRATION = 0.05  # amplitude of the random displacement that is added

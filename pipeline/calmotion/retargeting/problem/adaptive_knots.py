@@ -13,9 +13,9 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse.linalg import splu
 
+from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on, knot_frames, uniform_breaks
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.simulation.inputs.time_grid import TimeGrid
 
 FIRST, FINEST = 0.05, 1.0 / 60.0  # initial and smallest distance of knots [s]

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.multibody.kernels.so3 import matrix_of
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.solver.few_rows import with_rows
-from calmotion.shot.character import Array, BoolArray
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.motor_limits import Bounds
 from calmotion.simulation.standing.ground_limits import GroundLimits, Landing, landing_velocity

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import BoolArray
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.limited_step import limited_step
-from calmotion.shot.character import BoolArray
 from calmotion.simulation.motor_limits import QUANTITIES
 
 MOST = 4  # number of limits whose cost is estimated, largest multipliers first

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from calmotion.shot.character import Array, BoolArray
+from calmotion.arrays import Array, BoolArray
 from calmotion.simulation.motor_limits import Bounds
 
 FIRST_PENALTY = 1e3  # over the objective of the input for each second

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.sparse import csc_matrix, csr_matrix, diags, eye_array, hstack, vstack
 
-from calmotion.shot.character import Array, IntArray
+from calmotion.arrays import Array, IntArray
 from calmotion.simulation.inputs.time_grid import TimeGrid, pre_roll_weights
 
 DEGREE = 3

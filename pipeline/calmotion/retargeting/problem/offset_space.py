@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from calmotion.arrays import Array, IntArray
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
-from calmotion.shot.character import Array, IntArray
 from calmotion.simulation.inputs.curves import Curves
 
 

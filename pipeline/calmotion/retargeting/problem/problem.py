@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
@@ -37,7 +38,6 @@ from calmotion.retargeting.problem.several_robots import (
     tangents,
 )
 from calmotion.retargeting.solver.preconditioner import Preconditioner, RigidPreconditioner
-from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.simulation.forward import ForwardRun, limited_values
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid

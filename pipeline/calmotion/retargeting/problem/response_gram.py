@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.multibody.parallel import in_parallel
 from calmotion.multibody.sensitivity.linearization import spare_memory
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.solver.dense_preconditioner import DensePreconditioner
 from calmotion.retargeting.solver.preconditioner import Preconditioner, banded_preconditioner
-from calmotion.shot.character import Array, BoolArray, IntArray
 
 COST = 1 / 64  # of a response, in products: half of the instants, at a sixteenth of the time of a sweep
 OF_PART = 1 / 22  # the same of one that is followed for a part of the shot, over that part

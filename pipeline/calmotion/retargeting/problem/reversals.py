@@ -22,9 +22,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.multibody.analysis.reactions import reactions, transmitted
 from calmotion.multibody.model.model import Model
-from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.simulation.forward import ForwardRun
 
 WIDTH = 0.05  # of a gear's largest torque in the input: within it the side changes smoothly

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from calmotion.arrays import Array
 from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.multibody.model.model import Model, rigid_model
 from calmotion.multibody.model.moving_markers import rooted
 from calmotion.retargeting.problem.ground import GROUND
 from calmotion.retargeting.problem.offset_space import OffsetSpace
-from calmotion.shot.character import Array
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.intended_motion import rigid_motion

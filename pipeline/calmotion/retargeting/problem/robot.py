@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.model.model import Model, with_damping
 from calmotion.retargeting.problem.ground import GroundSlopes, ground_values
 from calmotion.retargeting.problem.reversals import ReversalTerms, transmitted_by
-from calmotion.shot.character import Array
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.simulator import Simulator
 from calmotion.simulation.standing.ground_limits import GroundLimits

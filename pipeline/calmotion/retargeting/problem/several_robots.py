@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.parallel import in_parallel
 from calmotion.retargeting.problem.ground import ground_of
 from calmotion.retargeting.problem.rigid_approximation import EFFORT, effort_of
 from calmotion.retargeting.problem.robot import Robot
-from calmotion.shot.character import Array
 from calmotion.simulation.forward import limited_values
 from calmotion.simulation.inputs.curves import Curves
 

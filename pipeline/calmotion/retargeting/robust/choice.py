@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.model import Track
+from calmotion.model.robust.robots import Scenario
+from calmotion.model.robust.settings import WORST
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.robust.measure import deviations_on, errors_on
 from calmotion.retargeting.robust.scenarios import Parameter, scenario_at
-from calmotion.shot import Track
-from calmotion.shot.character import Array
-from calmotion.shot.robust.robots import Scenario
-from calmotion.shot.robust.settings import WORST
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 
 REACH = 3.0  # standard deviations of the farthest robots of a worst case: one of 370 is farther along a direction

@@ -19,8 +19,8 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.retargeting.robust.linear_errors import FewErrors, LinearErrors
-from calmotion.shot.character import Array, BoolArray
 
 ORDERS: tuple[int, ...] = (8, 16)
 STEPS = 30  # most of each order, with those that fail

@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.retargeting.robust.linear_errors import LinearErrors, lengths, weights_of
 from calmotion.retargeting.robust.rest_of_merit import RestOfMerit
 from calmotion.retargeting.solver.dense_preconditioner import for_each_motor
-from calmotion.shot.character import Array, BoolArray
 
 ORDERS = (16, 32, 64)  # of the power means, one after the other
 STEPS = 200  # most of each of them, with those that fail: weights are far from stationary before

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calmotion.shot.character import Array, BoolArray
+from calmotion.arrays import Array, BoolArray
 
 _COUNTS = 1e-2  # of the largest weight: smaller ones count in the gradient only
 _LEFT_OUT, _MISSED = 1e-4, 1e-2  # of the largest weight: smaller ones do not count, until they are larger than this

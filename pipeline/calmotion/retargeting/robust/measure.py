@@ -7,15 +7,15 @@ from typing import TypeVar
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.model import Track
+from calmotion.model.robust.robots import Scenario
+from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.parallel import in_parallel
 from calmotion.multibody.sensitivity.linearization import processors
 from calmotion.retargeting.robust.scenarios import shot_of
-from calmotion.shot import Track
-from calmotion.shot.character import Array
-from calmotion.shot.robust.robots import Scenario
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.prepare import prepare

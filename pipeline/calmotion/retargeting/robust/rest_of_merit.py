@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.rigid_approximation import EFFORT, limit_metrics
 from calmotion.retargeting.solver.dense_preconditioner import add_terms, for_each_motor
-from calmotion.shot.character import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from calmotion.accuracy.simulate_to_tolerance import found_tracks
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.model import Result, Track
+from calmotion.model.robust.robots import Compromise, Robustness, Scenario
+from calmotion.model.robust.settings import WORST
+from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import tolerance_of
 from calmotion.retargeting.found_curves import best_so_far
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.robust.choice import (
@@ -21,15 +26,10 @@ from calmotion.retargeting.robust.choice import (
 from calmotion.retargeting.robust.measure import errors_on, silent
 from calmotion.retargeting.robust.scenarios import Parameter, random_scenarios, uncertain_parameters
 from calmotion.retargeting.robust.worst_case import WorstCase
-from calmotion.shot import Result, Track
-from calmotion.shot.character import Array
-from calmotion.shot.robust.robots import Compromise, Robustness, Scenario
-from calmotion.shot.robust.settings import WORST
-from calmotion.shot.run import RunSettings
-from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
+from calmotion.tolerance.simulate_to_tolerance import found_tracks
 
 ROUNDS = 6  # most searches with other weights
 FALLING = 0.98  # of the largest error: a smaller gain ends them

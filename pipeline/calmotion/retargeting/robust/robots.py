@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from calmotion.model.robust.robots import Scenario
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.robust.scenarios import shot_of
-from calmotion.shot.robust.robots import Scenario
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.prepare import Prepared, prepare
 from calmotion.simulation.simulate import intended_motion
 from calmotion.simulation.simulator import Simulator

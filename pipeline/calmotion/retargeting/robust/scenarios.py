@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.arrays import Array
+from calmotion.model import Character
+from calmotion.model.character import ElasticMaterial
+from calmotion.model.motor import PRESCRIBED, Motor
+from calmotion.model.robust.robots import Scenario
 from calmotion.reduction.reduced_body import Invariants, ReducedBody
 from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
-from calmotion.shot import Character
-from calmotion.shot.character import Array, ElasticMaterial
-from calmotion.shot.motor import PRESCRIBED, Motor
-from calmotion.shot.robust.robots import Scenario
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 
 MODULUS, DAMPING, MASS, PAYLOAD = "modulus", "damping", "mass", "payload"

@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from calmotion.shot.character import Array, BoolArray, IntArray
+from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.target_errors import Objective
 

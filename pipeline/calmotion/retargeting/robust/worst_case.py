@@ -14,7 +14,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from calmotion.arrays import Array
 from calmotion.linear_algebra.blas_threads import one_blas_thread
+from calmotion.model import Track
+from calmotion.model.robust.robots import Scenario
+from calmotion.model.run import RunSettings
 from calmotion.multibody.parallel import in_parallel
 from calmotion.multibody.sensitivity.linearization import spare_memory
 from calmotion.retargeting.found_curves import found_curves
@@ -33,10 +37,6 @@ from calmotion.retargeting.robust.rest_of_merit import RestOfMerit
 from calmotion.retargeting.robust.robots import robots_of
 from calmotion.retargeting.robust.weighted_errors import WeightedErrors
 from calmotion.retargeting.robust.work import Work
-from calmotion.shot import Track
-from calmotion.shot.character import Array
-from calmotion.shot.robust.robots import Scenario
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.prepare import prepare

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import IntArray
+from calmotion.model import Character
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.shot import Character
-from calmotion.shot.character import IntArray
 from calmotion.simulation.inputs.gearing import coupling_of
 
 STEPS = 2  # of conjugate gradients

@@ -20,13 +20,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray
+from calmotion.model import Simplification
 from calmotion.retargeting.problem.adaptive_knots import halved
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.simplification.pruning import UNCHANGED
 from calmotion.retargeting.solver.gauss_newton import Search
-from calmotion.shot import Simplification
-from calmotion.shot.character import Array, BoolArray
 from calmotion.simulation.inputs.time_grid import TimeGrid
 
 NEGLIGIBLE = 0.002  # share of the tolerance that the inactive intervals may gain together

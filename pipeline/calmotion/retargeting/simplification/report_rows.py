@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from calmotion.model import Character, MotorCurve, Simplification
+from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import tolerance_of
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.simplification.idle_motors import idle_motors
 from calmotion.retargeting.simplification.inactive_intervals import InactiveInterval, interval_rows
-from calmotion.shot import Character, MotorCurve, Simplification
-from calmotion.shot.run import RunSettings
-from calmotion.shot.tolerance import tolerance_of
 
 FINER = 0.1  # share of the least gain of a search that finer knots must gain
 PRUNED = 0.2  # share of it that the removed offsets may cost together

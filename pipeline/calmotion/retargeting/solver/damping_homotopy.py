@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.retargeting.solver.recycling import Recycled
-from calmotion.shot.character import Array, BoolArray
 
 FAR = 0.1  # error over the largest lever arm of a motor [rad] from which the homotopy is used
 DAMPING = (0.2, 0.05)  # damping ratios of the lowest mode

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_matrix, identity, kron
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.retargeting.solver.preconditioner import BandedGram
-from calmotion.shot.character import Array, BoolArray
 
 _LEAST = 1e-12  # of the largest diagonal entry, added to all: the factor exists for directions that move no target
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import splu
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 MOST = 100  # iterations
 NEAR = 0.995  # share of the way to the boundary that a step takes

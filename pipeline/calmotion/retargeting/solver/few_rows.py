@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 
 def with_rows(inverse: Callable[[Array], Array], rows: Array, weights: Array) -> Callable[[Array], Array]:

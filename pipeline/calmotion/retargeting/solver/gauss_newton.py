@@ -8,10 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.retargeting.solver.limited_step import LimitedProblem, LimitedStep, limited_step
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.retargeting.solver.truncated_cg import Path, conjugate_gradients
-from calmotion.shot.character import Array, BoolArray
 
 PAIRS = 24  # directions that are kept for the next system
 TRIES = 10  # most reductions of a step in one iteration

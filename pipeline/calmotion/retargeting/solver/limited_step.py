@@ -14,8 +14,8 @@ from typing import Protocol
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.retargeting.solver.truncated_cg import conjugate_gradients
-from calmotion.shot.character import Array, BoolArray
 
 Values = dict[str, Array]
 

@@ -9,9 +9,9 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
+from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.retargeting.problem.offset_basis import DEGREE, OffsetBasis
-from calmotion.shot.character import Array, BoolArray, IntArray
 
 _NOTHING = 1e-12  # of the largest entry, and a motor does not move a target
 

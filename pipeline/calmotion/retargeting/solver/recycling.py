@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 
 class Recycled:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 _LEFT = 1.5  # r P^-1 r times this bounds the remaining decrease
 

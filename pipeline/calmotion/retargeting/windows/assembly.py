@@ -8,14 +8,22 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from calmotion.arrays import Array
+from calmotion.model import (
+    LimitUse,
+    MotorCurve,
+    OptimizerStep,
+    Result,
+    Simplification,
+    Simulation,
+    WindowRow,
+)
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.posing import SMOOTHNESS, closeness_of
 from calmotion.retargeting.simplification.pruning import UNCHANGED
 from calmotion.retargeting.windows.parts import Piece, added, joined, offset_curves
 from calmotion.retargeting.windows.plan import Window
 from calmotion.retargeting.windows.search import Found
-from calmotion.shot import LimitUse, MotorCurve, OptimizerStep, Result, Simplification, Simulation, WindowRow
-from calmotion.shot.character import Array
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid

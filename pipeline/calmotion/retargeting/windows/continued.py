@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.multibody.analysis.kinematics import target_frames
 from calmotion.multibody.integrators.trajectory import Trajectory
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.model.system import State
-from calmotion.shot.character import Array
 from calmotion.simulation.forward import ForwardRun, followed
 from calmotion.simulation.simulator import Simulator
 

@@ -9,6 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from calmotion.arrays import Array
+from calmotion.model import Result, WindowRow
+from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.retargeting.problem.adaptive_knots import FIRST
@@ -27,10 +31,6 @@ from calmotion.retargeting.windows.parts import (
 from calmotion.retargeting.windows.plan import FEWEST, Window, overlap_time, plan_windows
 from calmotion.retargeting.windows.search import Found, Setting, search_window
 from calmotion.retargeting.windows.store import WindowStore, window_keys
-from calmotion.shot import Result, WindowRow
-from calmotion.shot.character import Array
-from calmotion.shot.run import RunSettings
-from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import Curves, sample_curves

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from calmotion.arrays import Array
+from calmotion.model import Motion, Simulation
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.retargeting.windows.continued import Beginning, ContinuedSimulator
-from calmotion.shot import Motion, Simulation
-from calmotion.shot.character import Array
 from calmotion.simulation.forward import ForwardRun, run_forward
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.excerpts import later

@@ -13,11 +13,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot import Animation, Character
-from calmotion.shot.budget import SEARCH_SHARE
-from calmotion.shot.character import Array, contact_joints
-from calmotion.shot.run import LONG_SHOT, WINDOW, WINDOW_OVERLAP, RunSettings
+from calmotion.model import Animation, Character
+from calmotion.model.budget import SEARCH_SHARE
+from calmotion.model.character import contact_joints
+from calmotion.model.run import (
+    LONG_SHOT,
+    WINDOW,
+    WINDOW_OVERLAP,
+    RunSettings,
+)
 
 FALL = 10.0  # factor by which the slowest mode falls in an overlap
 LEAST = 1.0  # overlap, but not above half a window [s]

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.checkpoint import Checkpoint, problem_key
 from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.problem.adaptive_knots import first_breaks
@@ -20,8 +22,6 @@ from calmotion.retargeting.search import RetargetSearch
 from calmotion.retargeting.solver.gauss_newton import Search
 from calmotion.retargeting.windows.continued import Beginning, ContinuedSimulator
 from calmotion.retargeting.windows.parts import Part, added
-from calmotion.shot.character import Array, BoolArray
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
 from calmotion.simulation.motor_limits import motor_bounds

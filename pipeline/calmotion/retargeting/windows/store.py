@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array
+from calmotion.model import Animation, Character, Track
+from calmotion.model.run import RunSettings
 from calmotion.multibody.model.system import State
 from calmotion.reduction.cache import cache_key
 from calmotion.retargeting.windows.continued import Beginning
 from calmotion.retargeting.windows.plan import Window
-from calmotion.shot import Animation, Character, Track
-from calmotion.shot.character import Array
-from calmotion.shot.run import RunSettings
 from calmotion.support.caching.verified_files import DamagedFileError, read_arrays, write_arrays
 from calmotion.support.sources import source_digest
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.errors import IntegrationError, ShotError
+from calmotion.model import Animation, Character
+from calmotion.model.character import contact_joints
+from calmotion.model.run import RunSettings
+from calmotion.model.standing.contact import Contact
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.kernels.so3 import matrix_of
 from calmotion.multibody.model.model import Model, start_angles
 from calmotion.multibody.model.moving_markers import pack
-from calmotion.shot import Animation, Character
-from calmotion.shot.character import Array, BoolArray, contact_joints
-from calmotion.shot.run import RunSettings
-from calmotion.shot.standing.contact import Contact
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.roots import sample_roots
 from calmotion.simulation.inputs.time_grid import TimeGrid

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.shot.animation import Track
-from calmotion.shot.character import Array
-from calmotion.shot.curves import curve_of, held_curve
+from calmotion.arrays import Array
+from calmotion.model.animation import Track
+from calmotion.model.curves import curve_of, held_curve
 from calmotion.simulation.inputs.time_grid import TimeGrid, over_grid
 
 PRE_ROLL = 1.0

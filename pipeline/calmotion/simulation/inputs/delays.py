@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 
 Maps: TypeAlias = "tuple[tuple[csr_matrix, csr_matrix], tuple[csr_matrix, csr_matrix]]"
 

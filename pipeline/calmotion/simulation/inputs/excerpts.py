@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from calmotion.shot import Animation, FreeTrack
-from calmotion.shot.character import Array
-from calmotion.shot.curves import held_curve
+from calmotion.arrays import Array
+from calmotion.model import Animation, FreeTrack
+from calmotion.model.curves import held_curve
 
 _BRIEF = 0.25  # time over which accelerations are averaged: that of a move [s]
 

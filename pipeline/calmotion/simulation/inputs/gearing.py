@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.shot.character import Array, Character, IntArray
+from calmotion.arrays import Array, IntArray
+from calmotion.model.character import Character
 
 
 def leaders(character: Character) -> IntArray:

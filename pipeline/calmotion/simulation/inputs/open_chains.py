@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import IntegrationError, ShotError
+from calmotion.model import Character
+from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.analysis.joint_gaps import OpenJoint, first_open_joint
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.model.topology import chain_members
 from calmotion.multibody.statics.equilibrium import OPEN, open_without_gravity
-from calmotion.shot import Character
-from calmotion.shot.character import Array
-from calmotion.shot.run import RunSettings
-from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.time_grid import TimeGrid
 

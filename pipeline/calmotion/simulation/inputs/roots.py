@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation, RotationSpline
 
+from calmotion.arrays import Array
+from calmotion.model.animation import MovingFrame, Track
+from calmotion.model.curves import curve_of
 from calmotion.multibody.kernels.markers import WORLD_MARKER
 from calmotion.multibody.kernels.so3 import right_jacobian
 from calmotion.multibody.model.moving_markers import pack
-from calmotion.shot.animation import MovingFrame, Track
-from calmotion.shot.character import Array
-from calmotion.shot.curves import curve_of
 from calmotion.simulation.inputs.time_grid import TimeGrid, over_grid, pre_roll_weights
 
 LOOPS = 3  # on either side of the one that is interpolated

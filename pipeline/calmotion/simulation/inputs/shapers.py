@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array, BoolArray
-from calmotion.shot.run import SHAPERS
+from calmotion.model.run import SHAPERS
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
 

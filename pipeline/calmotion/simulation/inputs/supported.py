@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import IntegrationError, ShotError
+from calmotion.model import Animation, Character
+from calmotion.model.run import INTEGRATORS, RunSettings
+from calmotion.model.tolerance import reach
 from calmotion.multibody.integrators.integrate import follows_roots
-from calmotion.shot import Animation, Character
-from calmotion.shot.character import Array
-from calmotion.shot.run import INTEGRATORS, RunSettings
-from calmotion.shot.tolerance import reach
 from calmotion.simulation.cyclic import refuse_open_loops
 from calmotion.simulation.inputs.contacts import refuse_unsupported_contacts
 from calmotion.simulation.inputs.time_grid import TimeGrid

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.shot.character import Array, BoolArray, IntArray
-from calmotion.shot.curves import Sample
+from calmotion.arrays import Array, BoolArray, IntArray
+from calmotion.model.curves import Sample
 
 MAX_STEP = 1.0 / 480.0
 

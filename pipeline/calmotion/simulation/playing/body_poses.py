@@ -11,15 +11,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from calmotion.arrays import Array
 from calmotion.control.commands import MotorCurves, instants
 from calmotion.errors import ShotError
+from calmotion.model.animation import Animation
+from calmotion.model.character import (
+    Body,
+    Character,
+    MassProperties,
+    with_ideal_motors,
+)
 from calmotion.multibody.analysis.kinematics import rigid_poses
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import compile_model, moves_freely
 from calmotion.multibody.model.topology import Tree, span_tree
-from calmotion.shot.animation import Animation
-from calmotion.shot.character import Array, Body, Character, MassProperties, with_ideal_motors
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.contacts import sample_world
 from calmotion.simulation.inputs.curves import needed_pre_roll

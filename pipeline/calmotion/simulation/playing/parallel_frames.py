@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 from calmotion.simulation.playing.body_poses import BodyTree, LocalPoses, motor_values
 
 EULER_ORDERS = ("ZXY", "ZYX", "YXZ", "YZX", "XYZ", "XZY")

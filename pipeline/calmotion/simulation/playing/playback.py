@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.control.commands import Commands, MotorCurves
 from calmotion.control.players import played
+from calmotion.model.curves import Sample
+from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.shot.character import Array
-from calmotion.shot.curves import Sample
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import run_forward

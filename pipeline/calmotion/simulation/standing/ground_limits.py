@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from calmotion.arrays import Array, BoolArray
+from calmotion.model import Character, Frame
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.model.model import Model, rigid_model
 from calmotion.multibody.model.phases import RESTARTED, held_contacts
-from calmotion.shot import Character, Frame
-from calmotion.shot.character import Array, BoolArray
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.simulator import Simulator

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from calmotion.shot import Character, Frame, Motion
-from calmotion.shot.character import Array, contact_joints
+from calmotion.arrays import Array
+from calmotion.model import Character, Frame, Motion
+from calmotion.model.character import contact_joints
 from calmotion.simulation.standing.soles import centres_of_pressure, margins, points_of, sole_of, vertical, weight_of
 
 _NOTHING = 1e-6  # of the weight: a force that is rounding

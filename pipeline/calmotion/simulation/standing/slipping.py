@@ -9,15 +9,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from calmotion.arrays import Array, BoolArray
 from calmotion.errors import ShotError
+from calmotion.model import Character
+from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.modes import falling_rate
 from calmotion.multibody.integrators.trajectory import copy_of_instant
 from calmotion.multibody.model.model import Model, start_angles
 from calmotion.multibody.model.phases import held_contacts
-from calmotion.shot import Character
-from calmotion.shot.character import Array, BoolArray
-from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.time_grid import TimeGrid
 

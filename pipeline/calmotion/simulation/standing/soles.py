@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.shot.character import Array, Body, Character, Frame
+from calmotion.arrays import Array
+from calmotion.model.character import Body, Character, Frame
 
 STANDS = 5e-3  # points of a body that are higher above its lowest one, over its extent, do not stand on the ground
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.errors import ShotError, raise_all
+from calmotion.model import MotorTracks
 from calmotion.rigging.materials import Material
-from calmotion.shot import MotorTracks
 from calmotion.support.naming import nearest
 from calmotion.usd import stages
 from calmotion.usd.diagnostics import quiet

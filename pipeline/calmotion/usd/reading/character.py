@@ -10,9 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.errors import ShotError, raise_all
-from calmotion.shot import Body, Character, Joint, MassProperties, RetargetSettings
-from calmotion.shot.motor import PRESCRIBED
-from calmotion.shot.tolerance import reach
+from calmotion.model import (
+    Body,
+    Character,
+    Joint,
+    MassProperties,
+    RetargetSettings,
+)
+from calmotion.model.motor import PRESCRIBED
+from calmotion.model.tolerance import reach
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import scene, targets, topology
 from calmotion.usd.reading.actuators.motor_models import motor_model

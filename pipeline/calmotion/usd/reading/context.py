@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array
 from calmotion.usd.gf import matrix
 from calmotion.usd.schemas import is_applied
 from calmotion.usd.transforms import Pose, pose_from_matrix, refuse_infinite

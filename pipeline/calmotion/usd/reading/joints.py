@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot import WORLD, Frame
-from calmotion.shot.character import Array
-from calmotion.shot.standing.contact import Contact
+from calmotion.model import WORLD, Frame
+from calmotion.model.standing.contact import Contact
 from calmotion.support.naming import nearest
 from calmotion.usd import gf
 from calmotion.usd.reading.bases.joint_ends import refuse_lost_target, refuse_no_place

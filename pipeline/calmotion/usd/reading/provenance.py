@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from calmotion.shot import InputLayer, Provenance
+from calmotion.model import InputLayer, Provenance
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
 from calmotion.usd.units import units_of

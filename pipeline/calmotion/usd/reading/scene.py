@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot import RetargetSettings
-from calmotion.shot.character import Array
-from calmotion.shot.robust.settings import Uncertainty
+from calmotion.model import RetargetSettings
+from calmotion.model.robust.settings import Uncertainty
 from calmotion.support.naming import nearest
 from calmotion.usd import gf, schemas
 from calmotion.usd.calibrations import known_factors

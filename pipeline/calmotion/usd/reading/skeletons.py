@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array
 from calmotion.support.naming import nearest
 from calmotion.usd import gf
 from calmotion.usd.reading.context import prims_of

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.model.outputs import Rig, RiggedJoint
 from calmotion.rigging.links import Link, make_links, targets_of
 from calmotion.rigging.materials import MATERIALS
-from calmotion.shot.character import Array
-from calmotion.shot.outputs import Rig, RiggedJoint
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
 from calmotion.usd.diagnostics import quiet

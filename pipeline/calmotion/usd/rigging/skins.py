@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array, IntArray
 from calmotion.usd import gf
 from calmotion.usd.reading.bodies.shapes import mesh_geometry
 from calmotion.usd.reading.context import prims_of

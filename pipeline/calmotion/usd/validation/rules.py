@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from calmotion.errors import ShotError, each
-from calmotion.shot.outputs import ERROR, WARNING, Finding
+from calmotion.model.outputs import ERROR, WARNING, Finding
 from calmotion.usd.reading.shot import StageReading, read_stage
 from calmotion.usd.reading.unread import misplaced_schemas, unread_attributes
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calmotion.shot import Character, Skin
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
+from calmotion.model import Character, Skin
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
 from calmotion.usd.transforms import Pose, pose_from_matrix, rotation_from_quaternion

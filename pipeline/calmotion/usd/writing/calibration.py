@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.shot import Character, Provenance
-from calmotion.shot.calibration.estimates import (
+from calmotion.model import Character, Provenance
+from calmotion.model.calibration.estimates import (
     ARMATURE,
     CENTRE,
     DAMPING,

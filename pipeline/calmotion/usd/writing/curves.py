@@ -7,8 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calmotion.shot import Animation, Character, Motor, MotorCurve, Track
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
+from calmotion.model import (
+    Animation,
+    Character,
+    Motor,
+    MotorCurve,
+    Track,
+)
 from calmotion.usd.clock import Clock
 from calmotion.usd.schemas import is_applied
 
@@ -44,7 +50,7 @@ def with_authored(times: Array, tracks: Iterable[Track]) -> Array:
         times: [s], ascending, shape [n].
         tracks: The animation of what is written.
     """
-    from calmotion.shot.curves import held_curve
+    from calmotion.model.curves import held_curve
 
     end = float(times[-1])
     for track in tracks:
@@ -70,7 +76,7 @@ def curve_values(animation: Animation, curve: MotorCurve, times: Array, cyclic: 
     """A motor's curve [rad or m] at times within the shot."""
     if times is animation.frame_times:
         return curve.frame_values
-    from calmotion.shot.curves import optimized_curve
+    from calmotion.model.curves import optimized_curve
 
     return optimized_curve(animation, curve, cyclic)(times, 0)
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.shot import Motion
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
+from calmotion.model import Motion
 
 
 @dataclass(frozen=True, eq=False)

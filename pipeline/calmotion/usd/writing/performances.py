@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from calmotion.shot import Character, Provenance
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
+from calmotion.model import Character, Provenance
 from calmotion.usd import schemas, stages
 from calmotion.usd.layers import write_layer
 from calmotion.usd.writing.metadata import author_stage_metadata

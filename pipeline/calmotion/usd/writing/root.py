@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from calmotion.errors import ShotError
-from calmotion.shot import Provenance
+from calmotion.model import Provenance
 from calmotion.usd import stages
 from calmotion.usd.layers import refuse_input_as_output, write_layer
 from calmotion.usd.writing.metadata import author_origin, author_stage_metadata

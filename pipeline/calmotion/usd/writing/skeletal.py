@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calmotion.shot import Animation, Character, MotorCurve
-from calmotion.shot.character import Array
-from calmotion.shot.curves import curve_of
+from calmotion.arrays import Array
+from calmotion.model import Animation, Character, MotorCurve
+from calmotion.model.curves import curve_of
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.character import read_skeleton

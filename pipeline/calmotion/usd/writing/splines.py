@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calmotion.shot import Animation, Character, MotorCurve
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
+from calmotion.model import Animation, Character, MotorCurve
 from calmotion.usd.clock import Clock
 from calmotion.usd.writing.curves import attribute_spec
 
@@ -23,7 +23,7 @@ def hermite(animation: Animation, curve: MotorCurve, cyclic: bool) -> tuple[Arra
 
     Knots are where the animation has samples and where the offset has knots; between them both are cubics.
     """
-    from calmotion.shot.curves import optimized_curve
+    from calmotion.model.curves import optimized_curve
 
     track, end = animation.tracks[curve.motor], float(animation.frame_times[-1])
     whole = optimized_curve(animation, curve, cyclic)

@@ -8,20 +8,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
 from calmotion.host import SettingError, Settings, merge, nearest, quantity_of
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion.identification.measurement import refuse_unknown_channels
 from calmotion.identification.parameters import DEFAULT, refuse_unknown
 from calmotion.identification.recordings.plausible import refuse_long
 from calmotion.identification.signals import refuse_cyclic
+from calmotion.model import Animation, Character, Provenance
+from calmotion.model.calibration.estimates import Calibration, Estimate
+from calmotion.model.calibration.recording import SensorRecording
+from calmotion.model.outputs import CalibrationFigures, WrittenLayer
+from calmotion.model.run import OutputPaths, RunSettings, Source
 from calmotion.multibody.integrators.coefficients import IMPLICIT
-from calmotion.shot import Animation, Character, Provenance
-from calmotion.shot.calibration.estimates import Calibration, Estimate
-from calmotion.shot.calibration.recording import SensorRecording
-from calmotion.shot.outputs import CalibrationFigures, WrittenLayer
-from calmotion.shot.run import OutputPaths, RunSettings, Source
 from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.tolerance.reduced_bodies import ConvergedReduction, compiled_in
 from calmotion.workflow.calibration.recordings import measured_prims, read_recordings
 from calmotion.workflow.run import Hooks, Outcome, Progress, again, carry_out
 from calmotion.workflow.shot import Given, Path, Shot, read_settings

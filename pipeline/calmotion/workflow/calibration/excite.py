@@ -9,15 +9,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from calmotion.accuracy.reduced_bodies import compiled_in
 from calmotion.errors import ShotError
 from calmotion.host import SettingError, parse_quantity, quantity_of
 from calmotion.identification.excitation.design import ExcitationSettings, blank_recordings, excite_shot
 from calmotion.identification.parameters import DEFAULT, refuse_unknown
-from calmotion.shot import Character, Provenance
-from calmotion.shot.calibration.excitation import Excitation, PlannedSensor
-from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER
-from calmotion.shot.run import RunSettings
+from calmotion.model import Character, Provenance
+from calmotion.model.calibration.excitation import Excitation, PlannedSensor
+from calmotion.model.calibration.recording import (
+    ACCELEROMETER,
+    ANGLE,
+    EFFORT,
+    MARKER,
+)
+from calmotion.model.run import RunSettings
+from calmotion.tolerance.reduced_bodies import compiled_in
 from calmotion.workflow.calibration.calibrate import compiled_with_sensors, with_sensors
 from calmotion.workflow.run import Hooks, Progress
 from calmotion.workflow.shot import Given, Path, Shot, read_settings

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, PropertyValues, RunContext
-from calmotion.shot.calibration.recording import RecordingRequest, SensorRecording
+from calmotion.model.calibration.recording import RecordingRequest, SensorRecording
 from calmotion.support.files import refuse_special
 
 

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.accuracy.reduced_bodies import compiled_in
-from calmotion.accuracy.simulate_to_tolerance import found_tracks
+from calmotion.arrays import Array
 from calmotion.identification.parameters import DEFAULT
+from calmotion.model.run import OutputPaths, RunSettings
 from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import random_scenarios, uncertain_parameters
-from calmotion.shot.character import Array
-from calmotion.shot.run import OutputPaths, RunSettings
+from calmotion.tolerance.reduced_bodies import compiled_in
+from calmotion.tolerance.simulate_to_tolerance import found_tracks
 from calmotion.workflow.calibration.calibrate import CalibratedShot, calibrate
 from calmotion.workflow.commands import optimize, simulate
 from calmotion.workflow.results import OptimizationResult, SimulationResult

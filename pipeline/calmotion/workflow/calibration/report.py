@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from calmotion.shot.calibration.estimates import Calibration
-from calmotion.shot.outputs import WrittenLayer
+from calmotion.model.calibration.estimates import Calibration
+from calmotion.model.outputs import WrittenLayer
 from calmotion.version import __version__
 
 

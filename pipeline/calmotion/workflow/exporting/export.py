@@ -12,18 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
+from calmotion.arrays import Array
 from calmotion.control.commands import Commands, ExportRequest, WrittenCommands
 from calmotion.host import Settings
-from calmotion.shot import Animation, Character, Provenance
-from calmotion.shot.character import Array
-from calmotion.shot.result import Result
-from calmotion.shot.run import RunSettings, Source
-from calmotion.shot.tolerance import tolerance_of
+from calmotion.model import Animation, Character, Provenance
+from calmotion.model.result import Result
+from calmotion.model.run import RunSettings, Source
+from calmotion.model.tolerance import tolerance_of
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.playing.lowest_rate import lowest_rate
 from calmotion.simulation.playing.playback import Loss, Playback
 from calmotion.support.files import temporary_folder
+from calmotion.tolerance.reduced_bodies import ConvergedReduction, compiled_in
 from calmotion.version import __version__
 from calmotion.workflow.exporting.controller_files import curves_of, format_named, write_commands
 from calmotion.workflow.exporting.given import GivenExport, given_export, refuse_beyond_format, refuse_beyond_shot

@@ -8,8 +8,8 @@ from numbers import Real
 from calmotion.control.commands import HIGHEST_RATE, LOWEST_RATE
 from calmotion.errors import ShotError
 from calmotion.host import SettingError, quantity_of
-from calmotion.shot import Animation, Character
-from calmotion.shot.run import RunSettings
+from calmotion.model import Animation, Character
+from calmotion.model.run import RunSettings
 from calmotion.simulation.inputs.supported import refuse_unsupported
 
 

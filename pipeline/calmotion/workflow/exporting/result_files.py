@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from calmotion.shot import Character, Provenance
+from calmotion.model import Character, Provenance
 from calmotion.workflow.outputs import refuse_layers, refuse_overwriting
 from calmotion.workflow.run import Outcome
 

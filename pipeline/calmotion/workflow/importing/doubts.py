@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from calmotion.shot import Character
+from calmotion.model import Character
 
 HEAVIEST = 1e5  # of a robot [kg]
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.host import Host, SettingError, has_no_unit, open_host, parse_quantity
+from calmotion.model import Animation, Character, MotorTracks
+from calmotion.model.run import Source
 from calmotion.rigging.materials import Material, material_named
-from calmotion.shot import Animation, Character, MotorTracks
-from calmotion.shot.run import Source
 from calmotion.support.files import try_writing
 from calmotion.usd.importing.robot_layer import FlexibleLinks, RobotOptions, robot_layer
 from calmotion.usd.layers import EXTENSIONS, refuse_input_as_output, write_layer

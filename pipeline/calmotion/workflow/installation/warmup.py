@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from calmotion.errors import ShotError
-from calmotion.shot.run import OutputPaths
+from calmotion.model.run import OutputPaths
 from calmotion.workflow.commands import optimize, simulate
 from calmotion.workflow.run import Progress
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from calmotion.errors import ShotError
-from calmotion.shot.outputs import ERROR
+from calmotion.model.outputs import ERROR
 from calmotion.workflow.publishing.manifest import LAYER, changed_files, read_manifest
 
 

@@ -36,8 +36,8 @@ def manifest_of(result: SimulationResult, folder: str | os.PathLike[str]) -> dic
         result: Of `simulate` or `optimize`.
         folder: Of the manifest.
     """
-    from calmotion.shot import Provenance
-    from calmotion.shot.run import Source
+    from calmotion.model import Provenance
+    from calmotion.model.run import Source
     from calmotion.workflow.plain import plain
 
     outcome = result.outcome
@@ -162,7 +162,7 @@ def _named(path: str, folder: str | os.PathLike[str]) -> str:
 
 def _inputs(result: SimulationResult) -> Iterator[tuple[str, str, str | None]]:
     """Path, role and hash of each file that the result depends on; layers were hashed when they were read."""
-    from calmotion.shot import Character, Provenance
+    from calmotion.model import Character, Provenance
 
     provenance, character = result.outcome.require(Provenance), result.outcome.require(Character)
     folder = os.path.dirname(os.path.realpath(provenance.shot))
@@ -178,7 +178,13 @@ def _inputs(result: SimulationResult) -> Iterator[tuple[str, str, str | None]]:
 
 
 def _outputs(result: SimulationResult) -> Iterator[tuple[str, str]]:
-    from calmotion.shot.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
+    from calmotion.model.outputs import (
+        CsvFile,
+        Figures,
+        Recording,
+        Video,
+        WrittenLayer,
+    )
 
     get = result.outcome.run.get
     if (layer := get(WrittenLayer)) is not None:

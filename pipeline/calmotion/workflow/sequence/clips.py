@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.host import SettingError, parse_quantity
-from calmotion.shot.character import Array, Character
-from calmotion.shot.curves import held_curve
+from calmotion.model.character import Character
+from calmotion.model.curves import held_curve
 from calmotion.support.reading import read_toml
 from calmotion.workflow.shot import Shot
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
 from calmotion.support.files import write_text
 from calmotion.version import __version__
 from calmotion.workflow.batch.jobs import Job, jobs_for
@@ -213,7 +213,7 @@ def _member(job: JobResult, start: str, end: str, seconds: float, poses: tuple[A
 
 def _is_joined(job: JobResult, poses: tuple[Any, Any]) -> bool:
     """Whether the written curves begin and end in some poses, at rest."""
-    from calmotion.shot.curves import held_curve
+    from calmotion.model.curves import held_curve
     from calmotion.workflow.shot import Shot
 
     root = (job.report or {}).get("root_layer")

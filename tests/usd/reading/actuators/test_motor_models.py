@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.shot.motor import Rotor
+from calmotion.model.motor import Rotor
 from calmotion.usd.reading import read_shot
 from pxr import Sdf, UsdPhysics, Vt
 from small_shots import ELBOW, SHOULDER, Scale, set_float, write_arm

@@ -5,7 +5,7 @@ import math
 
 import pytest
 from calmotion import ShotError
-from calmotion.accuracy.motors.motor_effects import with_gains_used
+from calmotion.tolerance.motors.motor_effects import with_gains_used
 from calmotion.usd.reading import read_shot
 from pxr import Sdf, UsdPhysics
 from small_shots import ELBOW, set_float, write_arm

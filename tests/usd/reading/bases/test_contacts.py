@@ -6,7 +6,7 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.shot.character import contact_joints
+from calmotion.model.character import contact_joints
 from pxr import Gf, UsdGeom
 from steppers import ANKLE, LANDING, RATE, ROBOT, TORSO, write_stepper
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.shot import MassProperties
+from calmotion.model import MassProperties
 from calmotion.usd.reading.bodies.moments import is_closed, sum_of, surface_moments, tetrahedron_moments
 
 BOX_TRIANGLES = np.array(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import calmotion as cm
 import numpy as np
 import pytest
-from calmotion.shot import MotorCurve
-from calmotion.shot.curves import commanded_curves
+from calmotion.model import MotorCurve
+from calmotion.model.curves import commanded_curves
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import read_shot
 from calmotion.usd.reading.generic_joints.chains import axis_values

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.shot import MotorTracks
+from calmotion.model import MotorTracks
 from calmotion.usd.reading.motors.given_tracks import length_note
 from calmotion.usd.reading.shot import read_shot
 from small_shots import ELBOW, SHOULDER, write_arm

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.shot.curves import curve_of
+from calmotion.model.curves import curve_of
 from calmotion.usd.reading import read_shot
 from calmotion.usd.reading.motors.splines import STEP
 from calmotion.usd.writing import write_result

@@ -15,7 +15,7 @@ import numpy as np
 
 from calmotion.control.motor_types import MotorType
 from calmotion.errors import ShotError
-from calmotion.shot.motor import PRESCRIBED, SERVO, Rotor
+from calmotion.model.motor import PRESCRIBED, SERVO, Rotor
 from calmotion.usd.dialects import ARMATURE, FRICTION, VISCOUS_FRICTION, Spelling, authored
 from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
 from calmotion.usd.reading.joints import JointPrim

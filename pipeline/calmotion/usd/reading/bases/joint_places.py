@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot import Frame
-from calmotion.shot.character import Array
+from calmotion.model import Frame
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.transforms import Pose, rotation_from_quaternion

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calmotion.shot import Frame, MovingFrame
+from calmotion.model import Frame, MovingFrame
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated_transforms import carriers, codes_of, moves
 from calmotion.usd.reading.context import Reading

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.shot import FlexibleSettings
+from calmotion.model import FlexibleSettings
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dependencies import refuse_place

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
-from calmotion.shot import InterfaceSurface
-from calmotion.shot.character import Array, IntArray
+from calmotion.model import InterfaceSurface
 from calmotion.support.naming import nearest
 from calmotion.usd import gf
 from calmotion.usd.reading.bodies.polygons import triangulate

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot import MassProperties
-from calmotion.shot.character import Array
+from calmotion.model import MassProperties
 from calmotion.usd import gf
 from calmotion.usd.reading.bodies.moments import Moments, sum_of, surface_moments
 from calmotion.usd.reading.bodies.primitives import TYPES

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError
-from calmotion.shot import ElasticMaterial
+from calmotion.model import ElasticMaterial
 from calmotion.usd import schemas
 from calmotion.usd.dialects import number_of
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below

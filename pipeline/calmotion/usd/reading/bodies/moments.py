@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.shot import MassProperties
-from calmotion.shot.character import Array, IntArray
+from calmotion.arrays import Array, IntArray
+from calmotion.model import MassProperties
 
 
 @dataclass(frozen=True, eq=False)

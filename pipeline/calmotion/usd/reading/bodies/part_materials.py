@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.geometry.tetrahedra import surface_volume
-from calmotion.shot import ElasticMaterial
-from calmotion.shot.materials.parts import Part
+from calmotion.mesh.tetrahedra import surface_volume
+from calmotion.model import ElasticMaterial
+from calmotion.model.materials.parts import Part
 from calmotion.usd.reading.bodies.materials import bound_elastic_material
 from calmotion.usd.reading.bodies.shapes import Shape
 from calmotion.usd.reading.context import Reading

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.shot.character import Array, BoolArray, IntArray
+from calmotion.arrays import Array, BoolArray, IntArray
 
 _TURN = 1e-6  # sine of the angle by which a corner may turn back in a polygon that counts as convex
 

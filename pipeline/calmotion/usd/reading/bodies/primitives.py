@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array, IntArray
 from calmotion.usd.reading.bodies.moments import Moments, together
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot import Body, SurfaceMesh
-from calmotion.shot.character import Array
+from calmotion.model import Body, SurfaceMesh
 from calmotion.usd.reading.bodies import primitives
 from calmotion.usd.reading.bodies.shapes import color_of, mesh_geometry
 from calmotion.usd.reading.context import Reading, is_rigid_body

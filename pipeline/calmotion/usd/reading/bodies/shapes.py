@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
-from calmotion.shot import SurfaceMesh, TetGeometry
-from calmotion.shot.character import Array, IntArray
+from calmotion.model import SurfaceMesh, TetGeometry
 from calmotion.usd import gf
 from calmotion.usd.reading.animated_transforms import moves_on_body
 from calmotion.usd.reading.bodies import primitives

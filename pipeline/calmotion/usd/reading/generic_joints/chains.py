@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calmotion.shot import Frame
-from calmotion.shot.character import Array
+from calmotion.arrays import Array
+from calmotion.model import Frame
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.generic_joints.freedoms import SEVERAL, TRANSLATIONS
 from calmotion.usd.reading.joints import HALF_TURN, JointPrim, axis_limits

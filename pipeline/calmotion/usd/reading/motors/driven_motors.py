@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.shot import Follows, Motor
+from calmotion.model import Follows, Motor
 from calmotion.usd import schemas
 from calmotion.usd.dialects import number_of
 from calmotion.usd.reading.actuators.motor_models import motor_model, read_gains

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calmotion.shot import FreeTrack, Motor
+from calmotion.model import FreeTrack, Motor
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot import MotorTracks, Track
-from calmotion.shot.character import Array
+from calmotion.model import MotorTracks, Track
 from calmotion.support.naming import nearest
 from calmotion.usd.reading.generic_joints import freedoms
 from calmotion.usd.reading.joints import JointPrim, joint_prims

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot import Track
-from calmotion.shot.character import Array, Frame
+from calmotion.model import Track
+from calmotion.model.character import Frame
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated_transforms import carriers, codes_of, has_splines, moves

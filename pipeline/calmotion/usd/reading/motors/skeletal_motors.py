@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.model import Track
 from calmotion.rigging.hinge_rows import follow
-from calmotion.shot import Track
-from calmotion.shot.character import Array
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated_transforms import moves

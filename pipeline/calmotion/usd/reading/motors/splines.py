@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot import Track
-from calmotion.shot.character import Array
+from calmotion.model import Track
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading
 
@@ -81,7 +81,7 @@ def _refined_codes(
     spline: Ts.Spline, codes: Array, breaks: Array, lines: list[tuple[float, float]], clock: Clock, to_si: float
 ) -> Array:
     """Time codes, refined where the track would differ from the spline by more than the tolerance, except in steps."""
-    from calmotion.shot.curves import held_curve
+    from calmotion.model.curves import held_curve
 
     end = float(clock.seconds(codes[-1]))
     for _ in range(_ROUNDS):

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot import Track
-from calmotion.shot.character import Array
-from calmotion.shot.curves import interpolate
+from calmotion.model import Track
+from calmotion.model.curves import interpolate
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.motors.splines import read_spline, value_at

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array
 from calmotion.usd import gf
 from calmotion.usd.reading.context import Reading, body_on
 from calmotion.usd.reading.joints import JointPrim

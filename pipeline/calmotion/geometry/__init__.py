@@ -1,1 +1,0 @@
-"""Surfaces and tetrahedra as geometry: closed surfaces, orientation, distances, solids."""

@@ -1,1 +1,0 @@
-"""Surfaces of triangles."""

@@ -1,0 +1,1 @@
+"""From what a link is made of to tetrahedra with interface patches."""

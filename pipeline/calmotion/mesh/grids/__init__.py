@@ -1,0 +1,1 @@
+"""Tetrahedra on a grid, for solids that TetWild does not fill."""

@@ -1,0 +1,1 @@
+"""Where joints and loads hold a link: interface patches."""

@@ -1,0 +1,1 @@
+"""Closed solids from surfaces with gaps, junctions and several parts."""

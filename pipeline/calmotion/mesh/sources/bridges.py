@@ -1,0 +1,152 @@
+"""Bridges across gaps between solids, such as those between parts of a CAD assembly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from calmotion.mesh.repair.closing import Part, connected_pieces
+from calmotion.mesh.repair.uniting import manifold_of, part_of
+from calmotion.mesh.sources.sampling import sampled
+
+NARROW, WIDE = 2e-3, 2e-2  # gaps across which triangles that face each other are joined, of the size of the body
+_SINK = 0.05  # overlap of a bridge with both sides, of the gap
+_SAMPLES = 4_000  # places on a solid between which a strut is sought
+_RADIUS, _SLENDER = 0.02, 0.3  # least radius of a strut, of the size and of the gap
+# Extent of the bridges of a solid, of its own, below which it would swing on them; how far from its first strut another
+# one is, of its extent, and the widest gap there, of the size
+_SPREAD, _APART, _REACH = 0.3, 0.5, 0.1
+
+
+def bridged(solids: Sequence[Part], largest: float = NARROW) -> tuple[Part | None, float]:
+    """The union of solids across gaps, and the widest of these gaps.
+
+    Each triangle that faces another solid across a narrow gap is extruded to a prism up to that solid. Across wider
+    gaps only triangles of the smaller solid are: a large triangle of the other one would thicken it.
+
+    Args:
+        solids: Disjoint, outward, in units of the size of the body.
+        largest: Gap that is bridged, of the size of the body.
+
+    Returns:
+        None instead of the union where it is not connected.
+    """
+    import manifold3d
+
+    prisms: list[np.ndarray] = []
+    widest = 0.0
+    for k, solid in enumerate(solids):
+        x = solid.points[solid.triangles]
+        begun = len(prisms)
+        for other in [other for i, other in enumerate(solids) if i != k]:
+            if largest > NARROW and solid.volume > other.volume:
+                continue
+            for i, gap in _near(x, other.points[other.triangles], largest):
+                widest = max(widest, gap)
+                normal = np.cross(x[i, 1] - x[i, 0], x[i, 2] - x[i, 0])
+                normal /= np.linalg.norm(normal)
+                sink = _SINK * gap + 1e-7
+                prisms.append(np.vstack([x[i] - sink * normal, x[i] + (gap + sink) * normal]))
+        if largest > NARROW and begun < len(prisms):
+            if _extent(np.vstack(prisms[begun:])) < _SPREAD * _extent(solid.points):
+                return None, 0.0
+    if not prisms:
+        return None, 0.0
+    made = [manifold3d.Manifold.hull_points(np.ascontiguousarray(prism)) for prism in prisms]
+    whole = manifold3d.Manifold.batch_boolean([*(manifold_of(s) for s in solids), *made], manifold3d.OpType.Add)
+    part = part_of(whole)
+    return (part if len(_solids(part)) == 1 else None), widest
+
+
+def strutted(solids: Sequence[Part]) -> tuple[Part, float]:
+    """The union of solids across gaps of any width, by struts between the nearest places of each and of the largest.
+
+    A solid that is held at one end by what was invented would swing on it, as a rod in the legs of Barkour in their
+    second and third mode: it gets another strut at its other end.
+
+    Args:
+        solids: Disjoint, outward, in units of the size of the body, the largest first.
+
+    Returns:
+        The union, and the widest gap.
+    """
+    import manifold3d
+    from scipy.spatial import cKDTree
+
+    places, normals = (list(values) for values in zip(*(sampled(solid, _SAMPLES) for solid in solids), strict=True))
+    whole, widest, struts = [0], 0.0, []
+    left = list(range(1, len(solids)))
+    while left:
+        tree = cKDTree(np.vstack([places[k] for k in whole]))
+        distances, found = zip(*(tree.query(places[k]) for k in left), strict=True)
+        nearest = int(np.argmin([d.min() for d in distances]))
+        k, gaps, facing = left[nearest], distances[nearest], tree.data[found[nearest]]
+        i = int(gaps.argmin())
+        widest = max(widest, float(gaps[i]))
+        ends = [i]
+        far = np.linalg.norm(places[k] - places[k][i], axis=1) > _APART * _extent(places[k])
+        if far.any() and gaps[far].min() < _REACH:
+            ends.append(int(np.flatnonzero(far)[gaps[far].argmin()]))
+        for end in ends:
+            gap = float(gaps[end])
+            near = [(places[k], normals[k], places[k][end]), *((places[j], normals[j], facing[end]) for j in whole)]
+            struts.append(_strut(near, gap))
+        whole.append(k)
+        left.remove(k)
+    united = manifold3d.Manifold.batch_boolean([*(manifold_of(s) for s in solids), *struts], manifold3d.OpType.Add)
+    return part_of(united), widest
+
+
+def _strut(near: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], gap: float) -> Any:
+    """The hull of places within a radius of a center on either side of a gap, and below them.
+
+    Args:
+        near: Places and outward normals on a solid, shape [n, 3], and the center, for both sides.
+        gap: Between the centers.
+    """
+    import manifold3d
+
+    radius, corners = max(_RADIUS, _SLENDER * gap), []
+    for points, outward, center in near:
+        inside = np.linalg.norm(points - center, axis=1) <= radius
+        corners += [points[inside], points[inside] - (_SINK * gap + 1e-4) * outward[inside]]
+    return manifold3d.Manifold.hull_points(np.ascontiguousarray(np.vstack(corners)))
+
+
+def _extent(points: np.ndarray) -> float:
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def _solids(part: Part) -> list[Part]:
+    return [piece for piece in connected_pieces(part.points, part.triangles) if piece.volume > 1e-12]
+
+
+def _near(x: np.ndarray, facing: np.ndarray, largest: float) -> list[tuple[int, float]]:
+    """Triangles with another solid within the largest gap, along the normal at their center: index and distance."""
+    from calmotion.mesh.surfaces.distances import ray_length
+
+    low, high = x.min(axis=(0, 1)) - largest, x.max(axis=(0, 1)) + largest
+    facing = facing[((facing.max(axis=1) > low) & (facing.min(axis=1) < high)).all(axis=1)]
+    if len(facing) == 0:
+        return []
+    low, high = facing.min(axis=(0, 1)) - largest, facing.max(axis=(0, 1)) + largest
+    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    inside = ((x.max(axis=1) > low) & (x.min(axis=1) < high)).all(axis=1) & (length > 0.0)
+    near = []
+    boxes_low, boxes_high = facing.min(axis=1), facing.max(axis=1)
+    for i in np.flatnonzero(inside):
+        n = normal[i] / length[i]
+        middle = x[i].mean(axis=0)
+        # only triangles whose boxes the ray can hit: testing all of them would take quadratic time
+        end = middle + largest * n
+        candidates = (
+            (boxes_high >= np.minimum(middle, end) - 1e-9) & (boxes_low <= np.maximum(middle, end) + 1e-9)
+        ).all(1)
+        if candidates.any():
+            gap = ray_length(middle - 1e-7 * n, n, facing[candidates], 0.0)
+            if gap <= largest:
+                near.append((int(i), gap))
+    return near

@@ -1,0 +1,1 @@
+"""Closed surfaces of triangles: distances, sides, slits, likeness, decimation."""

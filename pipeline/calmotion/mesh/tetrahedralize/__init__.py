@@ -1,0 +1,1 @@
+"""Tetrahedra that fill a closed solid."""

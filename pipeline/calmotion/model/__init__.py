@@ -1,0 +1,87 @@
+"""What a shot is, as plain data in SI units: read by plugins, solved by the engine, written by plugins."""
+
+from calmotion.model.animation import (
+    Animation,
+    FreeTrack,
+    MotorTracks,
+    MovingFrame,
+    Track,
+    WeightTrack,
+)
+from calmotion.model.character import (
+    WORLD,
+    Body,
+    Character,
+    ElasticMaterial,
+    FlexibleSettings,
+    Frame,
+    InterfaceSurface,
+    Joint,
+    MassProperties,
+    RetargetSettings,
+    SurfaceMesh,
+    Target,
+    TetGeometry,
+)
+from calmotion.model.meshes import FEMesh, FEMeshes, MeshQuality
+from calmotion.model.model_choice import ModelChoice, ModelChoices
+from calmotion.model.motor import Follows, Motor
+from calmotion.model.outputs import Finding, Findings
+from calmotion.model.provenance import InputLayer, Provenance
+from calmotion.model.result import (
+    Accuracy,
+    LimitUse,
+    ModeTable,
+    Motion,
+    MotorCurve,
+    OptimizerStep,
+    Result,
+    Simplification,
+    Simulation,
+    Skin,
+    WindowRow,
+)
+
+__all__ = [
+    "WORLD",
+    "Accuracy",
+    "Animation",
+    "Body",
+    "Character",
+    "ElasticMaterial",
+    "FEMesh",
+    "FEMeshes",
+    "FlexibleSettings",
+    "Finding",
+    "Findings",
+    "Follows",
+    "Frame",
+    "FreeTrack",
+    "InputLayer",
+    "InterfaceSurface",
+    "Joint",
+    "Simplification",
+    "LimitUse",
+    "MassProperties",
+    "MeshQuality",
+    "ModeTable",
+    "Motion",
+    "Motor",
+    "MotorCurve",
+    "MotorTracks",
+    "MovingFrame",
+    "ModelChoice",
+    "ModelChoices",
+    "OptimizerStep",
+    "Provenance",
+    "Result",
+    "RetargetSettings",
+    "Simulation",
+    "Skin",
+    "SurfaceMesh",
+    "Target",
+    "TetGeometry",
+    "Track",
+    "WeightTrack",
+    "WindowRow",
+]

@@ -1,0 +1,122 @@
+"""The animation of a shot: a sampled track for each motor, and the frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from calmotion.arrays import Array, BoolArray
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The authored samples of one motor.
+
+    Attributes:
+        times: [s] after the first frame of the shot, strictly increasing, shape [k]. May start before 0 or end
+            after the last frame when the animation does.
+        values: [rad] (or [m] of a length motor), shape [k], not wrapped.
+        corners: Times among these at which the curve may have a corner, as a spline was authored; smooth elsewhere.
+    """
+
+    times: Array
+    values: Array
+    corners: Array = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
+class MotorTracks:
+    """Tracks that are given in addition to the shot, such as a motion capture.
+
+    Attributes:
+        origin: Where they come from, for messages.
+        times: [s] after the first frame of the shot, strictly increasing, shape [k].
+        values: [rad or m] by the path of the motor's joint, or by its name where that is the only one, shape [k].
+    """
+
+    origin: str
+    times: Array
+    values: Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class MovingFrame:
+    """The world-side frame of a joint, where the shot moves it (a moving root).
+
+    Attributes:
+        joint: Index of the joint.
+        times: [s] after the first frame of the shot, strictly increasing, shape [k].
+        positions: [m], world, shape [k, 3].
+        rotations: Unit quaternions (w, x, y, z), world, neighbours of the same sign, shape [k, 4].
+    """
+
+    joint: int
+    times: Array
+    positions: Array
+    rotations: Array
+
+
+@dataclass(frozen=True, eq=False)
+class WeightTrack:
+    """How a weight of a target changes in time, linear between samples and held outside them.
+
+    Attributes:
+        target: Index of the target.
+        rotation: Whether it is the weight of the rotation instead of the position.
+        times: [s] after the first frame of the shot, strictly increasing, shape [k].
+        values: Weights, not negative, shape [k].
+    """
+
+    target: int
+    rotation: bool
+    times: Array
+    values: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FreeTrack:
+    """When a motor's curve may be changed.
+
+    Attributes:
+        motor: Index of the motor.
+        times: [s] after the first frame of the shot, strictly increasing, shape [k].
+        free: Whether it may be changed from each time on, and before the first as from it, shape [k], bool.
+    """
+
+    motor: int
+    times: Array
+    free: BoolArray
+
+    def locked(self, end: float) -> list[tuple[float, float]]:
+        """The ranges of the shot, up to its end [s], in which the curve is kept."""
+        starts = [-np.inf, *self.times[1:]]
+        ends = [*self.times[1:], np.inf]
+        return [
+            (max(start, 0.0), min(stop, end))
+            for start, stop, free in zip(starts, ends, self.free, strict=True)
+            if not free and start < end and stop > 0.0
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class Animation:
+    """The motion of a shot.
+
+    Attributes:
+        frame_times: Times of the shot's frames [s] after the first one, shape [f], first 0.
+        tracks: One for each motor of the character, in its order: the intended motion.
+        current: The tracks with earlier results applied, where the shot carries results of Calmotion
+            (`simulate`, the start of `optimize`); otherwise the same object as `tracks`.
+        moving: Moving roots, none for a character with a fixed root.
+        weights: Weights of targets that change in time; the others are those of `Target`.
+        free: When motors may be changed, where that changes in time.
+    """
+
+    frame_times: Array
+    tracks: tuple[Track, ...]
+    current: tuple[Track, ...]
+    moving: tuple[MovingFrame, ...] = ()
+    weights: tuple[WeightTrack, ...] = ()
+    free: tuple[FreeTrack, ...] = ()

@@ -1,0 +1,83 @@
+"""Recordings of a performance on the real robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.arrays import Array
+
+MARKER, ACCELEROMETER, ANGLE, EFFORT = "marker", "accelerometer", "angle", "effort"  # kinds of channels
+COMPONENTS = {MARKER: 3, ACCELEROMETER: 3, ANGLE: 1, EFFORT: 1}
+UNITS = {MARKER: "m", ACCELEROMETER: "m/s^2", ANGLE: "rad or m", EFFORT: "N m or N"}
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One measured quantity, on the clock of its recording.
+
+    Attributes:
+        kind: MARKER: position of a prim [m], world; ACCELEROMETER: specific force R^T (a - g) at a prim in its axes
+            [m/s^2]; ANGLE: value of a joint [rad or m]; EFFORT: of its motor [N m or N].
+        path: Prim path of the prim or of the joint.
+        times: [s], strictly increasing, shape [n].
+        values: Shape [n, c], c = 3 or 1; NaN where a sample is missing.
+        sigma: Standard deviation of the noise; None: estimated from the samples.
+    """
+
+    kind: str
+    path: str
+    times: Array
+    values: Array
+    sigma: float | None = None
+
+    @property
+    def name(self) -> str:
+        """Kind and path."""
+        return f"{self.kind} {self.path}"
+
+
+@dataclass(frozen=True, eq=False)
+class SensorRecording:
+    """What one device recorded, on one clock.
+
+    Attributes:
+        file: Its file, as it was given.
+        sha256: Of the file.
+        channels: What was measured.
+        notes: What the reader noticed, as sentences.
+    """
+
+    file: str
+    sha256: str
+    channels: tuple[Channel, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def start(self) -> float:
+        """Time of the first sample [s]."""
+        return float(min(channel.times[0] for channel in self.channels))
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample [s]."""
+        return float(max(channel.times[-1] for channel in self.channels))
+
+    @property
+    def samples(self) -> int:
+        """Number of values that are not missing."""
+        return int(sum(np.isfinite(channel.values).sum() for channel in self.channels))
+
+
+@dataclass(frozen=True)
+class RecordingRequest:
+    """A recording that is to be read.
+
+    Attributes:
+        file: Its file.
+        prim: Prim path of the sensor, for files that do not name it; empty where none was given.
+    """
+
+    file: str
+    prim: str = ""

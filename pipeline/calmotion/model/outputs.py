@@ -1,0 +1,201 @@
+"""Values that travel between the command line, the host and plugins, beside those of `calmotion.model`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from calmotion.arrays import Array
+    from calmotion.model.animation import Track
+    from calmotion.model.result import Simplification
+
+ERROR, WARNING = "error", "warning"  # levels of a `Finding`
+
+
+@dataclass(frozen=True)
+class WrittenLayer:
+    """Paths of the layer of overs and of the root layer that opens it with the shot."""
+
+    layer: str
+    root: str
+
+
+@dataclass(frozen=True)
+class RiggedJoint:
+    """The robot's part for one joint of a skeleton: its body, its motors, and the residual angle [rad] between the
+    animation and the motors."""
+
+    joint: str
+    body: str
+    motors: tuple[str, ...]
+    off: float
+
+
+@dataclass(frozen=True)
+class Rig:
+    """The robot that is made from a skinned character.
+
+    Attributes:
+        layer: Path of the layer, which opens with the shot beneath it.
+        robot: Prim path of the robot.
+        joints: The joints of the skeleton with their motors.
+        bodies: Number of bodies, servos included.
+        mass: Of all of them [kg].
+        targets: Prim paths.
+        flexible: Prim paths of the flexible bodies.
+    """
+
+    layer: str
+    robot: str
+    joints: tuple[RiggedJoint, ...]
+    bodies: int
+    mass: float
+    targets: tuple[str, ...]
+    flexible: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Path of a rerun recording."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class CsvFile:
+    """Path of a table."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Paths of the figures."""
+
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class CalibrationFigures:
+    """Paths of the figures of a calibration."""
+
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Video:
+    """Path of a video."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class ModeShapes:
+    """Paths of the files that show the modes of the flexible bodies."""
+
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ShapedTracks:
+    """The motors' tracks after an input shaper or a filter, in the motors' order."""
+
+    tracks: tuple[Track, ...]
+
+
+@dataclass(frozen=True)
+class Verification:
+    """A run compared with a finer one of the same curves.
+
+    Attributes:
+        error_m: Largest distance between a target in both runs, over all frames [m].
+        step_s: Step of the finer run [s].
+        modes: Its elastic coordinates.
+        mesh_m: Estimated error of its meshes at the targets [m], by which the distance may be too small.
+        parts: Number of parts in time in which it was simulated.
+        gap_m: Largest distance of a target between two parts where one takes over [m]; the distance may be too small
+            by it.
+    """
+
+    error_m: float
+    step_s: float
+    modes: int
+    mesh_m: float = 0.0
+    parts: int = 1
+    gap_m: float = 0.0
+
+    @property
+    def bound_m(self) -> float:
+        """What the error of the run is at most, as far as is known [m]."""
+        return self.error_m + self.mesh_m + self.gap_m
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedStep:
+    """The time step of a simulation of the shot, as a row of the simplifications."""
+
+    row: Simplification
+
+
+@dataclass(frozen=True, eq=False)
+class MotorEffects:
+    """What the animation does if motors give by their gains, and if they are ideal; links are flexible in both.
+
+    Attributes:
+        motors: Paths of the motors that have gains.
+        lag: Largest error of each target [m], shape [K].
+        droop: Its error at rest at the start [m], shape [K].
+        ideal_lag, ideal_droop: The same with ideal motors.
+    """
+
+    motors: tuple[str, ...]
+    lag: Array
+    droop: Array
+    ideal_lag: Array
+    ideal_droop: Array
+
+
+@dataclass(frozen=True, eq=False)
+class SystemModes:
+    """Natural modes of the whole character in one pose of the shot, motors held.
+
+    Attributes:
+        frequencies: [Hz], ascending.
+        damping: Their ratios of critical.
+        time_s: When the shot has this pose [s].
+    """
+
+    frequencies: Array
+    damping: Array
+    time_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An error or a warning about a shot.
+
+    Attributes:
+        level: `error` (the shot cannot be processed, or USD calls it invalid) or `warning`.
+        rule: Which rule found it, such as `usdPhysicsValidators:RigidBodyChecker`.
+        path: Prim path, or file.
+        attribute: Attribute or relationship, or empty.
+        problem: As a sentence without a full stop.
+        found: The value that was found, or empty.
+        remedy: What to do, or empty where the rule is not ours and does not say.
+    """
+
+    level: str
+    rule: str
+    path: str
+    attribute: str
+    problem: str
+    found: str = ""
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All of them, errors first."""
+
+    items: tuple[Finding, ...]

@@ -1,0 +1,102 @@
+"""Input of the user: the command, the settings of the run, and the files to write."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from calmotion.model.budget import SEARCH_SHARE
+from calmotion.model.robust.settings import RobustSettings
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """What the user chose for simulations and searches; None leaves a choice to the shot or to the program.
+
+    Attributes:
+        tolerance: Acceptable error at the targets [m].
+        step: Time step [s].
+        pre_roll: Length of the pre-roll [s].
+        integrator: Name of the integrator.
+        knot_spacing: Distance of the knots of the offsets [s].
+        smoothness: Weight of the second derivative of the offsets.
+        max_iterations: Largest number of Gauss-Newton iterations.
+        least_gain: A smaller predicted gain ends the search, a part of the tolerance.
+        adjoint: `discrete` or `continuous`.
+        ranges: `auto`, `on` (the whole shot is searched) or `off` (inactive intervals are not checked at the end).
+        motors: `auto`, `on` (every motor may change) or `off` (idle motors are not checked at the end).
+        ideal_motors: Whether joints follow their curves exactly, whatever the models of their motors say.
+        directions: `auto`, `on` (bodies keep all coordinates) or `off` (the smallest POD subspaces at any error).
+        window: Length of the windows in which a long shot is searched [s]; 0: one search; None: by its length.
+        avoid_reversals: Weight of the squared ways of the targets across the play of gears, over squared errors; 0:
+            play does not count.
+        robust: Settings of an optimisation for a set of robots; None: for the nominal robot alone.
+    """
+
+    tolerance: float | None = None
+    step: float | None = None
+    pre_roll: float | None = None
+    integrator: str | None = None
+    knot_spacing: float | None = None
+    smoothness: float | None = None
+    max_iterations: int = 30
+    least_gain: float = SEARCH_SHARE
+    adjoint: str = "discrete"
+    ranges: str = "auto"
+    motors: str = "auto"
+    ideal_motors: bool = False
+    directions: str = "auto"
+    robust: RobustSettings | None = None
+    window: float | None = None
+    avoid_reversals: float = 0.0
+
+    @property
+    def scheme(self) -> str:
+        """The integrator of a simulation for which none is chosen."""
+        return self.integrator or "bdf2"
+
+
+LONG_SHOT = 30.0  # a longer one is searched in windows unless the user says otherwise [s]
+WINDOW = 10.0  # length of a window's kept part [s]
+WINDOW_OVERLAP = 0.25  # most, of the length of a window
+INTEGRATORS = ("bdf2", "newmark", "generalized-alpha", "rk4", "radau")
+SHAPERS = ("zv", "zvd", "zv2", "zvd2", "lowpass")  # input shapers and a filter
+
+
+@dataclass(frozen=True)
+class Source:
+    """The shot and what is to be done with it.
+
+    Attributes:
+        path: The shot.
+        command: `inspect`, `simulate` or `optimize`.
+        settings: Of simulations and searches.
+        shaper: Input shaper or filter through which `simulate` passes the motors' tracks first, or None.
+        motion: File with a motion that replaces tracks of motors, or None.
+        verify: Whether the result is to be compared with a finer run.
+        measured: Prims at which sensors measured, which are targets as well.
+    """
+
+    path: str
+    command: str
+    settings: RunSettings = field(default_factory=RunSettings)
+    shaper: str | None = None
+    motion: str | None = None
+    verify: bool = False
+    measured: tuple[str, ...] = ()
+
+    @property
+    def refines(self) -> bool:
+        """Whether the reduction of the bodies is refined until the motion keeps the tolerance."""
+        return self.command != "inspect"
+
+
+@dataclass(frozen=True)
+class OutputPaths:
+    """Where the results go; None: not requested."""
+
+    layer: str | None = None
+    rrd: str | None = None
+    csv: str | None = None
+    figures: str | None = None
+    video: str | None = None
+    modes: str | None = None

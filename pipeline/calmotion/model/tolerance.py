@@ -1,0 +1,76 @@
+"""The tolerance of a shot: the user's, the shot's, or a share of how far the character reaches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.arrays import Array
+from calmotion.model.character import WORLD, Character, Joint
+
+SHARE_OF_REACH = 1e-3
+SMALLEST = 1e-6  # of a character without extent [m]
+
+
+def tolerance_of(character: Character, requested: float | None = None) -> float:
+    """Acceptable error at the targets [m]: the requested one, else the shot's, else a thousandth of the reach."""
+    return requested or character.retarget.tolerance or max(SHARE_OF_REACH * reach(character), SMALLEST)
+
+
+def reach(character: Character) -> float:
+    """Length of the longest chain from the base to a target: from joint to joint, and the travel of its sliders [m].
+
+    Joints that close chains do not count. A robot that floats reaches from its feet. Without targets it is the distance
+    to the farthest joint.
+    """
+    nodes, far = _distances(character)
+    ends = [
+        nodes[target.body][0] + _length(target.frame.position - nodes[target.body][1])
+        for target in character.targets
+        if target.body in nodes
+    ]
+    return max(ends, default=far)
+
+
+def _distances(character: Character) -> tuple[dict[int, tuple[float, Array]], float]:
+    """For each body, the distance from the base to the joint that carries it and that joint's place in the body."""
+    ends: dict[int, list[tuple[Joint, int]]] = {}
+    floats = any(joint.kind == "floating" for joint in character.joints)
+    for joint in character.joints:
+        if joint.contact is not None:
+            counts = floats
+        else:
+            counts = not (joint.kind == "floating" or joint.closes_chain or joint.redundant)
+        if counts:
+            ends.setdefault(joint.body0, []).append((joint, 0))
+            ends.setdefault(joint.body1, []).append((joint, 1))
+    nodes: dict[int, tuple[float, Array]] = {}
+    far = 0.0
+    # bodies that nothing joins to the world float: the first of each such group is its base
+    for base in (WORLD, *range(len(character.bodies))):
+        if base in nodes:
+            continue
+        nodes[base] = (0.0, np.zeros(3))
+        waiting = [base]
+        while waiting:
+            body = waiting.pop(0)
+            distance, entered = nodes[body]
+            for joint, side in ends.get(body, []):
+                places = (joint.frame0.position, joint.frame1.position)
+                other = (joint.body1, joint.body0)[side]
+                if other in nodes:
+                    continue
+                # the world's joints are the base, wherever they are
+                step = 0.0 if body == WORLD else _length(places[side] - entered)
+                nodes[other] = (distance + step + _travel(joint), places[1 - side])
+                far = max(far, nodes[other][0])
+                waiting.append(other)
+    return nodes, far
+
+
+def _travel(joint: Joint) -> float:
+    travel = joint.upper - joint.lower
+    return travel if joint.kind == "prismatic" and np.isfinite(travel) else 0.0
+
+
+def _length(vector: Array) -> float:
+    return float(np.linalg.norm(vector))

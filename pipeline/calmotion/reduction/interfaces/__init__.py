@@ -1,1 +1,0 @@
-"""Interface patches: the parts of a surface to which joints are attached, and their motion."""

@@ -1,0 +1,1 @@
+"""Meshes that are as fine as the tolerance asks for."""

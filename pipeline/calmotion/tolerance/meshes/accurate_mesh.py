@@ -1,0 +1,191 @@
+"""Meshes that are accurate enough for the first frequencies, and what is said about their accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.mesh.element_size import ACCURACY, envelope
+from calmotion.mesh.tetrahedra import tet_volumes
+from calmotion.mesh.tetrahedralize.filling import INTERSECTS, MAX_VOLUME_ERROR, filled
+from calmotion.mesh.tetrahedralize.tetwild import ProcessorTime
+from calmotion.model import (
+    Body,
+    Character,
+    FEMesh,
+    Frame,
+)
+from calmotion.model.materials.parts import Part
+from calmotion.model.meshes import MeshQuality
+
+if TYPE_CHECKING:
+    from calmotion.mesh.parts.makeup import Makeup
+    from calmotion.mesh.patches.interface_patches import AttachmentFrame
+    from calmotion.tolerance.meshes.body_mesh import MeshOptions, Volume
+    from calmotion.tolerance.meshes.mesh_refinement import Effort
+
+# The estimate is 1.2 to 3 times the true error of clamped beams and plates on meshes that are nearly fine enough, and
+# larger for links with many edges (see `calmotion bench meshing`). Twice the wanted error is therefore accepted.
+ENOUGH = 2.0 * ACCURACY
+# Nodes of a mesh at most, for some seconds; where the shot needs more, it is refined for its loads
+_REFINED = 12_000
+# Error that the extrapolation of the frequencies is estimated to leave, from which more nodes are spent: at least and
+# at most so many, and in between so many that meshing and refinement together take some 20 s (3.3 ms for each triangle
+# of the surface and 0.2 ms for each node)
+_POOR, _POOR_REFINED = 0.015, (40_000, 60_000)
+_IN_TIME, _OF_TRIANGLE = 100_000, 16.5
+# Error of the frequencies, that of the volume included, for which a mesh may take minutes, and its nodes at most: nine
+# of 160 links need it, most of all arms of many thin webs, whose frequencies are 8 to 30% too high with 30,000 nodes
+_BAD, _BAD_REFINED = 0.019, 250_000
+_KEPT = 22_000  # nodes of the mesh that takes the stiffness of these, where one factor is enough
+# Relative error of the squares of frequencies that a solver may leave on surfaces of more triangles than these: of the
+# G1's wrist 40% fewer steps, with frequencies that differ by 0.07% where 1.6% are estimated
+_ALGEBRAIC, _DETAILED = 3e-4, 2_000
+_LONGER = 1.5  # factor of the element size where a surface has many details: they are refined where it matters
+_FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
+# Error of the frequencies by what a mesh leaves out of its surface, from which another one follows it within half the
+# distance; and factor of the detail that a dense surface keeps then. A leg of Barkour had 189.7 Hz in its third mode,
+# with 3.9% estimated, and has 196.0 Hz with 2.1%; with 8,000 triangles, 196.2 Hz and 1.5%
+_LEFT_OUT, _CLOSER, _DETAIL = 0.01, 0.5, 2.0
+_SAME_MASS, _HOLLOW = 0.05, 0.7  # difference that is reported; ratio below which a body may be hollow
+
+
+def accurate(
+    index: int, body: Body, volume: Volume, size: float, options: MeshOptions, carrier: Frame | None,
+    attachments: Sequence[AttachmentFrame],
+) -> FEMesh:  # fmt: skip
+    """Tetrahedra fine enough for the first frequencies; where the shot needs more, they are refined for its loads.
+
+    Args:
+        index, body, options, attachments: As of `mesh_of`.
+        volume: To fill.
+        size: Of the elements before they are refined [m].
+        carrier: Frame of the joint to the parent, body frame.
+    """
+    from calmotion.tolerance.meshes.mesh_refinement import refined_for_frequencies
+
+    time = ProcessorTime(options.time_limit)
+
+    def made(volume: Volume) -> FEMesh:
+        mesh = filled(index, body, volume.solid, volume.shape, size, time, options.cache, _LONGER)
+        return shaped_to(volume, size, mesh, body, attachments)
+
+    def refined(mesh: FEMesh, shape: float = np.inf) -> FEMesh:
+        effort = replace(effort_after(time.triangles), shape=shape)
+        return refined_for_frequencies(mesh, body, carrier, effort, attachments)
+
+    first = made(volume)
+    mesh = refined(first, 2.0 * _LEFT_OUT)
+    if mesh.quality.shape_error > _LEFT_OUT:
+        shape = replace(volume.shape, envelope_factor=_CLOSER * volume.shape.envelope_factor, detail=_DETAIL)
+        with suppress(ShotError):  # it takes too long
+            closer = made(replace(volume, shape=shape))
+            first = closer if closer.quality.volume_error <= MAX_VOLUME_ERROR else first
+        mesh = refined(first)
+    repairs = (*mesh.quality.repairs, *remark(mesh.quality))
+    return replace(mesh, quality=replace(mesh.quality, repairs=repairs))
+
+
+def shaped_to(
+    volume: Volume, size: float, mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame]
+) -> FEMesh:  # fmt: skip
+    """The mesh of a volume with elements of a size [m], which follows its surface in the mean."""
+    from calmotion.mesh.mesh_shaping import Surface, shaped
+
+    solid, shape = volume.solid, volume.shape
+    diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    limit = _FIT * envelope(size, diagonal, shape, len(solid.triangles), 0)
+    return shaped(mesh, body, Surface(solid.points, solid.triangles, solid.volume, limit), attachments)
+
+
+def effort_after(triangles: int) -> Effort:
+    """How far the mesh of a surface is refined for the first frequencies.
+
+    Args:
+        triangles: Of the surfaces that were meshed for it.
+    """
+    from calmotion.tolerance.meshes.mesh_refinement import Effort
+
+    least, most = _POOR_REFINED
+    poor = int(min(max(_IN_TIME - _OF_TRIANGLE * triangles, least), most))
+    effort = Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, poor, _KEPT, bad=2.0 * _BAD, bad_nodes=_BAD_REFINED)
+    return replace(effort, algebraic=_ALGEBRAIC) if triangles > _DETAILED else effort
+
+
+def frames_of(character: Character, index: int) -> tuple[Frame, ...]:
+    """Frames on a body of its joints, body frame, that of the joint to its parent first."""
+    carrying = [joint.frame1 for joint in character.joints if joint.body1 == index]
+    return (*carrying, *(joint.frame0 for joint in character.joints if joint.body0 == index))
+
+
+def volume_note(quality: MeshQuality) -> tuple[str, ...]:
+    """Message about a mesh whose volume, after it was fitted to its surface, is not that of the surface."""
+    if quality.volume_error <= MAX_VOLUME_ERROR or INTERSECTS in quality.repairs:
+        return ()
+    return (f"its volume differs from that of the surface by {100.0 * quality.volume_error:.2g}%",)
+
+
+def mass_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
+    """Message about a stated mass that is not that of the solid and its material; the density follows the mass."""
+    if body.mass is None or body.flexible is None:
+        return ()
+    material = body.flexible.material
+    if material.core is not None or material.parts:
+        return ()  # see `makeup_note`
+    ratio = body.mass.mass / (material.density * mesh.quality.volume)
+    if abs(ratio - 1.0) <= _SAME_MASS:
+        return ()
+    note = (
+        f"the shot states a mass of {body.mass.mass:.3g} kg, {ratio:.2g} times that of its volume and material: "
+        f"its density is {material.density * ratio:.4g} instead of {material.density:.4g} kg/m^3"
+    )
+    return (note + ("; if it is hollow, author calm:flexible:wallThickness" if ratio < _HOLLOW else ""),)
+
+
+def makeup_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
+    """Message about what a body of several materials is taken for, and about a stated mass that is not that of it."""
+    from calmotion.mesh.parts.makeup import makeup_of
+
+    makeup = None if body.flexible is None else makeup_of(mesh.points, mesh.tets, body.flexible.material)
+    if body.flexible is None or makeup is None:
+        return ()
+    material, core = body.flexible.material, body.flexible.material.core
+    mass = float(material.density * (tet_volumes(mesh.points, mesh.tets) @ makeup.density))
+    note = parts_note(material.parts, mesh, makeup) if core is None else (
+        f"printed: a solid skin of {1e3 * core.skin:.3g} mm around {100.0 * core.infill:.3g}% infill with "
+        f"{100.0 * core.stiffness:.2g}% of the modulus (Hashin-Shtrikman); its mass is "
+        f"{100.0 * mass / (material.density * mesh.quality.volume):.3g}% of that of a solid part, {mass:.3g} kg"
+    )  # fmt: skip
+    if body.mass is not None and abs(body.mass.mass / mass - 1.0) > _SAME_MASS:
+        note += (
+            f", where the shot states {body.mass.mass:.3g} kg: densities are {body.mass.mass / mass:.3g} times those"
+        )
+    return (note,)
+
+
+def parts_note(parts: Sequence[Part], mesh: FEMesh, makeup: Makeup) -> str:
+    """What of a body is of which material."""
+    held = makeup.parts
+    assert held is not None
+    volumes = tet_volumes(mesh.points, mesh.tets) / held.shape[1]
+    shares = np.bincount(held.ravel(), np.repeat(volumes, held.shape[1]), len(parts)) / mesh.quality.volume
+    by_material: dict[str, float] = {}
+    for part, share in zip(parts, shares, strict=True):
+        by_material[part.material] = by_material.get(part.material, 0.0) + float(share)
+    told = ", ".join(f"{100.0 * share:.3g}% {path}" for path, share in by_material.items())
+    return f"{len(parts)} parts of {len(by_material)} materials: {told} of its volume"
+
+
+def remark(quality: MeshQuality) -> tuple[str, ...]:
+    """Message about a mesh that is less accurate than wanted."""
+    if quality.error is None or quality.error <= ENOUGH:
+        return ()
+    return (
+        f"estimated error of the first frequencies: {100.0 * quality.error:.2g}%, "
+        f"more than {100.0 * ENOUGH:.2g}%: author a smaller calm:flexible:elementSize to reduce it",
+    )

@@ -1,0 +1,117 @@
+"""How far motors that give move the targets: by the gains that a shot carries, and their part of its error."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from calmotion.arrays import Array
+from calmotion.errors import ShotError
+from calmotion.model import Result
+from calmotion.model.character import Character, motors_give, with_ideal_motors
+from calmotion.model.motor import PRESCRIBED
+from calmotion.model.outputs import MotorEffects
+from calmotion.model.result import ErrorShares
+from calmotion.model.run import RunSettings
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.model.model import Model, rigid_model, with_drives
+from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
+from calmotion.simulation.cyclic import SteadyState
+from calmotion.simulation.forward import run_forward
+from calmotion.simulation.inputs.curves import sample_tracks
+from calmotion.simulation.prepare import Prepared, failure_error, prepare
+from calmotion.simulation.simulate import Progress, intended_motion
+from calmotion.tolerance.integrator_choice import by_fast_scheme
+from calmotion.tolerance.simulate_to_tolerance import own_step
+
+
+def with_gains_used(character: Character) -> Character:
+    """The character with every ideal motor that has gains as a drive, or as a servo where its rotor is known."""
+    return replace(character, motors=tuple(replace(m, model=m.model_of_gains) for m in character.motors))
+
+
+def effects_of_gains(shot: CompiledShot, options: RunSettings) -> MotorEffects | None:
+    """What the gains that a shot carries would do to its animation; None where it has none, or where the robot would
+    not follow it.
+
+    Args:
+        shot: Its motors may be ideal.
+        options: Of the run.
+
+    Raises:
+        ShotError: The shot cannot be simulated.
+    """
+    character = with_gains_used(shot.character)
+    if not motors_give(character):
+        return None
+    options = replace(options, step=own_step(character, options))
+    prepared = prepare(shot, options)
+
+    def simulated(model: Model, options: RunSettings) -> Array:
+        try:
+            return _errors(prepared, model, options)
+        except SimulationFailure as failure:
+            raise failure_error(prepared, failure) from failure
+
+    found = []
+    for model in (_giving_model(shot, character), _with_ideal_motors(shot)):
+        try:
+            errors = by_fast_scheme(options, partial(simulated, model))
+        except ShotError:
+            return None
+        lag = errors[prepared.grid.judged].max(axis=0, initial=0.0)
+        found += [lag, np.zeros_like(lag) if prepared.grid.cyclic else errors[0]]
+    return MotorEffects(tuple(m.path for m in character.motors if m.model != PRESCRIBED), *found)
+
+
+def _giving_model(shot: CompiledShot, character: Character) -> Model:
+    """The robot on motors that give; on rigid links where one of its motors could not stand on a flexible one."""
+    try:
+        return compile_shot(character, shot.animation, shot.bodies).model
+    except ShotError:
+        return with_drives(rigid_model(shot.model), character.motors)
+
+
+def with_error_shares(shot: CompiledShot, result: Result, options: RunSettings, progress: Progress) -> Result:
+    """The result with the parts of the motors and of the links in the error of the animated curves: what is left of it
+    where the other of the two is ideal. The result itself where motors are ideal, or its input is no animation.
+
+    Raises:
+        ShotError: One of these robots cannot be simulated.
+    """
+    character, animation = shot.character, shot.animation
+    if not motors_give(character) or (result.after is None and animation.current is not animation.tracks):
+        return result
+    progress(0.99, "the parts of motors and links in the error")
+    of_step = replace(options, step=result.step_s)
+
+    def largest(options: RunSettings, rigid: bool) -> Array:
+        prepared = prepare(shot, options)
+        links = rigid_model(shot.model)
+        model = with_drives(links, character.motors) if rigid else _with_ideal_motors(shot)
+        try:
+            return np.asarray(_errors(prepared, model, options)[prepared.grid.judged].max(axis=0, initial=0.0))
+        except SimulationFailure as failure:
+            raise failure_error(prepared, failure) from failure
+
+    motors = by_fast_scheme(of_step, lambda options: largest(options, True))
+    links = by_fast_scheme(of_step, lambda options: largest(options, False))
+    return replace(result, error_shares=ErrorShares(motors, links))
+
+
+def _with_ideal_motors(shot: CompiledShot) -> Model:
+    return compile_shot(with_ideal_motors(shot.character), shot.animation, shot.bodies).model
+
+
+def _errors(prepared: Prepared, model: Model, options: RunSettings) -> Array:
+    """Distances of the targets from what is intended while a model follows the animated curves [m], shape [T, K]."""
+    grid, tracks = prepared.grid, prepared.shot.animation.tracks
+    angles, rates = sample_tracks(tracks, grid)
+    workspace = Workspace.for_system(model.system)
+    steady = SteadyState(model, prepared.world, grid.h, workspace) if grid.cyclic else None
+    run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, integrator=options.scheme, steady=steady)
+    intended = intended_motion(prepared, angles, rates)
+    return np.asarray(np.linalg.norm(run.target_positions - intended.target_positions, axis=2))

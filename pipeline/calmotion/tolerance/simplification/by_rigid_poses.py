@@ -1,0 +1,149 @@
+"""What a shot needs of its bodies, closed chains and motors, from the poses of the rigid robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from calmotion.mesh.solid import solid_of
+from calmotion.model import (
+    Animation,
+    Body,
+    Character,
+    MassProperties,
+    ModelChoice,
+)
+from calmotion.model.character import contact_joints
+from calmotion.model.model_choice import AUTO, OFF, ON
+from calmotion.model.run import RunSettings
+from calmotion.multibody.model.model import body_anchors, rigid_body
+from calmotion.multibody.model.topology import Tree, chain_members
+from calmotion.simulation.inputs.gearing import leaders
+from calmotion.simulation.prepare import grid_of
+from calmotion.simulation.rigid_run import RigidPoses, rigid_poses
+from calmotion.tolerance.simplification.influence import NOTHING, influence
+from calmotion.tolerance.simplification.redundant_constraints import closures_of
+
+STEP = 1.0 / 100.0  # between the poses of the rigid robot [s]
+
+
+def decide(
+    character: Character, animation: Animation, options: RunSettings, tree: Tree, choice: Callable[[str], str],
+    changes: bool,
+) -> tuple[Character, list[ModelChoice]]:  # fmt: skip
+    """Decide which bodies are rigid, which joints of closed chains are needed and which motors move targets.
+
+    Args:
+        tree: Of the character.
+        choice: From a kind of simplification to `auto`, `on` or `off`.
+        changes: Whether motors' curves are to be changed.
+
+    Returns:
+        The character marked with the decisions, and these.
+
+    Raises:
+        SimulationFailure: The rigid robot cannot follow its tracks.
+        ShotError: Motors contradict each other in a closed chain.
+    """
+    poses_matter = changes or bool(tree.closing)
+    if not poses_matter and choice("bodies") == AUTO:
+        return character, []
+    solids = {k: solid_of(body) for k, body in enumerate(character.bodies) if body.flexible is not None}
+    known = {k: None if solid is None else solid.mass for k, solid in solids.items()}
+    rough = replace(character, bodies=tuple(_with_mass(k, body, known) for k, body in enumerate(character.bodies)))
+    character, rows = _bodies(character, known, choice("bodies"))
+    if not poses_matter:
+        return character, rows
+    rigid = [rigid_body(body, own) for body, own in zip(rough.bodies, body_anchors(rough, tree), strict=True)]
+    grid = grid_of(character, animation, replace(options, step=STEP))
+    poses = rigid_poses(character, animation, grid, tree, rigid, options.tolerance)
+    if changes:
+        character, more = _motors(character, poses, choice("motors"))
+        rows += more
+    character, more = _loops(character, tree, poses, choice("loops"))
+    return character, rows + more
+
+
+def _with_mass(index: int, body: Body, known: Mapping[int, MassProperties | None]) -> Body:
+    """A body that can be simulated as rigid."""
+    if index not in known:
+        return body
+    return replace(body, mass=known[index] or _guessed_mass(body))
+
+
+def _guessed_mass(body: Body) -> MassProperties:
+    """That of the box around a body, half full: enough for motions that motors determine."""
+    assert body.flexible is not None
+    points = [surface.points for surface in body.surfaces] or [np.zeros((1, 3))]
+    corners = np.concatenate(points)
+    size = np.maximum(np.ptp(corners, axis=0), 1e-3)
+    mass = 0.5 * body.flexible.material.density * float(np.prod(size))
+    across = mass / 12.0 * (float(size @ size) - size**2)
+    return MassProperties(mass, 0.5 * (corners.min(axis=0) + corners.max(axis=0)), np.diag(across))
+
+
+def _bodies(
+    character: Character, masses: Mapping[int, MassProperties | None], choice: str
+) -> tuple[Character, list[ModelChoice]]:
+    """Flexible bodies that the user forces to be rigid or flexible; the others keep their finite elements."""
+    if choice == AUTO:
+        return character, []
+    bodies, rows = list(character.bodies), []
+    for k, mass in masses.items():
+        body, why = bodies[k], "forced by the user"
+        rigid = choice == OFF and mass is not None
+        if rigid:
+            bodies[k] = replace(body, stiff=True, mass=mass)
+        elif choice == OFF:
+            why = "only the mesh gives its mass"
+        model = "rigid" if rigid else "flexible"
+        rows.append(ModelChoice("bodies", f"{body.path}: {model}", not rigid, why, None, True))
+    return replace(character, bodies=tuple(bodies)), rows
+
+
+def _motors(character: Character, rigid: RigidPoses, choice: str) -> tuple[Character, list[ModelChoice]]:
+    """Motors that move no target."""
+    if contact_joints(character):  # where a foot lands follows from all that was before
+        return character, []
+    own = leaders(character)
+    reach = influence(character, rigid, own) if len(own) else np.zeros(0)
+    if choice == ON or not np.any(reach > NOTHING):
+        return character, []
+    motors, rows = list(character.motors), []
+    for k, far in zip(own, reach, strict=True):
+        if far <= NOTHING:
+            motors[k] = replace(motors[k], idle=True)
+            rows.append(
+                ModelChoice(
+                    "motors", f"{motors[k].path}: not optimised", False, "it moves no target", None, choice == OFF
+                )
+            )
+    return replace(character, motors=tuple(motors)), rows
+
+
+def _loops(character: Character, tree: Tree, rigid: RigidPoses, choice: str) -> tuple[Character, list[ModelChoice]]:
+    """Closed loops, and joints that could be left out of them."""
+    found = closures_of(rigid)
+    if not found.joints:
+        return character, []
+    joints, rows = list(character.joints), []
+    order = [*tree.joint, *tree.closing]
+    for k in found.joints:
+        item = joints[order[k]]
+        members = chain_members(tree.parent, rigid.model.system.side[k])
+        flexible = any(character.bodies[tree.body[b]].simulated_flexible for b in members)
+        if k in found.redundant and choice != ON and (choice == OFF or not flexible):
+            joints[order[k]] = replace(item, redundant=True)
+            why = "other joints transmit its forces, and its own are shown as zero"
+            rows.append(ModelChoice("loops", f"{item.path}: joint omitted", False, why, None, choice == OFF))
+        else:
+            rows.append(
+                ModelChoice("loops", f"{item.path}: joint kept", True, "it closes a chain", None, choice != AUTO)
+            )
+    left = [k for k in found.joints if not joints[order[k]].redundant]
+    if found.redundant_rows and left:
+        why = f"{found.redundant_rows} constraint rows follow from others; the forces of least norm are used"
+        rows.append(ModelChoice("loops", "redundant constraints", True, why))
+    return replace(character, joints=tuple(joints)), rows

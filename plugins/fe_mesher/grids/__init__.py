@@ -1,1 +1,0 @@
-"""Tetrahedra of regular grids."""

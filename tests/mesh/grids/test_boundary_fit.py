@@ -1,0 +1,38 @@
+"""Tetrahedra whose boundary is fitted to a surface: a round bar has its section, a box stays as it is."""
+
+import numpy as np
+import pytest
+from calmotion.mesh.grids.boundary_fit import fitted
+from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles
+from calmotion.mesh.tetrahedra import boundary_triangles, surface_volume, tet_volumes
+from round_bars import LENGTH, RADIUS, bar_surface, coarse_bar
+
+
+def second_moment(points, tets):
+    """Integral of z^2 over the tetrahedra."""
+    z = points[tets][:, :, 2]
+    return float((tet_volumes(points, tets) / 20.0 * ((z**2).sum(axis=1) + z.sum(axis=1) ** 2)).sum())
+
+
+def test_a_coarse_round_bar_has_the_volume_and_the_second_moment_of_a_fine_one(helpers):
+    surface, (points, tets) = bar_surface(), coarse_bar(helpers)
+    volume, moment = surface_volume(*surface), 0.25 * np.pi * RADIUS**4 * LENGTH
+    assert tet_volumes(points, tets).sum() < 0.97 * volume and second_moment(points, tets) < 0.94 * moment
+    found = fitted(points, tets, NearbyTriangles(*surface, 0.2 * RADIUS))
+    assert tet_volumes(found, tets).min() > 0.0
+    assert tet_volumes(found, tets).sum() == pytest.approx(volume, rel=2e-3)
+    assert second_moment(found, tets) == pytest.approx(moment, rel=5e-3)
+
+
+def test_a_box_stays_as_it_is(helpers):
+    points, tets = helpers.box((5, 2, 2), (0.3, 0.04, 0.04))
+    corners, bricks = helpers.box((1, 1, 1), (0.3, 0.04, 0.04))
+    found = fitted(np.asarray(points), tets, NearbyTriangles(np.asarray(corners), boundary_triangles(bricks), 0.01))
+    assert np.abs(found - points).max() < 1e-12
+
+
+def test_no_corner_moves_farther_than_the_limit(helpers):
+    (points, tets), surface = coarse_bar(helpers), bar_surface()
+    limit = 0.02 * RADIUS
+    moved = np.linalg.norm(fitted(points, tets, NearbyTriangles(*surface, limit)) - points, axis=1)
+    assert 0.0 < moved.max() <= limit * (1.0 + 1e-12)

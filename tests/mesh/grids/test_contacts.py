@@ -1,0 +1,98 @@
+"""Contacts in points and edges hold nothing, and faces everything."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+import trimesh
+from calmotion.mesh import tetrahedra as t
+from calmotion.mesh.grids.contacts import without_contacts
+
+
+def joined(helpers, *places):
+    """Unit cubes at places, with the points that they have in common."""
+    points, tets = helpers.box((1, 1, 1), (1, 1, 1))
+    stacked = np.vstack([points + np.asarray(place, float) for place in places])
+    return t.welded_tets(stacked, np.vstack([tets + k * len(points) for k in range(len(places))]), 1e-9)[:2]
+
+
+def test_a_mesh_whose_neighbours_share_faces_stays_as_it_is(helpers):
+    points, tets = joined(helpers, *product((0, 1), (0, 1), (0, 1)))
+    same, also = without_contacts(points, tets)
+    assert same is points and also is tets
+
+
+@pytest.mark.parametrize(("place", "doubled"), [((1, 1, 0), 2), ((1, 1, 1), 1)], ids=["edge", "point"])
+def test_cubes_that_touch_come_apart(helpers, place, doubled):
+    points, tets = joined(helpers, (0, 0, 0), place)
+    assert t.connected_parts(tets) == 1
+    apart, parted = without_contacts(points, tets)
+    assert len(apart) == len(points) + doubled and t.connected_parts(parted) == 2
+    assert len(np.unique(apart, axis=0)) == len(apart)  # two points in one place cannot be told apart
+    volumes = t.tet_volumes(points, tets)
+    assert t.tet_volumes(apart, parted) == pytest.approx(volumes, rel=0.2)
+    assert (t.tet_volumes(apart, parted) >= 0.5 * volumes).all()
+
+
+def test_a_ring_is_cut_where_its_ends_touch_and_nowhere_else(helpers):
+    # an open ring of cubes, and a second way around it by an edge
+    ring = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (2, 1, 0), (2, 2, 0), (1, 2, 0), (0, 2, 0), (-1, 1, 0)]
+    points, tets = joined(helpers, *ring[:7])
+    closed, more = joined(helpers, *ring)  # the last cube touches the first and the seventh along an edge each
+    assert t.connected_parts(more) == 1
+    apart, parted = without_contacts(closed, more)
+    assert len(apart) == len(closed) + 4 and t.connected_parts(parted) == 2
+    assert len(t.largest_part(apart, parted)) == len(tets)
+    assert without_contacts(points, tets)[0] is points
+
+
+def test_points_away_from_contacts_stay_where_they_are(helpers):
+    points, tets = joined(helpers, (0, 0, 0), (1, 1, 0))
+    apart, _ = without_contacts(points, tets)
+    moved = np.linalg.norm(apart[:, None] - points[None], axis=2).min(axis=1)
+    assert (moved > 0.0).sum() == 4 and moved.max() < 0.05
+
+
+def test_each_element_keeps_its_corners(helpers):
+    rng = np.random.default_rng(3)
+    cells = np.argwhere(rng.random((4, 4, 4)) < 0.5)
+    points, tets = joined(helpers, *cells)
+    apart, parted = without_contacts(points, tets)
+    assert len(apart) > len(points) and parted.dtype == tets.dtype
+    assert np.linalg.norm(apart[parted] - points[tets], axis=-1).max() < 0.05
+    # every point is one of elements that hang together by faces at it
+    again, same = without_contacts(apart, parted)
+    assert again is apart and same is parted
+
+
+def closed(*boxes):
+    """Points and triangles of the union of boxes, each given by two corners."""
+    made = [trimesh.creation.box(bounds=np.asarray(corners, float)) for corners in boxes]
+    whole = trimesh.boolean.union(made) if len(made) > 1 else made[0]
+    return np.array(whole.vertices), np.array(whole.faces, np.int32)
+
+
+# cubes beside each other on a diagonal, and the solid that they were made for
+CUBES = ((0, 0, 0), (1, 1, 0))
+APART = [(0, 0, 0), (0.98, 0.98, 1)], [(1.02, 1.02, 0), (2, 2, 1)]
+
+
+@pytest.mark.parametrize(
+    ("bridge", "stays"),
+    [
+        ([], False),
+        ([[(0.5, 0.5, 0.0), (1.5, 1.5, 1.0)]], True),  # a block between the two
+        ([[(0.5, 0.5, 0.4), (1.5, 1.5, 0.43)]], False),  # a foil, thinner than the mesh follows anything
+    ],
+    ids=["gap", "block", "foil"],
+)
+def test_a_contact_stays_where_the_solid_connects_its_sides(helpers, bridge, stays):
+    points, tets = joined(helpers, *CUBES)
+    apart, parted = without_contacts(points, tets, *closed(*APART, *bridge), 0.1)
+    assert (apart is points) == stays and t.connected_parts(parted) == (1 if stays else 2)
+
+
+def test_sides_that_are_not_where_the_solid_is_come_apart(helpers):
+    points, tets = joined(helpers, *CUBES)
+    surface = closed([(0, 0, 0), (0.98, 0.98, 1)])  # the other cube is nothing of it
+    assert t.connected_parts(without_contacts(points, tets, *surface, 0.1)[1]) == 2

@@ -1,0 +1,150 @@
+"""A limit of time or a thin connection gives a worse mesh with a message, never none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from calmotion.errors import ShotError
+from calmotion.mesh.element_size import shape_of
+from calmotion.mesh.grids import gridded
+from calmotion.mesh.grids.contacts import without_contacts
+from calmotion.mesh.repair import closed_solid
+from calmotion.mesh.sources import choice
+from calmotion.mesh.tetrahedralize import filling as filling_module
+from calmotion.mesh.tetrahedralize import tetwild
+from mesher_links import box, link, run, surface
+
+
+@pytest.mark.parametrize("given", [{"element_size": 0.02}, pytest.param({}, marks=pytest.mark.long)])
+def test_a_mesh_that_takes_too_long_is_made_on_a_grid(host, monkeypatch, given):
+    limits = []
+
+    def stuck(points, triangles, size, envelope, path, time, use_cache):
+        limits.append(time.limit)
+        raise tetwild.OutOfTime("took too long", path=path, found="12 triangles, 50 s")
+
+    monkeypatch.setattr(filling_module, "tetrahedralize", stuck)
+    (mesh,) = run(host, link(surface(box()), **given), time_limit=50.0)
+    assert limits == pytest.approx([30.0])  # the rest is for what follows
+    assert any("on a grid" in text and "took too long (12 triangles" in text for text in mesh.quality.repairs)
+    assert mesh.quality.volume == pytest.approx(8e-5, rel=3e-2) and mesh.quality.frequency_error > 0.0
+
+
+def rough_box():
+    """A box whose faces are covered with bumps of half a millimetre."""
+    rough = trimesh.creation.box((0.2, 0.02, 0.02))
+    for _ in range(5):
+        rough = rough.subdivide()
+    waves = np.sin(2.0 * np.pi * rough.vertices @ [[300.0, 410.0, 0.0], [350.0, 0.0, 420.0], [0.0, 380.0, 330.0]])
+    rough.vertices += 5e-4 * waves.prod(axis=1)[:, None] * rough.vertex_normals
+    return rough
+
+
+def test_a_surface_of_too_many_details_is_simplified(host):
+    rough = rough_box()
+    (mesh,) = run(host, link(surface(rough)))
+    (note,) = (text for text in mesh.quality.repairs if "simplified to" in text)
+    assert f"all {len(rough.faces)} would take too long" in note and "are missing" in note
+    assert not any("on a grid" in text for text in mesh.quality.repairs)
+    assert mesh.quality.volume == pytest.approx(float(rough.volume), rel=1e-2)
+
+
+def test_more_detail_is_kept_within_less_distance():
+    rough = rough_box()
+    made = closed_solid.Solid(np.array(rough.vertices), np.array(rough.faces), float(rough.volume), ())
+    plain = shape_of(made.points, made.triangles)
+    tried = [filling_module._attempt(made, replace(plain, detail=k), 0.01, 0, 1.0) for k in (1.0, 2.0)]
+    assert all(attempt.detailed for attempt in tried)
+    assert tried[1].distance == pytest.approx(0.5 * tried[0].distance, rel=1e-6)
+    assert len(tried[0].triangles) == 3_000 < len(tried[1].triangles) < 6_000
+    off = [np.abs(trimesh.Trimesh(t.points, t.triangles).volume / rough.volume - 1.0) for t in tried]
+    assert off[1] < off[0] < 0.01
+
+
+def test_details_are_left_out_where_following_them_takes_too_long(host, monkeypatch):
+    filling, mesh_of, tried = (
+        filling_module,
+        filling_module.tetrahedralize,
+        [],
+    )
+
+    def slow(points, triangles, size, *rest):
+        tried.append((len(triangles), size))
+        if len(tried) == 1:
+            raise tetwild.OutOfTime("took too long", path="/x")
+        return mesh_of(points, triangles, size, *rest)
+
+    monkeypatch.setattr(filling, "tetrahedralize", slow)
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.03)
+    (mesh,) = run(host, link(surface(ball)))
+    assert len(tried) == 2 and tried[1][0] < tried[0][0]
+    assert any("simplified to" in text for text in mesh.quality.repairs)
+    assert mesh.quality.volume == pytest.approx(float(ball.volume), rel=1e-2)
+
+
+def test_a_solid_that_a_grid_does_not_resolve_is_refused_with_the_reason(host, monkeypatch):
+    def stuck(points, triangles, size, envelope, path, time, use_cache):
+        raise tetwild.OutOfTime("took too long", path=path)
+
+    monkeypatch.setattr(filling_module, "tetrahedralize", stuck)
+    monkeypatch.setattr(gridded, "on_grid", lambda *given: None)
+    with pytest.raises(ShotError, match="too long"):
+        run(host, link(surface(box())))
+
+
+@pytest.mark.parametrize(("size", "lost"), [(0.01, True), pytest.param(0.05, False, marks=pytest.mark.long)])
+def test_small_parts_that_hang_on_nothing_are_left_out(host, monkeypatch, size, lost):
+    """As where the mesh did not follow a thread of a hundredth of a millimetre between two parts."""
+    filling, mesh_of = filling_module, filling_module.tetrahedralize
+
+    def with_part(points, triangles, *rest):
+        made, tets = mesh_of(points, triangles, *rest)
+        corner = size * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) + [0.0, 0.1, 0.0]
+        return np.vstack([made, corner]), np.vstack([tets, len(made) + np.arange(4)]).astype(np.int32)
+
+    monkeypatch.setattr(filling, "tetrahedralize", with_part)
+    body = link(surface(box()), element_size=0.02)
+    if lost:
+        (mesh,) = run(host, body)
+        assert mesh.quality.volume == pytest.approx(8e-5, rel=1e-2) and mesh.points[:, 1].max() < 0.05
+        assert any("loose parts" in text for text in mesh.quality.repairs)
+    else:
+        (mesh,) = run(host, body)
+        assert any("on a grid" in text for text in mesh.quality.repairs) and mesh.points[:, 1].max() < 0.05
+
+
+def test_parts_that_the_mesh_joins_along_an_edge_are_apart(host, monkeypatch):
+    """As where it follows two walls half a millimetre apart: such a hinge doubled the frequency of a gripper's base."""
+    filling, mesh_of, joined = (
+        filling_module,
+        filling_module.tetrahedralize,
+        [],
+    )
+
+    def with_contact(points, triangles, *rest):
+        made, tets = mesh_of(points, triangles, *rest)
+        ends = [np.flatnonzero((made[:, 0] > 0.05) & arm) for arm in (made[:, 1] < 0.011, made[:, 1] > 0.011)]
+        gaps = np.linalg.norm(made[ends[0]][:, None] - made[ends[1]][None], axis=2)
+        one, other = (end[k] for end, k in zip(ends, np.unravel_index(gaps.argmin(), gaps.shape), strict=True))
+        tets = np.where(tets == other, one, tets)
+        joined.append(len(without_contacts(made, tets)[0]) - len(np.unique(tets)))
+        return made, tets
+
+    monkeypatch.setattr(filling, "tetrahedralize", with_contact)
+    arms = [box(), box(at=(0.0, 0.022, 0.0)), box((0.02, 0.042, 0.02), at=(-0.1, 0.011, 0.0))]
+    (mesh,) = run(host, link(surface(trimesh.boolean.union(arms)), element_size=0.02))
+    assert joined == [1] and without_contacts(mesh.points, mesh.tets)[0] is mesh.points
+
+
+def test_separate_solids_are_joined_by_struts_where_all_else_fails():
+    parts = surface(box(), "/a"), surface(box(at=(0.0, 0.05, 0.0)), "/b")
+    with pytest.raises(ShotError, match="do not touch"):
+        closed_solid.closed_solid(parts, "/Arm/link")
+    body = link(*parts)
+    made = choice.solid_of(body, body.surfaces)
+    assert trimesh.Trimesh(made.points, made.triangles).body_count == 1
+    assert 1.6e-4 < made.volume < 1.7e-4
+    assert any("struts across gaps of up to 30 mm" in text for text in made.repairs)

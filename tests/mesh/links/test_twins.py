@@ -1,0 +1,118 @@
+"""Copies and mirror images of links are meshed once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calmotion.mesh.repair import closed_solid
+from calmotion.mesh.sources import twins as twins_module
+from calmotion.mesh.tetrahedra import tet_volumes
+from calmotion.model import Frame
+from calmotion.model.meshes import CutPatch, MissingVolume
+from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
+from calmotion.tolerance.meshes import accurate_mesh
+from mesher_links import bracket, divided, link, run, surface
+
+TURN = np.array([1.0, 0.0, 0.0, 0.0])
+ROOT = Frame(np.array([-0.05, 0.0, 0.0]), TURN)
+MIRROR = np.diag([1.0, -1.0, 1.0])
+
+
+def bracket_surface(mirrored=False):
+    whole = bracket()
+    if mirrored:
+        whole.apply_transform(np.diag([1.0, -1.0, 1.0, 1.0]))
+    return surface(whole)
+
+
+def test_the_mirror_image_of_a_link_is_meshed_once(host, monkeypatch):
+    accuracy = accurate_mesh
+    # a twentieth of the nodes: the meshes are refined as usual, and less far
+    for name, nodes in (("_REFINED", 600), ("_POOR_REFINED", (2_000, 3_000)), ("_KEPT", 1_100)):
+        monkeypatch.setattr(accuracy, name, nodes)
+    fill, count = accuracy.filled, []
+
+    def counted(*arguments):
+        count.append(arguments[1].path)
+        return fill(*arguments)
+
+    monkeypatch.setattr(accuracy, "filled", counted)
+    left, right = link(bracket_surface()), replace(link(bracket_surface(mirrored=True)), path="/Arm/right")
+    stiffer = replace(left.flexible, interface_radius=0.02)
+    first, second, third = run(host, left, right, replace(left, path="/Arm/third", flexible=stiffer))
+    assert sorted(count) == ["/Arm/link", "/Arm/third"]
+    assert second.body == 1 and (tet_volumes(second.points, second.tets) > 0.0).all()
+    assert second.points == pytest.approx(first.points @ MIRROR, abs=1e-9)
+    assert "meshed as /Arm/link, mirrored" in second.quality.repairs and len(third.tets)
+    assert not any("meshed as" in note for note in (*first.quality.repairs, *third.quality.repairs))
+    # its own estimate of its own body agrees
+    one, other = (frequency_estimate(mesh, body, None) for mesh, body in ((first, left), (second, right)))
+    assert other.squares == pytest.approx(one.squares, rel=1e-6)
+
+
+def test_links_are_twins_only_with_their_joints_at_the_same_places():
+    twins, solids = twins_module, closed_solid
+    solid, image = (solids.closed_solid([bracket_surface(m)], "/Arm/link") for m in (False, True))
+    tip, tilted = Frame(np.array([0.04, 0.006, 0.03]), TURN), Frame(np.array([0.04, 0.006, 0.03]), np.eye(4)[1])
+    mirrored_tip = Frame(MIRROR @ tip.position, TURN)
+    left = twins.Link(link(bracket_surface()), solid, -1.0, True, (ROOT, tip))
+    right = twins.Link(link(bracket_surface(True)), image, -1.0, True, (ROOT, mirrored_tip))
+    index, isometry = twins.twin_of(right, [left])
+    assert index == 0 and isometry.mirrors
+    assert twins.twin_of(left, [left])[1].turn == pytest.approx(np.eye(3))
+    assert twins.twin_of(replace(right, frames=(ROOT, tip)), [left]) is None
+    assert twins.twin_of(replace(right, frames=(mirrored_tip, ROOT)), [left]) is None, "the first is the carrier"
+    assert (
+        twins.twin_of(replace(right, frames=(ROOT, replace(tilted, position=mirrored_tip.position))), [left])
+        is not None
+    )
+    sideways = Frame(mirrored_tip.position, np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0]))
+    assert twins.twin_of(replace(right, frames=(ROOT, sideways)), [left]) is None, "another axis"
+    assert twins.twin_of(replace(right, size=0.01), [left]) is None
+
+
+def test_links_of_the_same_surfaces_are_twins_whatever_their_solids():
+    twins, solids = twins_module, closed_solid
+    left, right = link(bracket_surface()), link(bracket_surface(True))
+    solid, image = (solids.closed_solid(body.surfaces, "/Arm/link") for body in (left, right))
+    assert twins.twin_of(twins.Link(right, None, -1.0, True, (ROOT,)), [twins.Link(left, None, -1.0, True, (ROOT,))])
+    other = replace(image, points=image.points + [0.0, 0.0, 0.01 * np.sign(image.points[:, 2].mean())])
+    rough = replace(other, points=np.vstack([other.points, other.points[:1]]))  # of other points than its mirror image
+    one = twins.Link(left, replace(solid, source="wrapped visual surface"), -1.0, True, (ROOT,))
+    two = twins.Link(right, replace(rough, source="wrapped visual surface"), -1.0, True, (ROOT,))
+    assert twins.twin_of(two, [one])[1].mirrors
+    of_hulls = [replace(each, solid=replace(each.solid, source="collision shape")) for each in (one, two)]
+    assert twins.twin_of(of_hulls[1], of_hulls[:1]) is None
+
+
+def test_links_with_other_triangles_are_twins_and_say_how_near(host):
+    twins = twins_module
+    body = link(bracket_surface())
+    (part,) = body.surfaces
+    points, triangles = divided(part.points, part.triangles)
+    points[0] += 2e-5
+    other = replace(body, path="/Arm/other", surfaces=(replace(part, points=points, triangles=triangles),))
+    links = [twins.Link(each, None, -1.0, True, (ROOT,)) for each in (body, other)]
+    index, isometry = twins.twin_of(links[1], links[:1])
+    assert index == 0 and 1e-6 < isometry.distance <= np.sqrt(3.0) * 2e-5
+    (mesh,) = run(host, link(bracket_surface(), element_size=0.02))
+    assert (
+        f"(within {1e3 * isometry.distance:.2g} mm)" in twins.moved(mesh, isometry, 1, "/Arm/link").quality.repairs[0]
+    )
+
+
+def test_patches_and_what_is_missing_are_moved_with_the_mesh(host):
+    (mesh,) = run(host, link(bracket_surface(), element_size=0.02))
+    corners = mesh.points[mesh.tets[0, [0, 2, 1]]]
+    missing = MissingVolume(corners, np.array([1e-9, -2e-9, 3e-9]))
+    mesh = replace(mesh, patches=(CutPatch(ROOT.position, corners[None]),), missing=missing)
+    isometry = twins_module.Isometry(MIRROR, np.array([0.0, 0.5, 0.0]))
+    image = twins_module.moved(mesh, isometry, 3, "/Arm/link")
+    assert image.body == 3 and image.patches[0].origin == pytest.approx([-0.05, 0.5, 0.0])
+    area = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    found = np.cross(*(image.patches[0].triangles[0, k] - image.patches[0].triangles[0, 0] for k in (1, 2)))
+    assert found == pytest.approx(MIRROR @ area, abs=1e-12), "outward as before"
+    assert image.missing.points == pytest.approx(isometry(corners))
+    assert np.array_equal(image.missing.volumes, missing.volumes)

@@ -1,0 +1,122 @@
+"""A joint between the cheeks of a fork holds the cheeks, not what its sphere just reaches of the ground."""
+
+import numpy as np
+import pytest
+import trimesh
+from calmotion.mesh.patches.cut_patches import with_rims
+from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches
+from calmotion.mesh.patches.just_reached import just_reached
+from calmotion.mesh.quadratic import quadratic_mesh
+from calmotion.mesh.tetrahedra import surface_area
+from calmotion.model import Body, FlexibleSettings, Frame
+
+GAP, GROUND = 0.03, -0.037  # from the joint in the origin to the cheeks, and to the ground between them
+
+
+def fork(helpers, cells):
+    """Points and tetrahedra of a fork along z, its cheeks 10 mm thick."""
+    points, tets = helpers.box((8 * cells, 4 * cells, 10 * cells), (0.08, 0.08, 0.1), origin=(-0.04, -0.04, -0.057))
+    points = np.asarray(points)
+    x, _, z = points[tets].mean(axis=1).T
+    tets = tets[(np.abs(x) > GAP) | (z < GROUND)]
+    used = np.unique(tets)
+    return points[used], np.searchsorted(used, tets).astype(np.int32)
+
+
+@pytest.fixture(scope="module")
+def joint(helpers):
+    return AttachmentFrame("/Robot/pin", helpers.frame(0.0, 0.0, 0.0), "interface")
+
+
+def on_ground(x):
+    return (np.abs(x[..., 2] - GROUND) < 1e-9) & (np.abs(x[..., 0]) < GAP - 1e-9)
+
+
+@pytest.mark.parametrize("radius, left", [(0.0371, True), (0.045, False), (0.036, False)])
+def test_only_what_is_nearly_as_far_as_the_sphere_is_left(helpers, radius, left):
+    points, tets = fork(helpers, 1)
+    mesh = quadratic_mesh(points, tets)
+    found = just_reached(mesh.nodes, mesh.surface[:, :3], np.zeros(3), radius)
+    assert found.any() == left
+    assert on_ground(mesh.nodes[mesh.surface[found, :3]].mean(axis=1)).all()
+
+
+def test_the_axis_tells_the_cheeks_of_a_fork_from_its_ground(helpers):
+    radius, (points, tets) = 0.0395, fork(helpers, 2)
+    mesh = quadratic_mesh(points, tets)
+    corners = mesh.surface[:, :3]
+    assert not just_reached(mesh.nodes, corners, np.zeros(3), radius).any()
+    found = just_reached(mesh.nodes, corners, np.zeros(3), radius, np.array([1.0, 0.0, 0.0]))
+    assert found.any() and on_ground(mesh.nodes[corners[found]].mean(axis=1)).all()
+    # an axis through the ground, which has little of the area, tells nothing; nor does one that nothing is around
+    for axis in ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]):
+        assert not just_reached(mesh.nodes, corners, np.zeros(3), radius, np.array(axis)).any()
+
+
+def test_a_bore_around_the_axis_is_held(helpers):
+    """A ring as far from the axis as the ground of a fork, and a plate that the axis passes through."""
+    angle = 2.0 * np.pi * np.arange(24) / 24
+    ring = 0.9 * np.stack([np.cos(angle), np.sin(angle), np.zeros(24)], axis=1)
+    k, n = np.arange(24), (np.arange(24) + 1) % 24
+    wall = np.concatenate([ring - [0, 0, 0.1], ring + [0, 0, 0.1]])
+    around = np.concatenate([np.stack([k, n, n + 24], 1), np.stack([k, n + 24, k + 24], 1)])
+    plate = np.array([[0.5, 0.0, 0.8], [-0.3, 0.5, 0.8], [-0.3, -0.5, 0.8]])
+    points, last = np.concatenate([wall, plate]), np.array([[48, 49, 50]])
+    axis, center = np.array([0.0, 0.0, 1.0]), np.zeros(3)
+    assert not just_reached(points, np.concatenate([around, last]), center, 1.0, axis, np.inf).any()
+    some = np.concatenate([around[np.tile(k < 5, 2)], last])  # of the ring on one side
+    assert just_reached(points, some, center, 1.0, axis, np.inf).tolist() == [True] * 10 + [False]
+    assert not just_reached(points, some, center, 1.0, beyond=np.inf).any()
+
+
+def test_a_measured_patch_holds_the_cheeks_and_a_given_one_what_is_within_its_radius(helpers, joint):
+    """The measured radius is that of a ball of a quarter more than the gap, or farther."""
+    points, tets = fork(helpers, 2)
+    mesh = quadratic_mesh(points, tets)
+    (patch,) = interface_patches(mesh, [joint], -1.0, "/Robot/fork")
+    assert patch.radius > -GROUND  # else this test shows nothing
+    x = mesh.nodes[patch.nodes]
+    assert not on_ground(x).any()
+    assert {-1.0, 1.0} <= set(np.sign(x[:, 0]))
+    (given,) = interface_patches(mesh, [joint], patch.radius, "/Robot/fork")
+    assert on_ground(mesh.nodes[given.nodes]).any()
+
+
+@pytest.mark.parametrize("cells, radius", [(1, 0.0375), (1, 0.0378), (1, 0.0388), (2, 0.0378), (2, 0.0395)])
+def test_a_cut_patch_of_a_measured_radius_has_no_ground_and_the_area_of_the_cheeks(
+    helpers, plastic, monkeypatch, cells, radius
+):
+    from calmotion.mesh.patches import interface_patches as module
+
+    monkeypatch.setattr(module, "automatic_radius", lambda *_: radius)
+    across = Frame(np.zeros(3), np.array([1.0, 0.0, 1.0, 0.0]) / np.sqrt(2.0))  # its axis is x
+    points, tets = fork(helpers, cells)
+    body = Body("/Robot/fork", helpers.frame(0, 0, 0), None, flexible=FlexibleSettings(plastic))
+    points, tets, ((_, held),) = with_rims(points, tets, body, [AttachmentFrame("/Robot/pin", across, "interface")])
+    assert not on_ground(points[held].mean(axis=1)).any()
+    assert surface_area(points, held) == pytest.approx(2.0 * np.pi * (radius**2 - GAP**2), rel=0.006)
+
+
+def test_triangles_that_a_cut_left_a_little_outside_belong_to_their_part():
+    """Two triangles with a common edge above the joint, of which the farther one begins outside the sphere."""
+    near = [[-1.0, 0.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, 1.0]]
+    points = np.array([*near, [0.1, 0.0, -1.9], [1.0, 0.0, -1.9], [-0.1, 0.6, -1.9], [-0.2, 0.7, -1.9]])
+    triangles = np.array([[0, 1, 2], [3, 4, 5], [4, 5, 6]])
+    assert just_reached(points, triangles, np.zeros(3), 1.92).tolist() == [False, True, False]
+    assert just_reached(points, triangles, np.zeros(3), 1.92, beyond=np.inf).tolist() == [False, True, True]
+
+
+@pytest.mark.parametrize("gap, left", [(5e-4, True), (5e-3, False)])
+def test_the_sides_of_a_slit_across_the_axis_are_not_held(gap, left):
+    """A joint below a disc that is fastened to a block with a slit in between."""
+    disc, block = trimesh.creation.box((0.08, 0.08, 0.01)), trimesh.creation.box((0.08, 0.08, 0.02))
+    disc.apply_translation((0.0, 0.0, 0.005))
+    block.apply_translation((0.0, 0.0, 0.02 + gap))
+    x = trimesh.util.concatenate([disc, block]).subdivide().subdivide()
+    x = np.array(x.triangles)[np.abs(np.array(x.face_normals)[:, 2]) > 0.5]  # without the sides of the blocks
+    points, corners = np.unique(np.round(x.reshape(-1, 3), 9), axis=0, return_inverse=True)
+    found = just_reached(points, corners.reshape(-1, 3), np.zeros(3), 0.03, np.array([0.0, 0.0, 1.0]))
+    height = x[:, :, 2].mean(axis=1)
+    slit = (height > 0.005) & (height < 0.02) & (np.linalg.norm(x.mean(axis=1), axis=1) < 0.02)
+    assert slit.any() and found[slit].all() == left and found[slit].any() == left
+    assert not found[height < 1e-9].any()

@@ -1,0 +1,54 @@
+"""The measured error of a result: the distance to a finer run, and what that run does not know itself."""
+
+import dataclasses
+
+import pytest
+from calmotion.model.run import RunSettings
+from calmotion.simulation.body_reduction import reduction_for
+from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.tolerance.meshes.mesh_budget import MOST_NODES
+from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
+from calmotion.tolerance.verification.verify import verify
+
+
+def quiet(fraction, message):
+    pass
+
+
+def test_verifying_measures_the_distance_to_a_finer_run(arm, animation, meshes, bodies):
+    options = RunSettings(tolerance=1e-3)
+    result = simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet)
+    shot, reduction = compile_shot(arm, animation, bodies), reduction_for(arm, animation, meshes, options)
+    found = verify(shot, reduction, result, options, quiet)
+    assert found.step_s == pytest.approx(result.step_s / 4) and found.modes > 6
+    assert 0.3 * result.accuracy.step_m < found.error_m < 5e-3
+    moved = dataclasses.replace(
+        result.before.motion, target_positions=result.before.motion.target_positions + [0.02, 0.0, 0.0]
+    )
+    wrong = dataclasses.replace(result, before=dataclasses.replace(result.before, motion=moved))
+    assert verify(shot, reduction, wrong, options, quiet).error_m == pytest.approx(0.02, abs=1.1 * found.error_m)
+
+
+def test_the_stiffness_of_the_finer_run_is_that_of_meshes_as_fine_as_a_result_may_have(arm, animation, meshes, bodies):
+    options, asked = RunSettings(tolerance=1e-2), []
+    coarse = [dataclasses.replace(body, mesh_error=0.02 if len(body.stiffness) else None) for body in bodies]
+    shot, reduction = compile_shot(arm, animation, coarse), reduction_for(arm, animation, meshes, options)
+
+    def with_finer_meshes(tolerance, wanted, max_nodes, progress, by_factor=True, poor_nodes=0):
+        asked.append((by_factor, max(max_nodes, poor_nodes)))
+        return reduction
+
+    reduction.with_finer_meshes = with_finer_meshes
+    verify(shot, reduction, simulate_to_tolerance(shot, options, quiet), options, quiet)
+    assert [by_factor for by_factor, _ in asked] == [False, True] and asked[1][1] == MOST_NODES
+
+
+def test_meshes_that_cannot_be_finer_are_still_counted(arm, animation, bodies):
+    """The finer run had the same meshes, and agreed with the result however coarse they were."""
+    options = RunSettings(tolerance=1e-2)
+    coarse = [dataclasses.replace(body, mesh_error=0.02 if len(body.stiffness) else None) for body in bodies]
+    shot = compile_shot(arm, animation, coarse)
+    result = simulate_to_tolerance(shot, options, quiet)
+    found = verify(shot, None, result, options, quiet)
+    assert found.mesh_m == pytest.approx(result.accuracy.mesh_m, rel=0.1) and found.mesh_m > 1e-4
+    assert found.bound_m == found.error_m + found.mesh_m
