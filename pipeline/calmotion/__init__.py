@@ -79,7 +79,7 @@ __all__ = [
 
 _HOMES = {
     "host.errors": ("SettingError",),
-    "shot.run": ("OutputPaths",),
+    "model.run": ("OutputPaths",),
     "workflow.calibration.calibrate": ("CalibratedShot", "calibrate"),
     "workflow.calibration.excite": ("ExcitedShot", "excite"),
     "workflow.calibration.refine": ("RefinedShot", "refine"),

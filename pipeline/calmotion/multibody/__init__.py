@@ -37,7 +37,7 @@ _HOMES = {
     "multibody.model.system": ("State",),
     "multibody.runs": ("LinearizedRun", "ModelRun", "linearize", "natural_modes", "simulate"),
     "reduction.reduced_body": ("ReducedBody",),
-    "shot.character": ("WORLD",),
+    "model.character": ("WORLD",),
 }
 
 
