@@ -3,7 +3,7 @@
 import pytest
 from calmotion.cli.main import build_parser, main
 from calmotion.cli.options import KINDS, assignments, progress_display
-from calmotion.shot import model_choice
+from calmotion.model import model_choice
 from calmotion.workflow.run import Progress
 
 

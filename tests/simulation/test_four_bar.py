@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from calmotion.benchmarks.scenes.beam_arm import quintic, shot_of
+from calmotion.model.run import RunSettings
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.body_reduction import load_envelopes
 from calmotion.simulation.compiled_shot import compile_shot

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.linear_algebra.nested_dissection import Dissection
-from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 

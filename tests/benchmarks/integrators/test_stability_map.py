@@ -17,7 +17,7 @@ from calmotion.benchmarks.integrators.stability_map import (
     all_cells,
     cells_of,
 )
-from calmotion.shot.run import INTEGRATORS
+from calmotion.model.run import INTEGRATORS
 
 
 def rows_of(name, *values):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.benchmarks.scenes.beam_arm import LIFTS, beam_mesh
-from calmotion.shot import (
+from calmotion.model import (
     Body,
     Character,
     ElasticMaterial,
@@ -18,7 +19,7 @@ from calmotion.shot import (
     Motor,
     Target,
 )
-from calmotion.shot.character import WORLD, Array
+from calmotion.model.character import WORLD
 from scipy.spatial.transform import Rotation
 
 # crank, coupler, rocker and ground [m]: a crank-rocker (Grashof: 0.12 + 0.5 < 0.4 + 0.42)

@@ -7,11 +7,12 @@ import pytest
 from beams import timoshenko_frequencies
 from boxes import box_tets
 from calmotion.errors import ShotError
+from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches
+from calmotion.mesh.patches.named_patch import named_patch
+from calmotion.mesh.quadratic import quadratic_mesh
+from calmotion.model import ElasticMaterial, Frame, InterfaceSurface
 from calmotion.reduction.basis.natural_modes import frequencies
-from calmotion.reduction.elements.assembly import assemble, quadratic_mesh
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
-from calmotion.reduction.interfaces.named_patch import named_patch
-from calmotion.shot import ElasticMaterial, Frame, InterfaceSurface
+from calmotion.reduction.elements.assembly import assemble
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 

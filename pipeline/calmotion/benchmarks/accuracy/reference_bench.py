@@ -11,20 +11,21 @@ from typing import Any
 import numpy as np
 
 from calmotion import ShotError
-from calmotion.accuracy.mesh_budget import mesh_error
-from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, reference_run
-from calmotion.accuracy.step_error import StepRun, distance, simulate_at
+from calmotion.arrays import Array
 from calmotion.benchmarks.common.shots import Unreduced
 from calmotion.benchmarks.common.tables import say
 from calmotion.benchmarks.common.timing import median_time
+from calmotion.mesh.quadratic import quadratic_mesh
+from calmotion.model import Animation
+from calmotion.model.character import with_settings
+from calmotion.model.run import RunSettings
 from calmotion.multibody import ReducedBody
-from calmotion.reduction.elements.assembly import quadratic_mesh
-from calmotion.shot import Animation
-from calmotion.shot.character import Array, with_settings
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.body_reduction import BodyReduction, reduction_for
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
+from calmotion.tolerance.meshes.mesh_budget import mesh_error
+from calmotion.tolerance.pod_subspace import ProjectedShot, ReferenceRun, reference_run
+from calmotion.tolerance.step_error import StepRun, distance, simulate_at
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 REFERENCE_STEP, SMALLEST_STEP = 1 / 3840, 1 / 30720  # of the reference: at most, and where it ends

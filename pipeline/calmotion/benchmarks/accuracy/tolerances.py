@@ -14,21 +14,21 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
-from calmotion.accuracy.converged_reduction import converged_reduction
-from calmotion.accuracy.simplification.analysis import analyse
-from calmotion.accuracy.simulate_to_tolerance import found_tracks, simulate_to_tolerance
-from calmotion.accuracy.step_error import distance, frames_of
 from calmotion.benchmarks.accuracy.reference_bench import FINEST, TIMES, Bench, Reference
 from calmotion.benchmarks.common.parsers import bench_parser, output_options, shots_argument
 from calmotion.benchmarks.common.shots import SAMPLES, Unreduced, load_unreduced
 from calmotion.benchmarks.common.tables import finish, resumed_rows, say, write_rows
 from calmotion.benchmarks.common.timing import fresh_cache, machine
 from calmotion.cli.options import quantity
+from calmotion.model import Result
+from calmotion.model.run import RunSettings
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
-from calmotion.shot import Result
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.tolerance.converged_reduction import converged_reduction
+from calmotion.tolerance.simplification.analysis import analyse
+from calmotion.tolerance.simulate_to_tolerance import found_tracks, simulate_to_tolerance
+from calmotion.tolerance.step_error import distance, frames_of
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 # tolerance of the reference's reduction over the tightest that is measured; where it has finer meshes, these are known

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from calmotion import ShotError
-from calmotion.shot import Animation, Character, FEMeshes
-from calmotion.shot.model_choice import ON
+from calmotion.model import Animation, Character, FEMeshes
+from calmotion.model.model_choice import ON
 from calmotion.simulation.compiled_shot import CompiledShot
 
 SAMPLES = tuple(f"samples/{name}/{name}.usda" for name in ("bartender", "dancer", "rapper", "drummer", "boxer"))
@@ -62,7 +62,7 @@ def _processed(
 ) -> list[Any]:
     """What the operators of a command make of a shot, None where they do not make it."""
     from calmotion.host import open_host
-    from calmotion.shot.run import Source
+    from calmotion.model.run import Source
 
     run = open_host([]).run([Source(path=path, command=command)], list(wanted), settings=settings)
     for result in run:

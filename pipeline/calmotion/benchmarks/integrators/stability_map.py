@@ -15,7 +15,7 @@ import numpy as np
 
 from calmotion import ShotError
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
-from calmotion.shot.run import RunSettings
+from calmotion.model.run import RunSettings
 from calmotion.simulation.body_reduction import BodyReduction
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.simulation.simulate import simulate_shot
@@ -52,7 +52,7 @@ class Cell:
         map: Name of the map.
         value: Of the row's quantity, in its unit.
         step_s: [s].
-        integrator: One of `calmotion.shot.run.INTEGRATORS`.
+        integrator: One of `calmotion.model.run.INTEGRATORS`.
         outcome: `runs`, `refused` or `failed`.
         why: The reason of a refusal or failure, else empty.
         error_m: Largest error of the tip against the rigid motion [m]; None where it did not come to its end, or only

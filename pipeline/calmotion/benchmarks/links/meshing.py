@@ -79,7 +79,7 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, refine: int = 0) 
     Raises:
         ShotError: The surfaces enclose no volume.
     """
-    from calmotion.accuracy.element_size import element_size, shape_of
+    from calmotion.mesh.element_size import element_size, shape_of
 
     maker = mesher()
     solid = maker.solid_of(link.body, link.body.surfaces)
@@ -105,7 +105,7 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, refine: int = 0) 
 
 def _refined(link: Link, mesh: Any, nodes: int) -> Row:
     """The row of an automatic mesh that is refined to a number of nodes, with the stiffness of ever finer ones."""
-    from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
+    from calmotion.tolerance.meshes.mesh_refinement import Effort, refined_for_frequencies
 
     start = time.perf_counter()
     effort = Effort(_FINEST, int(nodes / 0.6), 0.0)
@@ -115,9 +115,9 @@ def _refined(link: Link, mesh: Any, nodes: int) -> Row:
 
 
 def _row(link: Link, size: float, mesh: Any, mesh_time: float) -> Row:
+    from calmotion.mesh.patches.interface_patches import interface_patches
     from calmotion.reduction.discretization_error import frequency_errors
     from calmotion.reduction.elements.assembly import assemble
-    from calmotion.reduction.interfaces.interface_patches import interface_patches
 
     settings = link.body.flexible
     assert settings is not None

@@ -11,7 +11,7 @@ import numpy as np
 from calmotion import ShotError
 from calmotion.benchmarks.common.timing import processor_time
 from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, mesher
-from calmotion.shot import FEMesh
+from calmotion.model import FEMesh
 from calmotion.support.processes.workers import Fault
 
 LIMIT = 20.0  # processor time of a link that is wanted [s]
@@ -123,8 +123,8 @@ def survey_link(link: Link, robot: str, time_limit: float, geometry_only: bool =
 def _with_solid(row: LinkRow, geometry: Any, visual: Sequence[Any], frames: Sequence[Any]) -> LinkRow:
     from scipy.spatial import ConvexHull
 
-    from calmotion.geometry.tetrahedra import boundary_triangles
-    from calmotion.reduction.interfaces.contact_place import contact_place
+    from calmotion.mesh.patches.contact_place import contact_place
+    from calmotion.mesh.tetrahedra import boundary_triangles
 
     solid = getattr(geometry, "solid", None)
     points = geometry.points if solid is None else solid.points
@@ -143,9 +143,9 @@ def _with_solid(row: LinkRow, geometry: Any, visual: Sequence[Any], frames: Sequ
 
 
 def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
+    from calmotion.mesh.patches.interface_patches import interface_patches
     from calmotion.reduction.discretization_error import clamped_modes
     from calmotion.reduction.elements.assembly import assemble
-    from calmotion.reduction.interfaces.interface_patches import interface_patches
 
     settings = link.body.flexible
     assert settings is not None

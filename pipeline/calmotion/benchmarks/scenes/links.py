@@ -11,10 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion import ShotError
-from calmotion.shot import Body, ElasticMaterial, FlexibleSettings, Frame, MassProperties
+from calmotion.model import (
+    Body,
+    ElasticMaterial,
+    FlexibleSettings,
+    Frame,
+    MassProperties,
+)
 
 if TYPE_CHECKING:
-    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+    from calmotion.mesh.patches.interface_patches import AttachmentFrame
     from calmotion.usd.reading.context import Reading
 
 # of polyamide as printed links are; relative errors of frequencies do not depend on its stiffness and density
@@ -142,7 +148,7 @@ def frames_of(link: Link) -> tuple[Frame, ...]:
 
 def attachments_of(link: Link) -> list[AttachmentFrame]:
     """The frames of a link's joints, that towards the world first, as the reduction has them."""
-    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+    from calmotion.mesh.patches.interface_patches import AttachmentFrame
 
     return [AttachmentFrame(f"joint {k}", frame, "interface") for k, frame in enumerate(frames_of(link))]
 

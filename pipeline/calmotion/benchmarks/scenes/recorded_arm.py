@@ -7,20 +7,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.identification.parameters import robot_parameters
 from calmotion.identification.robots import Robot, robot_with
 from calmotion.identification.signals import Signals, signals_of
+from calmotion.model import Body, Character, FEMeshes
+from calmotion.model.calibration.estimates import HIGHER_MODES
+from calmotion.model.calibration.recording import (
+    ACCELEROMETER,
+    ANGLE,
+    MARKER,
+    Channel,
+    SensorRecording,
+)
+from calmotion.model.motor import DRIVE
+from calmotion.model.run import RunSettings
 from calmotion.multibody import SimulationFailure
 from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.discretization_error import frequency_errors
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.shot import Body, Character, FEMeshes
-from calmotion.shot.calibration.estimates import HIGHER_MODES
-from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, MARKER, Channel, SensorRecording
-from calmotion.shot.character import Array
-from calmotion.shot.motor import DRIVE
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.benchmarks.integrators.integrators import Scene
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, beam_mesh, quintic, shot_of
+from calmotion.model import ElasticMaterial
 from calmotion.reduction.elements.assembly import FEModel, assemble
-from calmotion.shot import ElasticMaterial
-from calmotion.shot.character import Array
 
 LENGTH, THICKNESS, PAYLOAD, CELLS = 0.6, 0.02, 0.2, 12
 RETARDATION = 2e-4  # damping over stiffness [s]

@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.benchmarks.speed.exudyn_arm import (
     DURATION,
     FIXED_MODES,
@@ -21,7 +22,6 @@ from calmotion.benchmarks.speed.exudyn_arm import (
     SAMPLES,
     THICKNESS,
 )
-from calmotion.shot.character import Array
 
 HINGES = 6 + FIXED_MODES
 HUB = 1e6  # inertia of the hub [kg m^2]: the arm turns it by a millionth of the motion

@@ -21,11 +21,13 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import show
 from calmotion.benchmarks.common.timing import median_time
 from calmotion.benchmarks.scenes.beam_arm import beam_arm
 from calmotion.linear_algebra.blas_threads import one_blas_thread
+from calmotion.model import Body, Character
 from calmotion.multibody import Model, ReducedBody
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.simulation import simulate
@@ -33,8 +35,6 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import span_tree
 from calmotion.multibody.statics.equilibrium import equilibrium
-from calmotion.shot import Body, Character
-from calmotion.shot.character import Array
 from calmotion.simulation.bodies import reduce_bodies
 
 NAMES = {"exudyn": "Exudyn's reduced body", "mujoco": "MuJoCo's chain"}

@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import Any
 
 from calmotion import ShotError
-from calmotion.accuracy.step_error import simulate_at
 from calmotion.benchmarks.common.parsers import bench_parser, shots_argument
 from calmotion.benchmarks.common.shots import SAMPLES, load
 from calmotion.benchmarks.common.tables import markdown
 from calmotion.benchmarks.common.timing import processor_time
 from calmotion.host import OperatorResult
-from calmotion.shot.run import OutputPaths, RunSettings
+from calmotion.model.run import OutputPaths, RunSettings
+from calmotion.tolerance.step_error import simulate_at
 from calmotion.workflow.commands import optimize
 
 import_module("calmotion.support")  # sets options of numba that it reads once

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.geometry.distances import closest_on_triangles
-from calmotion.geometry.nearby_triangles import unit_normals
-from calmotion.reduction.elements.assembly import QuadraticMesh
-from calmotion.shot.character import Array, IntArray
+from calmotion.arrays import Array, IntArray
+from calmotion.mesh.quadratic import QuadraticMesh
+from calmotion.mesh.surfaces.distances import closest_on_triangles
+from calmotion.mesh.surfaces.nearby_triangles import unit_normals
 
 _DISTANCE = 5e-3  # of the body's size: distance that a tetrahedraliser may keep from the surface
 _FACING = 0.5  # least cosine between the normals; excludes the other side of a thin wall

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.reduction.elements.assembly import QuadraticMesh, corner_gradients
+from calmotion.arrays import Array
+from calmotion.mesh.quadratic import QuadraticMesh
+from calmotion.reduction.elements.assembly import corner_gradients
 from calmotion.reduction.elements.green_strain_fields import green_fields
-from calmotion.shot.character import Array
 from calmotion.support import interrupts
 
 # Order of the rule of elastic laws. It is exact for small strains of quadratic elements, as their order of convergence
