@@ -11,13 +11,7 @@ from calmotion.arrays import Array, IntArray
 from calmotion.control.commands import LINEAR, Commands, MotorCurves
 from calmotion.errors import ShotError
 from calmotion.model.character import SurfaceMesh
-from calmotion.simulation.playing.body_poses import (
-    LocalPoses,
-    body_tree,
-    local_poses,
-    motor_values,
-    near_turn,
-)
+from calmotion.simulation.playing.body_poses import LocalPoses, body_tree, local_poses, motor_values, near_turn
 from calmotion.simulation.playing.parallel_frames import parallel_skeleton
 from calmotion.support.files import replaced
 from calmotion.support.naming import distinct_names

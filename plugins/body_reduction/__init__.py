@@ -8,13 +8,7 @@ from typing import Any
 
 from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.model import (
-    Animation,
-    Character,
-    FEMeshes,
-    ModelChoices,
-    Result,
-)
+from calmotion.model import Animation, Character, FEMeshes, ModelChoices, Result
 from calmotion.model.character import motors_give
 from calmotion.model.model_choice import no_flexible_bodies, run_settings, simplified_character
 from calmotion.model.outputs import SystemModes

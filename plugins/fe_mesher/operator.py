@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from calmotion.mesh.patches.interface_patches import AttachmentFrame
     from calmotion.mesh.sources.twins import Link
     from calmotion.model import Body, FEMesh
-    from calmotion.tolerance.meshes.body_mesh import MeshOptions, Volume
+    from calmotion.tolerance.meshes.options import MeshOptions, Volume
 
 
 class TetrahedralizeFlexibleBodies(Operator):
@@ -58,7 +58,8 @@ class TetrahedralizeFlexibleBodies(Operator):
         from calmotion.mesh.sources.twins import twin_of
         from calmotion.simulation.bodies import bodies_in_parallel
         from calmotion.tolerance.meshes.accurate_mesh import frames_of
-        from calmotion.tolerance.meshes.body_mesh import MeshOptions, mesh_of, twin_mesh
+        from calmotion.tolerance.meshes.body_mesh import mesh_of, twin_mesh
+        from calmotion.tolerance.meshes.options import MeshOptions
 
         choices = context.get(ModelChoices)
         character = context.get(Character) if choices is None else choices.character
@@ -103,7 +104,7 @@ def _link(character: Character, index: int, geometry: FEMesh | Volume) -> Link |
     """What decides the mesh of a body; None where its tetrahedra are given."""
     from calmotion.mesh.sources.twins import Link
     from calmotion.tolerance.meshes.accurate_mesh import frames_of
-    from calmotion.tolerance.meshes.body_mesh import Volume
+    from calmotion.tolerance.meshes.options import Volume
 
     if not isinstance(geometry, Volume):
         return None

@@ -6,13 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from calmotion.arrays import Array, Indices
-from calmotion.model import (
-    Animation,
-    Character,
-    Motion,
-    Result,
-    Simulation,
-)
+from calmotion.model import Animation, Character, Motion, Result, Simulation
 from calmotion.support.naming import distinct_names
 from calmotion.views.playback import sample_motion
 from calmotion.views.rendering import Camera, View, draw_over_ghost, fit_camera, floor_below, pose, prepare

@@ -8,27 +8,10 @@ from functools import partial
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.model import (
-    Animation,
-    Character,
-    ModelChoices,
-    Result,
-)
-from calmotion.model.model_choice import (
-    AUTO,
-    KINDS,
-    OFF,
-    ON,
-    no_flexible_bodies,
-    run_settings,
-)
+from calmotion.model import Animation, Character, ModelChoices, Result
+from calmotion.model.model_choice import AUTO, KINDS, OFF, ON, no_flexible_bodies, run_settings
 from calmotion.model.motor import PRESCRIBED
-from calmotion.model.outputs import (
-    MotorEffects,
-    PlannedStep,
-    ShapedTracks,
-    Verification,
-)
+from calmotion.model.outputs import MotorEffects, PlannedStep, ShapedTracks, Verification
 from calmotion.model.run import LONG_SHOT, OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.tolerance.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in

@@ -6,12 +6,7 @@ import os
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.model.calibration.recording import (
-    MARKER,
-    Channel,
-    RecordingRequest,
-    SensorRecording,
-)
+from calmotion.model.calibration.recording import MARKER, Channel, RecordingRequest, SensorRecording
 from calmotion.support.naming import nearest
 from calmotion.support.reading import read_toml
 from calmotion.workflow.calibration.recording_reader import hash_of

@@ -6,12 +6,7 @@ import os
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.model.calibration.recording import (
-    ACCELEROMETER,
-    Channel,
-    RecordingRequest,
-    SensorRecording,
-)
+from calmotion.model.calibration.recording import ACCELEROMETER, Channel, RecordingRequest, SensorRecording
 from calmotion.support.reading import read_toml
 from calmotion.workflow.calibration.recording_reader import hash_of
 

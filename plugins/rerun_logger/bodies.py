@@ -8,13 +8,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 from calmotion.arrays import Array
-from calmotion.model import (
-    Body,
-    Character,
-    Motion,
-    Result,
-    SurfaceMesh,
-)
+from calmotion.model import Body, Character, Motion, Result, SurfaceMesh
 from calmotion.views.playback import carriers, deformed_points, deviations, modes_of, relative_poses
 from calmotion.views.shading import split_at_creases
 from numpy.typing import NDArray

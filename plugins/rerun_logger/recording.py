@@ -15,13 +15,7 @@ import rerun as rr
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.host import OperatorResult
-from calmotion.model import (
-    Animation,
-    Character,
-    Motion,
-    Result,
-    Simulation,
-)
+from calmotion.model import Animation, Character, Motion, Result, Simulation
 from calmotion.model.motor import measure_of
 from calmotion.model.outputs import SystemModes
 from calmotion.support.files import replaced

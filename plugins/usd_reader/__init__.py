@@ -5,13 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from calmotion.host import Operator, RunContext, registration
-from calmotion.model import (
-    Animation,
-    Character,
-    Findings,
-    MotorTracks,
-    Provenance,
-)
+from calmotion.model import Animation, Character, Findings, MotorTracks, Provenance
 from calmotion.model.run import OutputPaths, Source
 
 

@@ -6,12 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from calmotion.host import Operator, Property, RunContext, registration
-from calmotion.model import (
-    Animation,
-    Character,
-    Provenance,
-    Result,
-)
+from calmotion.model import Animation, Character, Provenance, Result
 from calmotion.model.outputs import WrittenLayer
 from calmotion.model.run import OutputPaths, Source
 

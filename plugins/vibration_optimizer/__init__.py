@@ -8,12 +8,7 @@ from typing import Any
 
 from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.model import (
-    Animation,
-    Character,
-    ModelChoices,
-    Result,
-)
+from calmotion.model import Animation, Character, ModelChoices, Result
 from calmotion.model.model_choice import run_settings, simplified_character, with_choices
 from calmotion.model.outputs import ShapedTracks
 from calmotion.model.result import is_exceeded, is_reached

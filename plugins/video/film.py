@@ -6,12 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from calmotion.model import (
-    Animation,
-    Character,
-    Result,
-    Simulation,
-)
+from calmotion.model import Animation, Character, Result, Simulation
 from calmotion.multibody.parallel import in_parallel
 from calmotion.support.naming import distinct_names
 from PIL import Image, ImageDraw

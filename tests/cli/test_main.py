@@ -16,14 +16,7 @@ from calmotion.cli.main import main
 from calmotion.errors import ShotError
 from calmotion.host.discovery import find_in_folder
 from calmotion.host.registry import Host
-from calmotion.model import (
-    Animation,
-    Character,
-    InputLayer,
-    ModeTable,
-    Provenance,
-    Result,
-)
+from calmotion.model import Animation, Character, InputLayer, ModeTable, Provenance, Result
 from calmotion.model.budget import MESH, BudgetEntry
 from calmotion.model.outputs import WrittenLayer
 from calmotion.model.run import OutputPaths, RunSettings, Source

@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 from calmotion import ShotError
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
-from calmotion.model.calibration.recording import (
-    ACCELEROMETER,
-    ANGLE,
-    EFFORT,
-    MARKER,
-)
+from calmotion.model.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER
 from calmotion.model.run import RunSettings
 from recorded import BIAS, CLOCKS, LOAD, PLACE, PLASTIC, TRUTH, only
 

@@ -5,15 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.identification.robots import robot_with
-from calmotion.model.calibration.estimates import (
-    CENTRE,
-    DAMPING,
-    DELAY,
-    DENSITY,
-    ENCODER_OFFSET,
-    MASS,
-    MODULUS,
-)
+from calmotion.model.calibration.estimates import CENTRE, DAMPING, DELAY, DENSITY, ENCODER_OFFSET, MASS, MODULUS
 from calmotion.model.motor import DRIVE
 from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.bodies import reduce_bodies

@@ -8,12 +8,7 @@ from calmotion import ShotError
 from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import ends_at_rest, refuse_cyclic, signals_of
 from calmotion.model import Animation, Track
-from calmotion.model.calibration.recording import (
-    ACCELEROMETER,
-    ANGLE,
-    EFFORT,
-    MARKER,
-)
+from calmotion.model.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER
 from calmotion.model.motor import DRIVE, SERVO, Rotor
 from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot

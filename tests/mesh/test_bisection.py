@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion.mesh.bisection import bisected
-from calmotion.mesh.tetrahedra import (
-    boundary_triangles,
-    min_dihedral_deg,
-    surface_area,
-    tet_volumes,
-)
+from calmotion.mesh.tetrahedra import boundary_triangles, min_dihedral_deg, surface_area, tet_volumes
 
 
 @pytest.mark.parametrize("seed", [0, 1])

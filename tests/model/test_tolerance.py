@@ -5,14 +5,7 @@ import dataclasses
 import calmotion as cm
 import numpy as np
 import pytest
-from calmotion.model import (
-    Body,
-    Character,
-    Frame,
-    Joint,
-    RetargetSettings,
-    Target,
-)
+from calmotion.model import Body, Character, Frame, Joint, RetargetSettings, Target
 from calmotion.model.tolerance import SMALLEST, reach, tolerance_of
 from steppers import write_stepper
 

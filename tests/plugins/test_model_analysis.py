@@ -4,13 +4,7 @@ import sys
 
 import pytest
 from calmotion.host import NotAsked
-from calmotion.model import (
-    Character,
-    FEMeshes,
-    ModelChoices,
-    Result,
-    Simplification,
-)
+from calmotion.model import Character, FEMeshes, ModelChoices, Result, Simplification
 from calmotion.model.model_choice import ON
 from calmotion.model.outputs import PlannedStep
 from calmotion.model.run import OutputPaths, RunSettings, Source

@@ -1,11 +1,6 @@
 import small_shots as shots
 from calmotion.host import Host
-from calmotion.model import (
-    Animation,
-    Character,
-    Provenance,
-    Result,
-)
+from calmotion.model import Animation, Character, Provenance, Result
 from calmotion.model.outputs import WrittenLayer
 from calmotion.model.run import OutputPaths, RunSettings, Source
 from calmotion.testing import host_with

@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
-from calmotion.model import (
-    Body,
-    FlexibleSettings,
-    MassProperties,
-    SurfaceMesh,
-)
+from calmotion.model import Body, FlexibleSettings, MassProperties, SurfaceMesh
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduce import reduce_body
 from calmotion.reduction.reduced_body import rigid_invariants

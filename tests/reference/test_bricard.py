@@ -5,15 +5,7 @@ Each hinge is across the two bars that it joins. By counting it cannot move (one
 
 import numpy as np
 import pytest
-from calmotion.model import (
-    WORLD,
-    Body,
-    Character,
-    Frame,
-    Joint,
-    MassProperties,
-    Target,
-)
+from calmotion.model import WORLD, Body, Character, Frame, Joint, MassProperties, Target
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace

@@ -10,12 +10,7 @@ import numpy as np
 import pytest
 from arms import chain, compiled, frame
 from calmotion.benchmarks.motors.lumped import simulate_lumped
-from calmotion.model import (
-    Animation,
-    MassProperties,
-    Target,
-    Track,
-)
+from calmotion.model import Animation, MassProperties, Target, Track
 from calmotion.model.motor import Rotor
 from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.kinematics import rigid_state

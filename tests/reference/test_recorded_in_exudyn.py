@@ -12,12 +12,7 @@ from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import signals_of
 from calmotion.model import Animation, Joint, Track
 from calmotion.model.calibration.estimates import HIGHER_MODES
-from calmotion.model.calibration.recording import (
-    ACCELEROMETER,
-    MARKER,
-    Channel,
-    SensorRecording,
-)
+from calmotion.model.calibration.recording import ACCELEROMETER, MARKER, Channel, SensorRecording
 from calmotion.model.curves import curve_of
 from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree

@@ -10,12 +10,7 @@ from calmotion.identification.calibrate import CalibrationSettings, calibrate_sh
 from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import signals_of
 from calmotion.model import Animation, Target, Track
-from calmotion.model.calibration.recording import (
-    ANGLE,
-    MARKER,
-    Channel,
-    SensorRecording,
-)
+from calmotion.model.calibration.recording import ANGLE, MARKER, Channel, SensorRecording
 from calmotion.model.curves import curve_of
 from calmotion.model.motor import Rotor
 from calmotion.model.run import RunSettings

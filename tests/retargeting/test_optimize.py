@@ -5,12 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.model import (
-    Animation,
-    FreeTrack,
-    Track,
-    WeightTrack,
-)
+from calmotion.model import Animation, FreeTrack, Track, WeightTrack
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.simulation.compiled_shot import compile_shot

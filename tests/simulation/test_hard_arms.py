@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 from calmotion.benchmarks.scenes.beam_arm import IDENTITY, beam_arm, quintic, shot_of
 from calmotion.errors import ShotError
-from calmotion.model import (
-    Body,
-    Frame,
-    Joint,
-    MassProperties,
-)
+from calmotion.model import Body, Frame, Joint, MassProperties
 from made_shots import simulated
 
 STEEL = {"youngs_modulus": 2.1e11, "density": 7800.0}

@@ -4,16 +4,7 @@ import dataclasses
 
 import pytest
 from calmotion.model import ModelChoice, ModelChoices
-from calmotion.model.budget import (
-    CHOICES,
-    MESH,
-    PATCHES,
-    REDUCTION,
-    SEARCH,
-    STEP,
-    SUBSPACE,
-    verdict_on,
-)
+from calmotion.model.budget import CHOICES, MESH, PATCHES, REDUCTION, SEARCH, STEP, SUBSPACE, verdict_on
 from calmotion.model.model_choice import with_choices
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance

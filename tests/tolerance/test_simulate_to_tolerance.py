@@ -19,12 +19,7 @@ from calmotion.tolerance import step_choice
 from calmotion.tolerance.pod_subspace import ProjectedShot
 from calmotion.tolerance.simulate_to_tolerance import found_tracks, planned_step, simulate_to_tolerance
 from calmotion.tolerance.step_choice import WHOLE
-from calmotion.tolerance.step_error import (
-    CLOSED_GAP,
-    distance,
-    frames_of,
-    simulate_at,
-)
+from calmotion.tolerance.step_error import CLOSED_GAP, distance, frames_of, simulate_at
 
 FINE = 1 / 7680
 

@@ -3,14 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.errors import IntegrationError
-from calmotion.tolerance.step_choice import (
-    LEAST,
-    MISSED,
-    MOST,
-    WHOLE,
-    confirmed_step,
-    step_allowance,
-)
+from calmotion.tolerance.step_choice import LEAST, MISSED, MOST, WHOLE, confirmed_step, step_allowance
 from calmotion.tolerance.step_error import StepRun, distance
 
 

@@ -10,12 +10,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.identification.problem import Calibrated
 from calmotion.model.calibration.estimates import ROBOT_KINDS
-from calmotion.model.calibration.recording import (
-    ACCELEROMETER,
-    ANGLE,
-    EFFORT,
-    MARKER,
-)
+from calmotion.model.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER
 
 RATE = 100.0  # of the sensors that are imagined [Hz]
 NOISE: Mapping[str, float] = {MARKER: 5e-4, ACCELEROMETER: 0.1, ANGLE: 5e-4}  # [m], [m/s^2], [rad or m]

@@ -18,20 +18,8 @@ from calmotion.identification.parameters import PRIORS, Parameter
 from calmotion.identification.recordings.noise import noise_of
 from calmotion.identification.signals import Signals
 from calmotion.model import Character
-from calmotion.model.calibration.estimates import (
-    BIAS,
-    CLOCK_DRIFT,
-    CLOCK_OFFSET,
-    PLACE,
-)
-from calmotion.model.calibration.recording import (
-    ACCELEROMETER,
-    ANGLE,
-    EFFORT,
-    MARKER,
-    Channel,
-    SensorRecording,
-)
+from calmotion.model.calibration.estimates import BIAS, CLOCK_DRIFT, CLOCK_OFFSET, PLACE
+from calmotion.model.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER, Channel, SensorRecording
 from calmotion.support.naming import nearest
 
 REST = 0.5  # time before the first frame that counts [s]: the robot rests

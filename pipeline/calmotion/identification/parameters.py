@@ -35,12 +35,7 @@ from calmotion.model.calibration.estimates import (
     VELOCITY_GAIN,
     VISCOUS_FRICTION,
 )
-from calmotion.model.motor import (
-    DRIVE,
-    PRESCRIBED,
-    SERVO,
-    Motor,
-)
+from calmotion.model.motor import DRIVE, PRESCRIBED, SERVO, Motor
 from calmotion.retargeting.robust.scenarios import payload_bodies
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.support.naming import nearest

@@ -15,12 +15,7 @@ from calmotion.identification.model_error import covariance_of_model
 from calmotion.identification.problem import Calibrated, Measured
 from calmotion.identification.recordings.free_decay import decay_factors
 from calmotion.identification.recordings.noise import correlation_time, least_sigma, spread_of
-from calmotion.model.calibration.estimates import (
-    DAMPING,
-    GEAR_STIFFNESS,
-    MODULUS,
-    POSITION_GAIN,
-)
+from calmotion.model.calibration.estimates import DAMPING, GEAR_STIFFNESS, MODULUS, POSITION_GAIN
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.parallel import in_parallel
 

@@ -13,12 +13,7 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.identification.robots import Robot
 from calmotion.model import Animation
-from calmotion.model.calibration.recording import (
-    ACCELEROMETER,
-    ANGLE,
-    EFFORT,
-    MARKER,
-)
+from calmotion.model.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER
 from calmotion.model.curves import curve_of
 from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.reactions import reactions

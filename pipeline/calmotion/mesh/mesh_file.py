@@ -8,12 +8,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.cells import (
-    CORNERS,
-    TRIANGLES,
-    tets_of,
-    triangles_of,
-)
+from calmotion.mesh.cells import CORNERS, TRIANGLES, tets_of, triangles_of
 from calmotion.model import SurfaceMesh, TetGeometry
 from calmotion.support.memory import too_large
 

@@ -1,13 +1,6 @@
 """What a shot is, as plain data in SI units: read by plugins, solved by the engine, written by plugins."""
 
-from calmotion.model.animation import (
-    Animation,
-    FreeTrack,
-    MotorTracks,
-    MovingFrame,
-    Track,
-    WeightTrack,
-)
+from calmotion.model.animation import Animation, FreeTrack, MotorTracks, MovingFrame, Track, WeightTrack
 from calmotion.model.character import (
     WORLD,
     Body,

@@ -6,23 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from calmotion.arrays import Array
-from calmotion.model import (
-    WORLD,
-    Body,
-    Character,
-    Frame,
-    Joint,
-    MassProperties,
-    Motor,
-    Target,
-)
-from calmotion.model.motor import (
-    MODELS,
-    ON_ERROR,
-    ON_JOINT,
-    PRESCRIBED,
-    Rotor,
-)
+from calmotion.model import WORLD, Body, Character, Frame, Joint, MassProperties, Motor, Target
+from calmotion.model.motor import MODELS, ON_ERROR, ON_JOINT, PRESCRIBED, Rotor
 from calmotion.multibody.model.model import Model, body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.reduced_body import ReducedBody

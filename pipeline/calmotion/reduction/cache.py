@@ -17,12 +17,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from calmotion.model.meshes import (
-    CutPatch,
-    FEMesh,
-    MeshQuality,
-    MissingVolume,
-)
+from calmotion.model.meshes import CutPatch, FEMesh, MeshQuality, MissingVolume
 from calmotion.model.result import Simplification
 from calmotion.reduction.reduced_body import Elasticity, InterfaceStiffness, Invariants, Marker, ReducedBody
 from calmotion.support.caching.cache_folder import REDUCTIONS

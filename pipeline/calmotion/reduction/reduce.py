@@ -13,12 +13,7 @@ from calmotion.mesh.patches.interface_patches import AttachmentFrame, InterfaceP
 from calmotion.mesh.patches.rim_error import compliance_error, rim_error
 from calmotion.mesh.quadratic import QuadraticMesh
 from calmotion.model.budget import REDUCTION
-from calmotion.model.character import (
-    DEFAULT_TOLERANCE,
-    Body,
-    ElasticMaterial,
-    SurfaceMesh,
-)
+from calmotion.model.character import DEFAULT_TOLERANCE, Body, ElasticMaterial, SurfaceMesh
 from calmotion.model.meshes import FEMesh
 from calmotion.model.result import Simplification
 from calmotion.reduction.basis.craig_bampton import Basis, reduced_basis

@@ -42,20 +42,8 @@ from calmotion.tolerance.simulate_to_tolerance import (
     with_modes,
     with_subspaces,
 )
-from calmotion.tolerance.step_choice import (
-    FIRST,
-    LAST,
-    allowed_step_error,
-    chooses_step,
-)
-from calmotion.tolerance.step_error import (
-    StepRun,
-    distance,
-    frames_of,
-    largest_step,
-    order_of,
-    simulate_at,
-)
+from calmotion.tolerance.step_choice import FIRST, LAST, allowed_step_error, chooses_step
+from calmotion.tolerance.step_error import StepRun, distance, frames_of, largest_step, order_of, simulate_at
 
 MARGIN, MOST = 0.8, 3  # safety factor of a new step, and most searches
 FIRST_STEP = 0.2  # of the shake: the error that the step of the first search may have

@@ -8,13 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from calmotion.errors import ShotError
-from calmotion.model import (
-    Body,
-    Character,
-    FEMeshes,
-    ModeTable,
-    Skin,
-)
+from calmotion.model import Body, Character, FEMeshes, ModeTable, Skin
 from calmotion.model.character import ElasticMaterial, with_ideal_motors, with_settings
 from calmotion.model.meshes import FEMesh
 from calmotion.model.tolerance import tolerance_of

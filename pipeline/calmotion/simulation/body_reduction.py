@@ -87,7 +87,7 @@ class BodyReduction:
         Raises:
             ShotError: A body that cannot be reduced.
         """
-        from calmotion.tolerance.meshes.mesh_refinement import refined_for_loads
+        from calmotion.reduction.mesh_refinement import refined_for_loads
 
         assert self.meshes is not None and self.loads is not None
         anchors, models = body_anchors(self.character, self._tree), self._models()

@@ -8,12 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.model import (
-    LimitUse,
-    Motion,
-    Simplification,
-    Simulation,
-)
+from calmotion.model import LimitUse, Motion, Simplification, Simulation
 from calmotion.multibody.analysis.dead_centres import dead_centres
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.analysis.unheld_joints import unheld_joints

@@ -5,17 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from calmotion.model import Character, Result
-from calmotion.model.budget import (
-    CHOICES,
-    MESH,
-    PATCHES,
-    REDUCTION,
-    SEARCH,
-    SEARCH_SHARE,
-    STEP,
-    SUBSPACE,
-    BudgetEntry,
-)
+from calmotion.model.budget import CHOICES, MESH, PATCHES, REDUCTION, SEARCH, SEARCH_SHARE, STEP, SUBSPACE, BudgetEntry
 from calmotion.model.tolerance import tolerance_of
 from calmotion.tolerance import converged_reduction, simulate_to_tolerance, step_choice
 from calmotion.tolerance.meshes import mesh_budget

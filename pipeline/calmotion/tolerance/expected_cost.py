@@ -7,12 +7,7 @@ from dataclasses import dataclass
 
 from calmotion.errors import ShotError
 from calmotion.model import Animation, Character
-from calmotion.model.run import (
-    LONG_SHOT,
-    WINDOW,
-    WINDOW_OVERLAP,
-    RunSettings,
-)
+from calmotion.model.run import LONG_SHOT, WINDOW, WINDOW_OVERLAP, RunSettings
 from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
 
 # Measured on the five samples: 1.5 to 2.9 us for a step and a coordinate; a search costs 40 to 300 simulations.

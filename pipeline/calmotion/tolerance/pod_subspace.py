@@ -17,12 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.model import (
-    Animation,
-    Character,
-    Simplification,
-    Track,
-)
+from calmotion.model import Animation, Character, Simplification, Track
 from calmotion.model.budget import SUBSPACE
 from calmotion.model.character import FlexibleSettings
 from calmotion.model.model_choice import OFF, ON

@@ -19,13 +19,7 @@ from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.simulate import Progress, simulate_shot
 from calmotion.tolerance.pod_subspace import ProjectedShot, ReferenceRun
 from calmotion.tolerance.reduced_bodies import RunMemory
-from calmotion.tolerance.step_error import (
-    StepRun,
-    distance,
-    frames_of,
-    run_or_none,
-    simulate_at,
-)
+from calmotion.tolerance.step_error import StepRun, distance, frames_of, run_or_none, simulate_at
 
 
 def with_last_choices(

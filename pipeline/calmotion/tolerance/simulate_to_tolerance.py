@@ -12,14 +12,7 @@ from functools import partial
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.model import (
-    Accuracy,
-    Animation,
-    Character,
-    Result,
-    Simplification,
-    Track,
-)
+from calmotion.model import Accuracy, Animation, Character, Result, Simplification, Track
 from calmotion.model.budget import STEP, SUBSPACE
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import tolerance_of
@@ -36,12 +29,7 @@ from calmotion.tolerance.meshes.mesh_budget import mesh_error, patch_error
 from calmotion.tolerance.pod_subspace import ProjectedShot, ReferenceRun, project_to_subspace
 from calmotion.tolerance.reduced_bodies import SUBSPACES, TIME_STEP, RunMemory
 from calmotion.tolerance.simulate_again import with_last_choices
-from calmotion.tolerance.step_choice import (
-    FIRST,
-    allowed_step_error,
-    chooses_step,
-    chosen_step,
-)
+from calmotion.tolerance.step_choice import FIRST, allowed_step_error, chooses_step, chosen_step
 from calmotion.tolerance.step_error import (
     StepRun,
     effort_errors,

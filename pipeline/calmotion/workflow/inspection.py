@@ -25,12 +25,7 @@ from calmotion.model import (
     Track,
 )
 from calmotion.model.motor import SERVO, measure_of
-from calmotion.model.outputs import (
-    ModeShapes,
-    MotorEffects,
-    PlannedStep,
-    SystemModes,
-)
+from calmotion.model.outputs import ModeShapes, MotorEffects, PlannedStep, SystemModes
 from calmotion.model.run import WINDOW_OVERLAP, RunSettings
 from calmotion.tolerance.reduced_bodies import ReducedBodies
 from calmotion.version import __version__

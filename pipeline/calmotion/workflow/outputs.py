@@ -8,13 +8,7 @@ from pathlib import Path
 
 from calmotion.host import Host, SettingError
 from calmotion.model import Character, Provenance
-from calmotion.model.outputs import (
-    CsvFile,
-    Figures,
-    Recording,
-    Video,
-    WrittenLayer,
-)
+from calmotion.model.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
 from calmotion.model.run import OutputPaths
 from calmotion.support.files import try_writing
 

@@ -10,25 +10,11 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.host import OperatorResult, Run
-from calmotion.model import (
-    Character,
-    LimitUse,
-    Result,
-    Simplification,
-    Simulation,
-)
+from calmotion.model import Character, LimitUse, Result, Simplification, Simulation
 from calmotion.model.budget import Verdict, verdict_on
 from calmotion.model.character import motors_give
 from calmotion.model.motor import measure_of
-from calmotion.model.outputs import (
-    CsvFile,
-    Figures,
-    Recording,
-    Rig,
-    Verification,
-    Video,
-    WrittenLayer,
-)
+from calmotion.model.outputs import CsvFile, Figures, Recording, Rig, Verification, Video, WrittenLayer
 from calmotion.model.result import is_exceeded
 from calmotion.model.run import Source
 from calmotion.support.memory import peak_memory

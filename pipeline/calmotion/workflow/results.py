@@ -12,14 +12,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model import Character, Result, Simulation
-from calmotion.model.outputs import (
-    CsvFile,
-    Figures,
-    Recording,
-    Verification,
-    Video,
-    WrittenLayer,
-)
+from calmotion.model.outputs import CsvFile, Figures, Recording, Verification, Video, WrittenLayer
 from calmotion.model.run import OutputPaths
 from calmotion.model.table import columns, read_only
 from calmotion.workflow.exporting.result_files import no_input

@@ -10,12 +10,7 @@ from typing import Any, TypeVar
 from calmotion.errors import ShotError
 from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, merge, nearest
 from calmotion.model import Character, Provenance
-from calmotion.model.run import (
-    INTEGRATORS,
-    SHAPERS,
-    OutputPaths,
-    Source,
-)
+from calmotion.model.run import INTEGRATORS, SHAPERS, OutputPaths, Source
 from calmotion.support import interrupts
 from calmotion.support.foreign_files import remedy_for
 from calmotion.workflow.outputs import files_of, prepare_outputs, refuse_layers, refuse_other_types, requested_files

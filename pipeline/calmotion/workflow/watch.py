@@ -9,15 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from calmotion.host import Operator
-from calmotion.model import (
-    Animation,
-    Character,
-    FEMeshes,
-    ModelChoices,
-    Provenance,
-    Result,
-    Track,
-)
+from calmotion.model import Animation, Character, FEMeshes, ModelChoices, Provenance, Result, Track
 from calmotion.model.model_choice import run_settings, simplified_character
 from calmotion.model.run import Source
 from calmotion.workflow.shot import Shot

@@ -7,16 +7,7 @@ import pytest
 from calmotion.benchmarks.common.tables import write_rows
 from calmotion.benchmarks.integrators import stability, stability_map
 from calmotion.benchmarks.integrators.stability import largest_steps
-from calmotion.benchmarks.integrators.stability_map import (
-    FAILED,
-    MAPS,
-    REFUSED,
-    RUNS,
-    STEPS,
-    Cell,
-    all_cells,
-    cells_of,
-)
+from calmotion.benchmarks.integrators.stability_map import FAILED, MAPS, REFUSED, RUNS, STEPS, Cell, all_cells, cells_of
 from calmotion.model.run import INTEGRATORS
 
 

@@ -7,17 +7,7 @@ import pytest
 from arms import chain, frame
 from calmotion import ShotError
 from calmotion.benchmarks.motors.lumped import lumped_mjcf, simulate_lumped
-from calmotion.model import (
-    Animation,
-    Body,
-    Character,
-    FlexibleSettings,
-    Joint,
-    MassProperties,
-    Motor,
-    Target,
-    Track,
-)
+from calmotion.model import Animation, Body, Character, FlexibleSettings, Joint, MassProperties, Motor, Target, Track
 from calmotion.model.character import ElasticMaterial
 from calmotion.model.motor import Follows, Rotor
 from calmotion.model.run import RunSettings

@@ -3,13 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.model import (
-    Body,
-    ElasticMaterial,
-    FlexibleSettings,
-    Frame,
-    SurfaceMesh,
-)
+from calmotion.model import Body, ElasticMaterial, FlexibleSettings, Frame, SurfaceMesh
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 STEEL = ElasticMaterial("/Looks/Steel", 2.1e11, 0.3, 7850.0)

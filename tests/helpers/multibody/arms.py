@@ -1,15 +1,7 @@
 """Small characters for tests: pendulums and planar arms, rigid."""
 
 import numpy as np
-from calmotion.model import (
-    Body,
-    Character,
-    Frame,
-    Joint,
-    MassProperties,
-    Motor,
-    Target,
-)
+from calmotion.model import Body, Character, Frame, Joint, MassProperties, Motor, Target
 from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import span_tree
 

@@ -1,15 +1,7 @@
 """Gantries for tests: rigid carriages on slides, and beams on them that bend, twist and stretch."""
 
 import numpy as np
-from calmotion.model import (
-    Body,
-    Character,
-    Frame,
-    Joint,
-    MassProperties,
-    Motor,
-    Target,
-)
+from calmotion.model import Body, Character, Frame, Joint, MassProperties, Motor, Target
 from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.reduced_body import Invariants, Marker, ReducedBody

@@ -6,15 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from calmotion.benchmarks.scenes.beam_arm import IDENTITY, LIFTS
-from calmotion.model import (
-    Body,
-    Character,
-    Frame,
-    Joint,
-    MassProperties,
-    Motor,
-    Target,
-)
+from calmotion.model import Body, Character, Frame, Joint, MassProperties, Motor, Target
 from calmotion.model.character import WORLD
 
 _ANGLE = "drive:angular:physics:targetPosition"

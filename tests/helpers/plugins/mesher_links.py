@@ -9,15 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.mesh.repair import closed_solid
-from calmotion.model import (
-    Body,
-    Character,
-    ElasticMaterial,
-    FEMeshes,
-    FlexibleSettings,
-    Frame,
-    SurfaceMesh,
-)
+from calmotion.model import Body, Character, ElasticMaterial, FEMeshes, FlexibleSettings, Frame, SurfaceMesh
 from calmotion.testing import run_operator
 
 PLUGIN = Path(__file__).resolve().parents[3] / "plugins" / "fe_mesher"

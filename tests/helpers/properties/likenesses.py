@@ -6,15 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from calmotion.model import (
-    WORLD,
-    Animation,
-    Character,
-    FEMeshes,
-    Frame,
-    Motion,
-    Track,
-)
+from calmotion.model import WORLD, Animation, Character, FEMeshes, Frame, Motion, Track
 from random_shots import Shot, beyond, rotation_of
 
 BESIDE = 1e-3  # share of what a joint bears, below which its motor's effort is next to nothing

@@ -4,16 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from arms import Z_TO_Y, frame
-from calmotion.model import (
-    WORLD,
-    Body,
-    Character,
-    Frame,
-    Joint,
-    MassProperties,
-    Motor,
-    Target,
-)
+from calmotion.model import WORLD, Body, Character, Frame, Joint, MassProperties, Motor, Target
 from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import span_tree
 from scipy.spatial.transform import Rotation

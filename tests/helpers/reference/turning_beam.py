@@ -6,15 +6,7 @@ import numpy as np
 from arms import Z_TO_Y, frame
 from boxes import box_tets, fe_mesh
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
-from calmotion.model import (
-    Body,
-    Character,
-    FlexibleSettings,
-    Joint,
-    MassProperties,
-    Motor,
-    Target,
-)
+from calmotion.model import Body, Character, FlexibleSettings, Joint, MassProperties, Motor, Target
 from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace

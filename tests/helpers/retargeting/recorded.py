@@ -10,14 +10,7 @@ from calmotion.identification.parameters import robot_parameters
 from calmotion.identification.problem import Calibrated
 from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import signals_of
-from calmotion.model.calibration.recording import (
-    ACCELEROMETER,
-    ANGLE,
-    EFFORT,
-    MARKER,
-    Channel,
-    SensorRecording,
-)
+from calmotion.model.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER, Channel, SensorRecording
 from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.bodies import reduce_bodies

@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.model import (
-    MotorCurve,
-    Result,
-    Simulation,
-    Track,
-)
+from calmotion.model import MotorCurve, Result, Simulation, Track
 from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves

@@ -11,13 +11,7 @@ from calmotion.identification.parameters import robot_parameters
 from calmotion.identification.problem import Calibrated
 from calmotion.identification.robots import robot_with
 from calmotion.model import Animation, Track
-from calmotion.model.calibration.recording import (
-    ACCELEROMETER,
-    ANGLE,
-    MARKER,
-    Channel,
-    SensorRecording,
-)
+from calmotion.model.calibration.recording import ACCELEROMETER, ANGLE, MARKER, Channel, SensorRecording
 from calmotion.model.run import RunSettings
 from recorded import LOAD, MOTOR, PLASTIC
 

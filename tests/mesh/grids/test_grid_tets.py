@@ -5,12 +5,7 @@ import pytest
 import trimesh
 from calmotion.mesh.grids import grid_tets as grid_tets_module
 from calmotion.mesh.grids.grid_tets import grid_tets
-from calmotion.mesh.tetrahedra import (
-    boundary_triangles,
-    connected_parts,
-    min_dihedral_deg,
-    tet_volumes,
-)
+from calmotion.mesh.tetrahedra import boundary_triangles, connected_parts, min_dihedral_deg, tet_volumes
 
 
 def made(mesh, spacing):

@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.mesh.tetrahedralize import filling, tetwild
-from calmotion.model import (
-    FEMesh,
-    Frame,
-    MassProperties,
-    TetGeometry,
-)
+from calmotion.model import FEMesh, Frame, MassProperties, TetGeometry
 from calmotion.model.materials.parts import Part
 from calmotion.model.materials.printed import core_of
 from calmotion.model.meshes import MeshQuality

@@ -9,20 +9,10 @@ from calmotion.errors import ShotError
 from calmotion.mesh import cells as cells_module
 from calmotion.mesh import mesh_file as mesh_file_module
 from calmotion.mesh.repair import closed_solid
-from calmotion.mesh.tetrahedra import (
-    boundary_triangles,
-    oriented_tets,
-    surface_area,
-    tet_volumes,
-)
-from calmotion.model import (
-    Body,
-    ElasticMaterial,
-    FlexibleSettings,
-    Frame,
-    TetGeometry,
-)
+from calmotion.mesh.tetrahedra import boundary_triangles, oriented_tets, surface_area, tet_volumes
+from calmotion.model import Body, ElasticMaterial, FlexibleSettings, Frame, TetGeometry
 from calmotion.tolerance.meshes import body_mesh
+from calmotion.tolerance.meshes.options import MeshOptions
 
 MATERIAL = ElasticMaterial("/Looks/Plastic", 1.8e9, 0.35, 1200.0)
 
@@ -31,7 +21,7 @@ def mesh(file, scale=1.0):
     """The FEMesh of a body whose geometry is a file."""
     rest = Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
     body = Body("/Arm/link", rest, None, (), flexible=FlexibleSettings(MATERIAL, mesh_file=str(file), mesh_scale=scale))
-    options = body_mesh.MeshOptions(cache=False)
+    options = MeshOptions(cache=False)
     return body_mesh.mesh_body(0, body, options)
 
 

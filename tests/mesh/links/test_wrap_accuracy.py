@@ -12,6 +12,7 @@ from calmotion.mesh.sources import choice
 from calmotion.model import Frame
 from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
 from calmotion.tolerance.meshes import body_mesh
+from calmotion.tolerance.meshes.options import MeshOptions
 from mesher_links import FLEXIBLE, box, link, run, solid, surface
 
 LENGTH, WIDTH, HEIGHT = 0.16, 0.03, 0.014
@@ -85,7 +86,7 @@ def test_first_frequencies_of_wrapped_parts_are_within_five_percent_and_of_a_bea
     beam = body_mesh.mesh_body(
         0,
         body := replace(link(element_size=0.009), mass=mass),
-        body_mesh.MeshOptions(),
+        MeshOptions(),
         (ROOT, TIP),
     )
     found = np.sqrt(frequency_estimate(beam, body, ROOT).squares)

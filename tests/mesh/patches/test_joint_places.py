@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, at_one_place
-from calmotion.mesh.patches.joint_places import (
-    balls_between,
-    nearest_apart,
-    reached_by,
-    within,
-)
+from calmotion.mesh.patches.joint_places import balls_between, nearest_apart, reached_by, within
 from calmotion.mesh.tetrahedra import boundary_triangles
 from calmotion.model import InterfaceSurface
 

@@ -7,12 +7,7 @@ from calmotion.mesh.patches.cut_patches import with_rims
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches
 from calmotion.mesh.patches.rim_error import compliance_error, rim_edges, rim_error
 from calmotion.mesh.quadratic import quadratic_mesh
-from calmotion.model import (
-    Body,
-    ElasticMaterial,
-    FlexibleSettings,
-    Frame,
-)
+from calmotion.model import Body, ElasticMaterial, FlexibleSettings, Frame
 from calmotion.model.meshes import CutPatch
 from calmotion.reduction.reduce import reduce_body
 

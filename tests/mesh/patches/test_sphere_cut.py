@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.mesh.patches.sphere_cut import cut, inside
-from calmotion.mesh.tetrahedra import (
-    boundary_triangles,
-    min_dihedral_deg,
-    surface_area,
-    tet_volumes,
-)
+from calmotion.mesh.tetrahedra import boundary_triangles, min_dihedral_deg, surface_area, tet_volumes
 
 SIZE = (0.3, 0.04, 0.04)
 

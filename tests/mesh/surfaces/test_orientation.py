@@ -4,12 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.mesh.surfaces.orientation import (
-    closing_signs,
-    directed_edges,
-    patch_boundaries,
-    patches_of,
-)
+from calmotion.mesh.surfaces.orientation import closing_signs, directed_edges, patch_boundaries, patches_of
 from calmotion.mesh.tetrahedra import boundary_triangles, surface_volume
 
 

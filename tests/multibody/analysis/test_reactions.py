@@ -3,14 +3,7 @@
 import numpy as np
 import pytest
 from arms import chain, compiled, frame
-from calmotion.model import (
-    Body,
-    Character,
-    Joint,
-    MassProperties,
-    Motor,
-    Target,
-)
+from calmotion.model import Body, Character, Joint, MassProperties, Motor, Target
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.integrators.simulation import simulate

@@ -6,13 +6,7 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.errors import IntegrationError
-from calmotion.model import (
-    Body,
-    Character,
-    Frame,
-    Joint,
-    MassProperties,
-)
+from calmotion.model import Body, Character, Frame, Joint, MassProperties
 from calmotion.model.run import RunSettings
 from calmotion.model.standing.contact import Contact
 from calmotion.multibody.analysis.kinematics import rigid_state, target_jacobians

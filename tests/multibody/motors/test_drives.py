@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 from arms import Z_TO_Y, chain, compiled, frame
 from calmotion.errors import ShotError
-from calmotion.model import (
-    Body,
-    Character,
-    Joint,
-    MassProperties,
-    Motor,
-)
+from calmotion.model import Body, Character, Joint, MassProperties, Motor
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.analysis.reactions import reactions, transmitted

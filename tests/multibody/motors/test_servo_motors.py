@@ -5,13 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import chain, compiled, frame
-from calmotion.model import (
-    Body,
-    Character,
-    Joint,
-    MassProperties,
-    Motor,
-)
+from calmotion.model import Body, Character, Joint, MassProperties, Motor
 from calmotion.model.motor import Rotor
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.motors.servos import motor_effort

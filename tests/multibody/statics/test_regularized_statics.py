@@ -3,16 +3,7 @@
 import numpy as np
 import pytest
 from arms import chain, compiled
-from calmotion.model import (
-    WORLD,
-    Body,
-    Character,
-    Frame,
-    Joint,
-    MassProperties,
-    Motor,
-    Target,
-)
+from calmotion.model import WORLD, Body, Character, Frame, Joint, MassProperties, Motor, Target
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace

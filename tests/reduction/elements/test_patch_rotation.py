@@ -9,13 +9,7 @@ from calmotion.reduction.basis.fixed_interface import FixedInterface
 from calmotion.reduction.basis.modal_derivatives import Support, extended_basis
 from calmotion.reduction.elements import patch_rotation
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.elements.patch_rotation import (
-    shape_changes,
-    spring_rows,
-    springs,
-    square_fields,
-    squares,
-)
+from calmotion.reduction.elements.patch_rotation import shape_changes, spring_rows, springs, square_fields, squares
 from scipy.spatial.transform import Rotation
 
 ENTRIES = ((0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1))

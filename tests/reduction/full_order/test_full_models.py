@@ -9,12 +9,7 @@ import numpy as np
 import pytest
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.tetrahedra import measure_quality
-from calmotion.model import (
-    Body,
-    FEMesh,
-    FlexibleSettings,
-    MassProperties,
-)
+from calmotion.model import Body, FEMesh, FlexibleSettings, MassProperties
 from calmotion.reduction.full_order import full_models as module
 from calmotion.reduction.full_order.full_models import FullModels, Member
 

@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.tetrahedra import measure_quality
-from calmotion.model import (
-    Body,
-    FEMesh,
-    FlexibleSettings,
-    Frame,
-)
+from calmotion.model import Body, FEMesh, FlexibleSettings, Frame
 from calmotion.reduction.full_order.likeness import turn_between
 from calmotion.reduction.reduce import full_body, reduce_body
 

@@ -2,12 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.reduction.full_order.mesh_extrapolation import (
-    Estimate,
-    extrapolation,
-    interface_factors,
-    mode_ratios,
-)
+from calmotion.reduction.full_order.mesh_extrapolation import Estimate, extrapolation, interface_factors, mode_ratios
 
 
 def estimate(error, stiffness, nodes=1000):

@@ -14,13 +14,8 @@ from calmotion.model import Body, FEMesh, FlexibleSettings
 from calmotion.reduction.full_order.mesh_estimates import frequency_estimate, load_estimate
 from calmotion.reduction.full_order.mesh_extrapolation import Estimate, by_shape
 from calmotion.reduction.load_envelope import LoadEnvelope
+from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies, refined_for_loads, with_own_stiffness
 from calmotion.reduction.reduce import linear_modes
-from calmotion.tolerance.meshes.mesh_refinement import (
-    Effort,
-    refined_for_frequencies,
-    refined_for_loads,
-    with_own_stiffness,
-)
 
 SIZE, MORE = (0.3, 0.04, 0.03), (0.0, 0.0, 4e-4)  # too thin by 1.3%
 

@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.model import Track
-from calmotion.model.curves import (
-    curve_of,
-    cycle_gap,
-    cyclic_curve,
-    interpolate,
-)
+from calmotion.model.curves import curve_of, cycle_gap, cyclic_curve, interpolate
 from calmotion.simulation.inputs.curves import needed_pre_roll, sample_tracks
 from calmotion.simulation.inputs.time_grid import make_grid
 

@@ -2,15 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.model import (
-    Body,
-    Character,
-    Frame,
-    Joint,
-    MassProperties,
-    Motor,
-    Target,
-)
+from calmotion.model import Body, Character, Frame, Joint, MassProperties, Motor, Target
 from calmotion.model.animation import MovingFrame
 from calmotion.multibody.analysis.kinematics import rigid_poses
 from calmotion.multibody.integrators.workspace import Workspace

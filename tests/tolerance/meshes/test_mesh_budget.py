@@ -8,12 +8,7 @@ from calmotion.model.run import RunSettings
 from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.meshes import mesh_budget
-from calmotion.tolerance.meshes.mesh_budget import (
-    locking_error,
-    mesh_error,
-    meshes_to_tolerance,
-    patch_error,
-)
+from calmotion.tolerance.meshes.mesh_budget import locking_error, mesh_error, meshes_to_tolerance, patch_error
 from calmotion.tolerance.step_error import distance, simulate_at
 
 OPTIONS, STEP = RunSettings(tolerance=1e-3, integrator="bdf2"), 1 / 240

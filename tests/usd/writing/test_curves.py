@@ -6,12 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calmotion.model import (
-    Animation,
-    Motor,
-    MotorCurve,
-    Track,
-)
+from calmotion.model import Animation, Motor, MotorCurve, Track
 from calmotion.usd.clock import Clock
 from calmotion.usd.writing.curves import NEAR, attribute_spec, author_curves, curve_values, sample_times
 from pxr import Sdf

@@ -4,12 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calmotion.model import (
-    Animation,
-    Motor,
-    MotorCurve,
-    Track,
-)
+from calmotion.model import Animation, Motor, MotorCurve, Track
 from calmotion.model.curves import curve_of
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading

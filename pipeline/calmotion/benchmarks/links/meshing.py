@@ -105,7 +105,7 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, refine: int = 0) 
 
 def _refined(link: Link, mesh: Any, nodes: int) -> Row:
     """The row of an automatic mesh that is refined to a number of nodes, with the stiffness of ever finer ones."""
-    from calmotion.tolerance.meshes.mesh_refinement import Effort, refined_for_frequencies
+    from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
 
     start = time.perf_counter()
     effort = Effort(_FINEST, int(nodes / 0.6), 0.0)

@@ -28,12 +28,7 @@ from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.motors.lumped import STEP, simulate_lumped
 from calmotion.benchmarks.motors.original import simulate_original
 from calmotion.errors import ShotError
-from calmotion.model import (
-    Animation,
-    Character,
-    Result,
-    Track,
-)
+from calmotion.model import Animation, Character, Result, Track
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot

@@ -19,12 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model.character import (
-    WORLD,
-    Character,
-    Frame,
-    Joint,
-)
+from calmotion.model.character import WORLD, Character, Frame, Joint
 from calmotion.model.motor import ON_ERROR, PRESCRIBED, Motor
 
 STEP = 1e-4  # of MuJoCo's implicit integrator [s]

@@ -11,13 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion import ShotError
-from calmotion.model import (
-    Body,
-    ElasticMaterial,
-    FlexibleSettings,
-    Frame,
-    MassProperties,
-)
+from calmotion.model import Body, ElasticMaterial, FlexibleSettings, Frame, MassProperties
 
 if TYPE_CHECKING:
     from calmotion.mesh.patches.interface_patches import AttachmentFrame

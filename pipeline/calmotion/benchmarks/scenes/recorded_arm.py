@@ -14,13 +14,7 @@ from calmotion.identification.robots import Robot, robot_with
 from calmotion.identification.signals import Signals, signals_of
 from calmotion.model import Body, Character, FEMeshes
 from calmotion.model.calibration.estimates import HIGHER_MODES
-from calmotion.model.calibration.recording import (
-    ACCELEROMETER,
-    ANGLE,
-    MARKER,
-    Channel,
-    SensorRecording,
-)
+from calmotion.model.calibration.recording import ACCELEROMETER, ANGLE, MARKER, Channel, SensorRecording
 from calmotion.model.motor import DRIVE
 from calmotion.model.run import RunSettings
 from calmotion.multibody import SimulationFailure

@@ -31,13 +31,7 @@ from calmotion.identification.problem import Calibrated
 from calmotion.identification.signals import Signals, refuse_cyclic
 from calmotion.model import Animation, Track
 from calmotion.model.calibration.estimates import ROBOT_KINDS
-from calmotion.model.calibration.excitation import (
-    Clear,
-    Excitation,
-    MotorUse,
-    PlannedSensor,
-    Predicted,
-)
+from calmotion.model.calibration.excitation import Clear, Excitation, MotorUse, PlannedSensor, Predicted
 from calmotion.model.calibration.recording import COMPONENTS, Channel, SensorRecording
 from calmotion.model.motor import SERVO
 from calmotion.model.run import RunSettings

@@ -9,23 +9,9 @@ import numpy as np
 
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
-from calmotion.mesh.patches.automatic_patch import (
-    ROOM,
-    Skin,
-    automatic_radius,
-    end_face,
-    nodes_of_area,
-)
+from calmotion.mesh.patches.automatic_patch import ROOM, Skin, automatic_radius, end_face, nodes_of_area
 from calmotion.mesh.patches.contact_place import contact_place
-from calmotion.mesh.patches.joint_places import (
-    TIE,
-    Ball,
-    balls_between,
-    cut_at,
-    nearest_apart,
-    reached_by,
-    within,
-)
+from calmotion.mesh.patches.joint_places import TIE, Ball, balls_between, cut_at, nearest_apart, reached_by, within
 from calmotion.mesh.patches.named_patch import named_patch
 from calmotion.mesh.patches.seats import seat_radius
 from calmotion.mesh.quadratic import QuadraticMesh

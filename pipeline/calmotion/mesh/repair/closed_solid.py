@@ -8,13 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.repair.closing import (
-    REMEDY,
-    Part,
-    closed_parts,
-    concatenated,
-    connected_pieces,
-)
+from calmotion.mesh.repair.closing import REMEDY, Part, closed_parts, concatenated, connected_pieces
 from calmotion.mesh.repair.uniting import NotManifold, united, without_detail
 from calmotion.mesh.sources.bridges import WIDE, bridged, strutted
 from calmotion.mesh.sources.slits import without_slits

@@ -13,12 +13,7 @@ import numpy as np
 
 from calmotion.mesh.grids.slit_closing import CLOSED, closed_slits
 from calmotion.mesh.repair.closing import Part, concatenated, connected_pieces
-from calmotion.mesh.repair.uniting import (
-    NotManifold,
-    manifold_of,
-    part_of,
-    without_detail,
-)
+from calmotion.mesh.repair.uniting import NotManifold, manifold_of, part_of, without_detail
 from calmotion.mesh.sources.bridges import NARROW
 from calmotion.mesh.surfaces.nearby_triangles import unit_normals
 from calmotion.mesh.surfaces.slits import Filling, slit_fillings, slit_widths

@@ -11,12 +11,7 @@ import numpy as np
 from calmotion.mesh.repair.closed_solid import Solid
 from calmotion.mesh.solid import joined_surfaces
 from calmotion.mesh.surfaces.congruence import Isometry, isometries, near_isometries
-from calmotion.model import (
-    Body,
-    FEMesh,
-    FlexibleSettings,
-    Frame,
-)
+from calmotion.model import Body, FEMesh, FlexibleSettings, Frame
 from calmotion.model.meshes import CutPatch
 
 _SAME, _ALONG = 1e-4, 1e-4  # distance of frames, of the size; 1 - cosine of axes that are the same

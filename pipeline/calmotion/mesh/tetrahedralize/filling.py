@@ -8,12 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.element_size import (
-    Shape,
-    envelope,
-    expected_nodes,
-    smallest_size,
-)
+from calmotion.mesh.element_size import Shape, envelope, expected_nodes, smallest_size
 from calmotion.mesh.grids.contacts import without_contacts
 from calmotion.mesh.grids.gridded import gridded
 from calmotion.mesh.repair.closed_solid import Solid, simplified
@@ -27,14 +22,7 @@ from calmotion.mesh.tetrahedra import (
     tet_volumes,
     without_unused_points,
 )
-from calmotion.mesh.tetrahedralize.tetwild import (
-    DENSE,
-    MORE_TIME,
-    REMEDY,
-    OutOfTime,
-    ProcessorTime,
-    tetrahedralize,
-)
+from calmotion.mesh.tetrahedralize.tetwild import DENSE, MORE_TIME, REMEDY, OutOfTime, ProcessorTime, tetrahedralize
 from calmotion.model import Body, FEMesh
 
 # Wanted and largest allowed error. An error of half a percent of volume in thin walls is larger than that in a

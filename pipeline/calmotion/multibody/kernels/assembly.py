@@ -18,12 +18,7 @@ from calmotion.multibody.kernels.inertia import (
     velocity_jacobian,
 )
 from calmotion.multibody.kernels.joint_tangent import joint_tangent
-from calmotion.multibody.kernels.joints import (
-    add_skew,
-    apply_wrench,
-    constraint_residual,
-    joint_kinematics,
-)
+from calmotion.multibody.kernels.joints import add_skew, apply_wrench, constraint_residual, joint_kinematics
 from calmotion.multibody.kernels.markers import add_wrench_stiffness, marker_jacobian
 from calmotion.multibody.kernels.neohookean import neohookean_forces
 from calmotion.multibody.kernels.sliders import LENGTH, rotated_force, slide_jacobian, slide_wrench, slides_freely

@@ -6,13 +6,7 @@ from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import marker_of
 from calmotion.multibody.kernels.joints import add_skew, firmness, is_hinge
 from calmotion.multibody.kernels.markers import MarkerWork, marker_velocity_jacobian
-from calmotion.multibody.kernels.sliders import (
-    free_columns,
-    free_rows,
-    has_row,
-    slide_velocity_jacobian,
-    slides_freely,
-)
+from calmotion.multibody.kernels.sliders import free_columns, free_rows, has_row, slide_velocity_jacobian, slides_freely
 from calmotion.multibody.kernels.work import Work
 from calmotion.multibody.model.system import Blocks, Integrator, System
 from calmotion.support.compilation import inlined_kernel, kernel, shared_kernel

@@ -22,18 +22,8 @@ import math
 
 from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import marker_of
-from calmotion.multibody.kernels.markers import (
-    MarkerWork,
-    fixed_marker,
-    marker_values,
-    moving_marker,
-)
-from calmotion.multibody.kernels.sliders import (
-    LENGTH,
-    free_length,
-    slide,
-    slides_freely,
-)
+from calmotion.multibody.kernels.markers import MarkerWork, fixed_marker, marker_values, moving_marker
+from calmotion.multibody.kernels.sliders import LENGTH, free_length, slide, slides_freely
 from calmotion.multibody.kernels.work import Work
 from calmotion.multibody.model.system import Integrator, State, System
 from calmotion.support.compilation import kernel, shared_kernel

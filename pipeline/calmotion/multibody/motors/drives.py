@@ -27,13 +27,7 @@ import numpy as np
 
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
-from calmotion.model.motor import (
-    ON_ERROR,
-    PRESCRIBED,
-    SERVO,
-    Motor,
-    Rotor,
-)
+from calmotion.model.motor import ON_ERROR, PRESCRIBED, SERVO, Motor, Rotor
 from calmotion.multibody.model.system import LINEAR, System
 
 

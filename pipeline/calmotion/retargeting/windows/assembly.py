@@ -9,15 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from calmotion.arrays import Array
-from calmotion.model import (
-    LimitUse,
-    MotorCurve,
-    OptimizerStep,
-    Result,
-    Simplification,
-    Simulation,
-    WindowRow,
-)
+from calmotion.model import LimitUse, MotorCurve, OptimizerStep, Result, Simplification, Simulation, WindowRow
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.posing import SMOOTHNESS, closeness_of
 from calmotion.retargeting.simplification.pruning import UNCHANGED

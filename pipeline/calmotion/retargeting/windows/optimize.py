@@ -19,15 +19,7 @@ from calmotion.retargeting.problem.adaptive_knots import FIRST
 from calmotion.retargeting.problem.posing import knot_spacing
 from calmotion.retargeting.windows.assembly import Done, result_of
 from calmotion.retargeting.windows.continued import Beginning, needed_instants
-from calmotion.retargeting.windows.parts import (
-    Part,
-    Piece,
-    added,
-    offsets_in,
-    part_of,
-    performed,
-    piece_of,
-)
+from calmotion.retargeting.windows.parts import Part, Piece, added, offsets_in, part_of, performed, piece_of
 from calmotion.retargeting.windows.plan import FEWEST, Window, overlap_time, plan_windows
 from calmotion.retargeting.windows.search import Found, Setting, search_window
 from calmotion.retargeting.windows.store import WindowStore, window_keys

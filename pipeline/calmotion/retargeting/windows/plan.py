@@ -18,12 +18,7 @@ from calmotion.errors import ShotError
 from calmotion.model import Animation, Character
 from calmotion.model.budget import SEARCH_SHARE
 from calmotion.model.character import contact_joints
-from calmotion.model.run import (
-    LONG_SHOT,
-    WINDOW,
-    WINDOW_OVERLAP,
-    RunSettings,
-)
+from calmotion.model.run import LONG_SHOT, WINDOW, WINDOW_OVERLAP, RunSettings
 
 FALL = 10.0  # factor by which the slowest mode falls in an overlap
 LEAST = 1.0  # overlap, but not above half a window [s]

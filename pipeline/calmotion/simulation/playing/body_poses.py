@@ -15,12 +15,7 @@ from calmotion.arrays import Array
 from calmotion.control.commands import MotorCurves, instants
 from calmotion.errors import ShotError
 from calmotion.model.animation import Animation
-from calmotion.model.character import (
-    Body,
-    Character,
-    MassProperties,
-    with_ideal_motors,
-)
+from calmotion.model.character import Body, Character, MassProperties, with_ideal_motors
 from calmotion.multibody.analysis.kinematics import rigid_poses
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace

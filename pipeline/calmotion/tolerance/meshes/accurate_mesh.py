@@ -14,20 +14,15 @@ from calmotion.mesh.element_size import ACCURACY, envelope
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.mesh.tetrahedralize.filling import INTERSECTS, MAX_VOLUME_ERROR, filled
 from calmotion.mesh.tetrahedralize.tetwild import ProcessorTime
-from calmotion.model import (
-    Body,
-    Character,
-    FEMesh,
-    Frame,
-)
+from calmotion.model import Body, Character, FEMesh, Frame
 from calmotion.model.materials.parts import Part
 from calmotion.model.meshes import MeshQuality
 
 if TYPE_CHECKING:
     from calmotion.mesh.parts.makeup import Makeup
     from calmotion.mesh.patches.interface_patches import AttachmentFrame
-    from calmotion.tolerance.meshes.body_mesh import MeshOptions, Volume
-    from calmotion.tolerance.meshes.mesh_refinement import Effort
+    from calmotion.reduction.mesh_refinement import Effort
+    from calmotion.tolerance.meshes.options import MeshOptions, Volume
 
 # The estimate is 1.2 to 3 times the true error of clamped beams and plates on meshes that are nearly fine enough, and
 # larger for links with many edges (see `calmotion bench meshing`). Twice the wanted error is therefore accepted.
@@ -67,7 +62,7 @@ def accurate(
         size: Of the elements before they are refined [m].
         carrier: Frame of the joint to the parent, body frame.
     """
-    from calmotion.tolerance.meshes.mesh_refinement import refined_for_frequencies
+    from calmotion.reduction.mesh_refinement import refined_for_frequencies
 
     time = ProcessorTime(options.time_limit)
 
@@ -109,7 +104,7 @@ def effort_after(triangles: int) -> Effort:
     Args:
         triangles: Of the surfaces that were meshed for it.
     """
-    from calmotion.tolerance.meshes.mesh_refinement import Effort
+    from calmotion.reduction.mesh_refinement import Effort
 
     least, most = _POOR_REFINED
     poor = int(min(max(_IN_TIME - _OF_TRIANGLE * triangles, least), most))

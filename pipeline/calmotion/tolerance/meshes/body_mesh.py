@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.element_size import (
-    MAX_NODES,
-    Shape,
-    element_size,
-    shape_of,
-)
+from calmotion.mesh.element_size import MAX_NODES, element_size, shape_of
 from calmotion.mesh.grids.contacts import without_contacts
 from calmotion.mesh.mesh_file import read_mesh_file
-from calmotion.mesh.repair.closed_solid import Solid
 from calmotion.mesh.solid import mass_of_solid
 from calmotion.mesh.sources.beam import equivalent_beam
 from calmotion.mesh.sources.choice import solid_of
@@ -34,26 +28,10 @@ from calmotion.mesh.tetrahedra import (
     without_unused_points,
 )
 from calmotion.mesh.tetrahedralize.filling import filled, refuse_loose_parts, refuse_too_many
-from calmotion.mesh.tetrahedralize.tetwild import (
-    DENSE,
-    TIME_LIMIT,
-    OutOfTime,
-    ProcessorTime,
-)
-from calmotion.model import (
-    Body,
-    Character,
-    FEMesh,
-    Frame,
-    TetGeometry,
-)
-from calmotion.tolerance.meshes.accurate_mesh import (
-    accurate,
-    makeup_note,
-    mass_note,
-    shaped_to,
-    volume_note,
-)
+from calmotion.mesh.tetrahedralize.tetwild import DENSE, OutOfTime, ProcessorTime
+from calmotion.model import Body, Character, FEMesh, Frame, TetGeometry
+from calmotion.tolerance.meshes.accurate_mesh import accurate, makeup_note, mass_note, shaped_to, volume_note
+from calmotion.tolerance.meshes.options import MeshOptions, Volume
 
 if TYPE_CHECKING:
     from calmotion.mesh.patches.interface_patches import AttachmentFrame
@@ -61,32 +39,6 @@ if TYPE_CHECKING:
 FAR = 5.0  # distance of a mesh from all joints of its body, over its size, that nobody means
 _SIMPLE = ("collision surface", "wrapped collision surface", "equivalent beam")
 _WELD = 1e-6  # distance of coincident points, of the diagonal
-
-
-@dataclass(frozen=True)
-class MeshOptions:
-    """Settings of the user.
-
-    Attributes:
-        element_size: [m]; negative: that of the shot.
-        time_limit: Of the processor time of the meshes of one body [s].
-        cache: Whether the cache is used.
-        envelope_factor: Factor of the distance that meshes may be from their surfaces.
-    """
-
-    element_size: float = -1.0
-    time_limit: float = TIME_LIMIT
-    cache: bool = True
-    envelope_factor: float = 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class Volume:
-    """A solid to be meshed, its dimensions, and the requested size of its elements [m] (not positive: automatic)."""
-
-    solid: Solid
-    shape: Shape
-    size: float
 
 
 def mesh_body(
@@ -280,7 +232,7 @@ def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FE
 
 def _judged(mesh: FEMesh, body: Body, carrier: Frame | None, attachments: Sequence[AttachmentFrame]) -> FEMesh:
     """A mesh whose elements are given, with its estimated error; a mesh that is too large for the estimate without."""
-    from calmotion.tolerance.meshes.mesh_refinement import Effort, refined_for_frequencies
+    from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
 
     if len(mesh.points) > MAX_NODES:
         return replace(mesh, given=True)

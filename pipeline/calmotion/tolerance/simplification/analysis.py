@@ -8,13 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from calmotion.model import (
-    Animation,
-    Character,
-    FlexibleSettings,
-    ModelChoice,
-    ModelChoices,
-)
+from calmotion.model import Animation, Character, FlexibleSettings, ModelChoice, ModelChoices
 from calmotion.model.character import with_settings
 from calmotion.model.model_choice import AUTO, OFF, ON
 from calmotion.model.run import RunSettings

@@ -8,13 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from calmotion.mesh.solid import solid_of
-from calmotion.model import (
-    Animation,
-    Body,
-    Character,
-    MassProperties,
-    ModelChoice,
-)
+from calmotion.model import Animation, Body, Character, MassProperties, ModelChoice
 from calmotion.model.character import contact_joints
 from calmotion.model.model_choice import AUTO, OFF, ON
 from calmotion.model.run import RunSettings

@@ -10,13 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.errors import ShotError, raise_all
-from calmotion.model import (
-    Body,
-    Character,
-    Joint,
-    MassProperties,
-    RetargetSettings,
-)
+from calmotion.model import Body, Character, Joint, MassProperties, RetargetSettings
 from calmotion.model.motor import PRESCRIBED
 from calmotion.model.tolerance import reach
 from calmotion.usd.clock import Clock

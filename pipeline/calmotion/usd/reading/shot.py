@@ -10,14 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.errors import raise_all
-from calmotion.model import (
-    Animation,
-    Character,
-    MotorTracks,
-    MovingFrame,
-    Provenance,
-    Track,
-)
+from calmotion.model import Animation, Character, MotorTracks, MovingFrame, Provenance, Track
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock, clock_of, still_clock
 from calmotion.usd.diagnostics import quiet, with_places

@@ -9,13 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.model import (
-    Body,
-    Frame,
-    Joint,
-    Target,
-    WeightTrack,
-)
+from calmotion.model import Body, Frame, Joint, Target, WeightTrack
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock

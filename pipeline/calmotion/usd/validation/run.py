@@ -6,12 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from calmotion.errors import ShotError, each
-from calmotion.model.outputs import (
-    ERROR,
-    WARNING,
-    Finding,
-    Findings,
-)
+from calmotion.model.outputs import ERROR, WARNING, Finding, Findings
 from calmotion.usd import stages
 from calmotion.usd.diagnostics import quiet, with_places
 from calmotion.usd.reading.context import prims_of

@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.model import (
-    Animation,
-    Character,
-    Motor,
-    MotorCurve,
-    Track,
-)
+from calmotion.model import Animation, Character, Motor, MotorCurve, Track
 from calmotion.usd.clock import Clock
 from calmotion.usd.schemas import is_applied
 

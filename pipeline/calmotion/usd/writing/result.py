@@ -8,15 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from calmotion.errors import ShotError
-from calmotion.model import (
-    Animation,
-    Character,
-    Motor,
-    MotorCurve,
-    Provenance,
-    Result,
-    Track,
-)
+from calmotion.model import Animation, Character, Motor, MotorCurve, Provenance, Result, Track
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
 from calmotion.usd.layers import refuse_input_as_output, write_layer

@@ -15,12 +15,7 @@ from calmotion.identification.excitation.design import ExcitationSettings, blank
 from calmotion.identification.parameters import DEFAULT, refuse_unknown
 from calmotion.model import Character, Provenance
 from calmotion.model.calibration.excitation import Excitation, PlannedSensor
-from calmotion.model.calibration.recording import (
-    ACCELEROMETER,
-    ANGLE,
-    EFFORT,
-    MARKER,
-)
+from calmotion.model.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER
 from calmotion.model.run import RunSettings
 from calmotion.tolerance.reduced_bodies import compiled_in
 from calmotion.workflow.calibration.calibrate import compiled_with_sensors, with_sensors

@@ -6,12 +6,7 @@ import os
 from collections.abc import Sequence
 
 from calmotion.host import Host, SettingError, Settings
-from calmotion.model.calibration.recording import (
-    ACCELEROMETER,
-    MARKER,
-    RecordingRequest,
-    SensorRecording,
-)
+from calmotion.model.calibration.recording import ACCELEROMETER, MARKER, RecordingRequest, SensorRecording
 from calmotion.workflow.calibration.recording_reader import RecordingReader
 from calmotion.workflow.problems import value_of
 

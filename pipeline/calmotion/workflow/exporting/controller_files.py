@@ -9,12 +9,7 @@ import numpy as np
 from calmotion.control.commands import ExportRequest, MotorCurves, WrittenCommands
 from calmotion.errors import ShotError
 from calmotion.host import Host, SettingError, Settings, nearest
-from calmotion.model import (
-    Animation,
-    Character,
-    Provenance,
-    Result,
-)
+from calmotion.model import Animation, Character, Provenance, Result
 from calmotion.model.curves import commanded_curves
 from calmotion.support.files import try_writing
 from calmotion.support.naming import distinct_names

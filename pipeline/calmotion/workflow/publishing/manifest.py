@@ -178,13 +178,7 @@ def _inputs(result: SimulationResult) -> Iterator[tuple[str, str, str | None]]:
 
 
 def _outputs(result: SimulationResult) -> Iterator[tuple[str, str]]:
-    from calmotion.model.outputs import (
-        CsvFile,
-        Figures,
-        Recording,
-        Video,
-        WrittenLayer,
-    )
+    from calmotion.model.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
 
     get = result.outcome.run.get
     if (layer := get(WrittenLayer)) is not None:

@@ -5,12 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError
-from calmotion.model.materials.printed import (
-    LINE_WIDTH,
-    PERIMETERS,
-    Core,
-    core_of,
-)
+from calmotion.model.materials.printed import LINE_WIDTH, PERIMETERS, Core, core_of
 from calmotion.usd import schemas
 from calmotion.usd.reading.context import Reading
 

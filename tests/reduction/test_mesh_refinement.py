@@ -9,14 +9,14 @@ import pytest
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.tetrahedra import measure_quality, tet_volumes
 from calmotion.model import Body, FEMesh, FlexibleSettings
+from calmotion.reduction import mesh_refinement
 from calmotion.reduction.basis.natural_modes import frequencies
 from calmotion.reduction.cache import recomputed
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.full_order.mesh_estimates import frequency_estimate, load_estimate
 from calmotion.reduction.load_envelope import LoadEnvelope
+from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies, refined_for_loads
 from calmotion.reduction.reduce import full_body, linear_modes, reduce_body
-from calmotion.tolerance.meshes import mesh_refinement
-from calmotion.tolerance.meshes.mesh_refinement import Effort, refined_for_frequencies, refined_for_loads
 from scipy.linalg import eigh
 
 SIZE = (0.3, 0.04, 0.04)

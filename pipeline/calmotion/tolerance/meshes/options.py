@@ -1,0 +1,35 @@
+"""What the mesher of a body is told: settings of the user, and the solid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from calmotion.mesh.element_size import Shape
+from calmotion.mesh.repair.closed_solid import Solid
+from calmotion.mesh.tetrahedralize.tetwild import TIME_LIMIT
+
+
+@dataclass(frozen=True)
+class MeshOptions:
+    """Settings of the user.
+
+    Attributes:
+        element_size: [m]; negative: that of the shot.
+        time_limit: Of the processor time of the meshes of one body [s].
+        cache: Whether the cache is used.
+        envelope_factor: Factor of the distance that meshes may be from their surfaces.
+    """
+
+    element_size: float = -1.0
+    time_limit: float = TIME_LIMIT
+    cache: bool = True
+    envelope_factor: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """A solid to be meshed, its dimensions, and the requested size of its elements [m] (not positive: automatic)."""
+
+    solid: Solid
+    shape: Shape
+    size: float
