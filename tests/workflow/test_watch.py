@@ -9,7 +9,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from calmotion.accuracy.reduced_bodies import ConvergedReduction, RunMemory
 from calmotion.cli.commands.shots.watch import _tell
 from calmotion.cli.main import main
 from calmotion.cli.output import Output
@@ -17,8 +16,9 @@ from calmotion.errors import ShotError
 from calmotion.host import Operator
 from calmotion.host.plan import Plan
 from calmotion.host.run import Run
+from calmotion.model import Animation, Character, FEMeshes, ModelChoices, Result
 from calmotion.reduction.load_envelope import LoadEnvelope
-from calmotion.shot import Animation, Character, FEMeshes, ModelChoices, Result
+from calmotion.tolerance.reduced_bodies import ConvergedReduction, RunMemory
 from calmotion.workflow.commands import optimize, simulate
 from calmotion.workflow.shot import Shot
 from calmotion.workflow.watch import Watch, _growth, largest_error

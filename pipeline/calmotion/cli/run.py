@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from calmotion.cli.options import opened_shot, progress_display, run_arguments, simulation_arguments
 from calmotion.cli.output import FAILED, INTERRUPTED, Output, conclude
 from calmotion.host import SettingError
-from calmotion.shot.run import OutputPaths
+from calmotion.model.run import OutputPaths
 from calmotion.workflow.results import SimulationResult
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ def test_a_mesh_is_made_once_and_then_read_from_the_cache(host, package, own_cac
     body = link(surface(box()), element_size=0.02)
     (first,) = run(host, body)
     (kept,) = own_cache.iterdir()
-    monkeypatch.setattr(package("tetwild"), "_run", lambda *arguments: pytest.fail("meshed again"))
+    monkeypatch.setattr(package("mesh.tetrahedralize.tetwild"), "_run", lambda *arguments: pytest.fail("meshed again"))
     (again,) = run(host, body)
     assert np.array_equal(first.points, again.points) and np.array_equal(first.tets, again.tets)
     kept.write_bytes(b"torn")

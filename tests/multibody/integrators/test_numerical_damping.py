@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
+from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.body_reduction import BodyReduction
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.prepare import prepare

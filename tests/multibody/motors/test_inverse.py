@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import chain, compiled
+from calmotion.model import Motor
+from calmotion.model.motor import Rotor
 from calmotion.multibody.motors.inverse import inverse_commands
-from calmotion.shot import Motor
-from calmotion.shot.motor import Rotor
 from motor_runs import pitch, run
 
 H = 1e-3

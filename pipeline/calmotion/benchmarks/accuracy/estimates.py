@@ -20,22 +20,22 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from calmotion import ShotError
-from calmotion.accuracy.converged_reduction import converged_reduction
-from calmotion.accuracy.integrator_choice import by_fast_scheme
-from calmotion.accuracy.pod_subspace import ReferenceRun, project_to_subspace, reference_run
-from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
-from calmotion.accuracy.step_error import StepRun, distance, frames_of, simulate_at
+from calmotion.arrays import Array
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import finish, resumed_rows, say, write_rows
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, beam_mesh, quintic, shot_of
-from calmotion.reduction.elements.assembly import quadratic_nodes
+from calmotion.mesh.quadratic import quadratic_nodes
+from calmotion.model import Animation, Character, FEMesh, FEMeshes, MeshQuality
+from calmotion.model.run import RunSettings
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
-from calmotion.shot import Animation, Character, FEMesh, FEMeshes, MeshQuality
-from calmotion.shot.character import Array
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.body_reduction import BodyReduction, reduction_for
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
+from calmotion.tolerance.converged_reduction import converged_reduction
+from calmotion.tolerance.integrator_choice import by_fast_scheme
+from calmotion.tolerance.pod_subspace import ReferenceRun, project_to_subspace, reference_run
+from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
+from calmotion.tolerance.step_error import StepRun, distance, frames_of, simulate_at
 
 HONEST, LIMIT = (0.05, 1.0), 1.5  # where errors over estimates are to be, and what none may exceed
 EDGES = (0.0, HONEST[0], 0.1, 0.2, 0.5, HONEST[1], LIMIT, np.inf)  # of the classes of error over estimate

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-from calmotion.accuracy.converged_reduction import converged_reduction
-from calmotion.accuracy.integrator_choice import by_fast_scheme
-from calmotion.accuracy.simulate_to_tolerance import project_to_tolerance
-from calmotion.accuracy.step_choice import chosen_step
 from calmotion.benchmarks.accuracy.reference_bench import BASE, TOLERANCES, Bench, Point, Reference, setting_of
-from calmotion.shot.run import RunSettings
-from calmotion.shot.tolerance import tolerance_of
+from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import tolerance_of
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
+from calmotion.tolerance.converged_reduction import converged_reduction
+from calmotion.tolerance.integrator_choice import by_fast_scheme
+from calmotion.tolerance.simulate_to_tolerance import project_to_tolerance
+from calmotion.tolerance.step_choice import chosen_step
 
 STEPS = (1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 960, 1 / 1920)
 FINER_STEPS = (1 / 3840, 1 / 7680)  # too, where directions are fine enough: the tightest tolerances ask for them

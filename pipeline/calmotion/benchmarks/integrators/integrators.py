@@ -22,7 +22,7 @@ import numpy as np
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import show
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
-from calmotion.shot import Animation, Character, FEMeshes
+from calmotion.model import Animation, Character, FEMeshes
 
 WORKING_STEP = 1.0 / 240.0
 SHORT = 0.1  # run time [s]
@@ -75,8 +75,8 @@ class Scene:
         Raises:
             SimulationFailure: It did not come to the end.
         """
+        from calmotion.model.run import RunSettings
         from calmotion.multibody.integrators.workspace import Workspace
-        from calmotion.shot.run import RunSettings
         from calmotion.simulation.forward import run_forward
         from calmotion.simulation.inputs.curves import sample_tracks
         from calmotion.simulation.prepare import prepare

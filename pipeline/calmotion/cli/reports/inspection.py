@@ -10,8 +10,8 @@ from calmotion.cli.quantities import angle, counted, frequency, length
 from calmotion.cli.reports.left_out import print_left_out
 from calmotion.cli.reports.run import NOTHING_SHAKES, print_notes
 from calmotion.cli.tables import print_table, say
-from calmotion.shot.motor import DRIVE, ON_ERROR, ON_JOINT, PRESCRIBED, SERVO
-from calmotion.shot.outputs import ERROR, WARNING
+from calmotion.model.motor import DRIVE, ON_ERROR, ON_JOINT, PRESCRIBED, SERVO
+from calmotion.model.outputs import ERROR, WARNING
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -113,7 +113,7 @@ def _expected(row: dict[str, Any]) -> str:
     """What `optimize` is expected to take, as a sentence."""
     from rich.filesize import decimal
 
-    from calmotion.accuracy.expected_cost import readable_hours
+    from calmotion.tolerance.expected_cost import readable_hours
 
     windows = ""
     if row["windows"] > 1:

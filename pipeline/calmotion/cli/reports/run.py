@@ -14,7 +14,7 @@ from calmotion.cli.reports.feet import print_contacts, print_support
 from calmotion.cli.reports.left_out import print_left_out
 from calmotion.cli.reports.limits import print_limits, print_reason
 from calmotion.cli.tables import print_table, say
-from calmotion.shot.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
+from calmotion.model.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
 
 # What helps where an entry of the error budget is too large.
 _SENSITIVE = "With large deflections, or near buckling, small errors grow: use a stiffer robot or a slower motion."
@@ -71,7 +71,7 @@ def print_lost_motion(console: Console, lost: dict[str, Any] | None, suffix: str
 
 def print_joint_gap(console: Console, gap: float) -> None:
     """The largest gap of a joint [m], where joints are not closed."""
-    from calmotion.accuracy.step_error import CLOSED_GAP  # loads what has simulated before
+    from calmotion.tolerance.step_error import CLOSED_GAP  # loads what has simulated before
 
     if gap > CLOSED_GAP:
         say(console, f"joints come apart by up to {length(gap)}")

@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from calmotion.errors import ShotError
-from calmotion.geometry.flat_tets import unflattened
-from calmotion.geometry.tetrahedra import flat_tets, surface_volume
+from calmotion.mesh.tetrahedra import flat_tets, surface_volume
+from calmotion.mesh.tetrahedralize.flat_tets import unflattened
 from calmotion.support.caching.cache_folder import MESHES
 from calmotion.support.caching.caches import key_of, store_arrays, stored_arrays
 from calmotion.support.files import temporary_folder

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calmotion.shot.character import Array
-from calmotion.shot.motor import ON_JOINT, PRESCRIBED, SERVO, Motor, Rotor
+from calmotion.arrays import Array
+from calmotion.model.motor import ON_JOINT, PRESCRIBED, SERVO, Motor, Rotor
 
 _MOST = 0.95  # share of its largest torque that a command asks of a motor
 

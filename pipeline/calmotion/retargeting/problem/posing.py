@@ -6,7 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.errors import ShotError
+from calmotion.model import Animation, Character
+from calmotion.model.character import motors_give
+from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import rigid_model
@@ -16,9 +20,6 @@ from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on, uniform_breaks
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.shot import Animation, Character
-from calmotion.shot.character import Array, BoolArray, IntArray, motors_give
-from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
 from calmotion.simulation.inputs.time_grid import TimeGrid
