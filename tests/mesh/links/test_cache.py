@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
+from calmotion.mesh.tetrahedralize import tetwild
 from mesher_links import box, link, run, surface
 
 
-def test_a_mesh_is_made_once_and_then_read_from_the_cache(host, package, own_cache, monkeypatch):
+def test_a_mesh_is_made_once_and_then_read_from_the_cache(host, own_cache, monkeypatch):
     body = link(surface(box()), element_size=0.02)
     (first,) = run(host, body)
     (kept,) = own_cache.iterdir()
-    monkeypatch.setattr(package("mesh.tetrahedralize.tetwild"), "_run", lambda *arguments: pytest.fail("meshed again"))
+    monkeypatch.setattr(tetwild, "_run", lambda *arguments: pytest.fail("meshed again"))
     (again,) = run(host, body)
     assert np.array_equal(first.points, again.points) and np.array_equal(first.tets, again.tets)
     kept.write_bytes(b"torn")
