@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import tomllib
 
 import pytest
@@ -62,6 +63,20 @@ def test_a_command_of_a_plugin_runs_as_those_of_the_engine_do(greeter, capfd):
     assert main(["greet", "--help"]) == 0
     shown = capfd.readouterr().out
     assert "Greet somebody." in shown and "whom to greet" in shown and "say hello to Ada" in shown
+
+
+def test_a_command_of_an_installed_plugin_is_found_by_its_entry_point(greeter, capfd, monkeypatch):
+    folder = greeter("anvil_of_a_package")
+    monkeypatch.delenv("CALMOTION_PLUGINS")
+    info = folder.parent / "anvil-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: anvil\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[calmotion.plugins]\nanvil = {folder.name}\n")
+    monkeypatch.syspath_prepend(str(folder.parent))
+    assert main(["greet", "Ada"]) == 0
+    assert capfd.readouterr().out == "hello Ada\n"
+    for name in (folder.name, f"{folder.name}.command"):
+        sys.modules.pop(name)
 
 
 def test_help_lists_it_without_importing_the_plugin(greeter, capfd, monkeypatch):
