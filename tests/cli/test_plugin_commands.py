@@ -140,6 +140,13 @@ def test_a_command_that_cannot_be_imported_names_its_plugin(greeter, capfd, sour
     assert told in capfd.readouterr().out
 
 
+def test_options_of_a_plugin_that_fail_end_in_an_error(greeter, capfd):
+    greeter("anvil", "def add_arguments(parser): 1 / 0\ndef run(arguments, output): ...\n")
+    assert main(["greet", "--json"]) == 1
+    error = json.loads(capfd.readouterr().out)["error"]
+    assert "ZeroDivisionError" in error["found"] and "command.py" in error["traceback"]
+
+
 def test_plugins_list_and_check_know_commands(greeter, capfd):
     folder = greeter("greeter")
     assert main(["plugins", "check", str(folder)]) == 0

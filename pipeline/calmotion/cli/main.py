@@ -52,30 +52,30 @@ def _run(given: list[str]) -> int:
         args = build_parser(name).parse_args(given)
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else WRONG_USAGE
-    except ShotError as error:
+    except Exception as error:
         from calmotion.cli.output import Output
 
-        return _refused(error, Output(sys.stdout, "--json" in given))
-    from calmotion.cli.output import own_messages, print_fault, protected_stdout
+        return _failed(error, Output(sys.stdout, "--json" in given))
+    from calmotion.cli.output import own_messages, protected_stdout
 
     with protected_stdout(getattr(args, "json", False)) as output, own_messages():
         try:
             status: int = args.command(args, output)
             return status
-        except ShotError as error:
-            return _refused(error, output)
         except BrokenPipeError:
             return FAILED
         except Exception as error:
-            print_fault(error, output)
-            return FAILED
+            return _failed(error, output)
 
 
-def _refused(error: ShotError, output: Output) -> int:
+def _failed(error: Exception, output: Output) -> int:
     """Print why nothing was done; the exit status."""
-    from calmotion.cli.output import print_error
+    from calmotion.cli.output import print_error, print_fault
     from calmotion.host.errors import SettingError
 
+    if not isinstance(error, ShotError):
+        print_fault(error, output)
+        return FAILED
     print_error(error, output)
     return WRONG_USAGE if isinstance(error, SettingError) else FAILED
 
@@ -89,11 +89,7 @@ def build_parser(chosen: str | None = None) -> Parser:
     Raises:
         ShotError: The command is that of a plugin, and cannot be called.
     """
-    parser = Parser(
-        prog="calmotion",
-        description="Retargets the animation of a flexible robotic character so that it does not shake.",
-        epilog="Exit status: 0 done, 1 the shot cannot be processed, 2 wrong usage, 130 interrupted.",
-    )
+    parser = Parser(prog="calmotion")
     parser.add_argument("--version", action="version", version=f"calmotion {__version__}")
     group = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     commands = BUILT_IN if chosen in BUILT_IN else all_commands()
