@@ -50,7 +50,7 @@ class ReduceFlexibleBodies(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.mesh.patches.contact_notes import contact_notes
-        from calmotion.simulation.bodies import mode_tables, with_elasticity
+        from calmotion.simulation.bodies import mode_tables, weak_seat_notes, with_elasticity
         from calmotion.simulation.body_reduction import BodyReduction, reduction_for
 
         choices, meshes, animation = context.get(ModelChoices), context.get(FEMeshes), context.get(Animation)
@@ -66,6 +66,8 @@ class ReduceFlexibleBodies(Operator):
             tolerance = options.tolerance
             reduction = reduction_for(character, animation, meshes, options, source.refines)
         bodies = tuple(reduction.bodies(tolerance, progress=context.progress))
+        for note in weak_seat_notes(character, meshes, bodies) if meshes is not None else ():
+            context.report("info", note)
         return [ReducedBodies(bodies, mode_tables(bodies), reduction)]
 
 

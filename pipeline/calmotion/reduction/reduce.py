@@ -26,6 +26,7 @@ from calmotion.reduction.inertia_integrals import inertia_integrals
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
 from calmotion.reduction.reduced_body import Elasticity, InterfaceStiffness, Marker, ReducedBody
 from calmotion.reduction.scaled_stiffness import with_interface_stiffness
+from calmotion.reduction.weak_seats import weak_patch
 
 __all__ = ["AttachmentFrame", "LinearModes", "linear_modes", "reduce_body"]
 
@@ -93,8 +94,18 @@ def reduce_body(
         patch_error=patch_error,
         element_error=mesh.quality.element_error,
         damping_ratio=ratio_of_parts(model.mesh, material, linear.basis.modes),
+        weak_seat=_weak_seat(linear, material, root),
     )
     return damped(_with_finer_interfaces(reduced, mesh, linear), material)
+
+
+def _weak_seat(linear: LinearModes, material: ElasticMaterial, root: int) -> int | None:
+    """The attachment frame of the patch that gives way most, where that is much."""
+    radii, basis = [radius for _, radius in linear.rims], linear.basis
+    weak = weak_patch(linear.model, material, radii, basis.omega_squared, basis.patch_motion)
+    if weak is None:
+        return None
+    return root if weak == 0 else linear.moving[weak - 1].attachments[0]
 
 
 def _with_finer_interfaces(body: ReducedBody, mesh: FEMesh, linear: LinearModes) -> ReducedBody:

@@ -118,6 +118,7 @@ class ReducedBody:
         interfaces: Static stiffness of its moving interfaces, and how soft they may be on ever finer meshes; None where
             `mesh_error` is for all directions.
         damping_ratio: Fraction of critical damping of a body of several materials; None: that of its material.
+        weak_seat: A marker whose seat seems to decide how far it bends, see `weak_seats`; None without one.
     """
 
     invariants: Invariants
@@ -135,6 +136,7 @@ class ReducedBody:
     element_error: float = 0.0
     interfaces: InterfaceStiffness | None = None
     damping_ratio: float | None = None
+    weak_seat: int | None = None
 
     @property
     def frequencies(self) -> Array:

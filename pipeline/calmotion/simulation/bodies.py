@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from calmotion.errors import ShotError
@@ -190,6 +191,23 @@ def flexible_modes(
         load_envelope = None if load_envelopes is None else load_envelopes[mesh.body]
         frames = fem_anchors(character, body, own)
         yield body, linear_modes(mesh, body, frames, own.root, load_envelope, allowed / len(meshes.meshes))
+
+
+def weak_seat_notes(character: Character, meshes: FEMeshes, bodies: Sequence[ReducedBody]) -> Iterator[str]:
+    """Messages about joints whose seats, of which the shot says nothing, decide how far a flexible body bends."""
+    from calmotion.reduction.cache import cached_reduction
+    from calmotion.reduction.weak_seats import weak_seat_note
+
+    anchors = body_anchors(character, span_tree(character))
+    for mesh in meshes.meshes:
+        weak = bodies[mesh.body].weak_seat
+        if weak is None:
+            continue
+        own = full_model_of(character, mesh, anchors[mesh.body])
+        parts = (own.mesh, own.body, own.attachments, weak)
+        note = cached_reduction(("weak seat", *parts), partial(weak_seat_note, *parts))
+        if note:
+            yield note
 
 
 def with_elasticity(character: Character, law: str) -> Character:

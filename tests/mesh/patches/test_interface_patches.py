@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 from calmotion.errors import ShotError
+from calmotion.mesh.bisection import bisected
+from calmotion.mesh.mesh_shaping import Surface
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches, spans_a_plane
 from calmotion.mesh.quadratic import quadratic_mesh
 
@@ -133,3 +136,31 @@ def test_points_on_a_line_span_no_plane():
     line = np.outer(np.arange(4.0), [1, 2, 3])
     assert not spans_a_plane(line) and not spans_a_plane(line[:2])
     assert spans_a_plane(np.vstack([line, [[1.0, 0, 0], [0, 4, 0]]]))
+
+
+@pytest.mark.parametrize("pin", [0.25, 0.5])
+def test_a_casting_is_not_held_by_a_detail_that_the_frame_of_its_joint_touches(pin, attachment, helpers):
+    """A pin of half a millimetre across on 756 cm^3: it was held by 1.25 mm of it."""
+    points, tets = helpers.box((12, 9, 7), (0.12, 0.09, 0.07), origin=(-0.06, -0.045, -0.07))
+    points = np.asarray(points)
+    for _ in range(12):
+        points, tets = bisected(points, tets, np.argsort(np.linalg.norm(points[tets].mean(axis=1), axis=1))[:20])
+    block = trimesh.creation.box((120.0, 90.0, 70.0), trimesh.transformations.translation_matrix((0.0, 0.0, -35.0)))
+    casting = trimesh.boolean.union([block, trimesh.creation.cylinder(pin, 2.0, sections=12)])
+    skin = Surface(1e-3 * np.array(casting.vertices), np.array(casting.faces), 1e-9 * casting.volume, 1e-3)
+    mesh = quadratic_mesh(points, tets)
+    at = [attachment("/roll", 0.0, 0.0, 1e-3), attachment("/pitch", 0.06, 0.0, -0.035)]
+    held, _ = interface_patches(mesh, at, -1.0, "/casting", meshed=skin)
+    assert np.ptp(mesh.nodes[held.nodes], axis=0)[:2].min() > 0.04
+    # by a radius that the shot gives, as it says
+    given, _ = interface_patches(mesh, at, 2e-3, "/casting", meshed=skin)
+    assert np.ptp(mesh.nodes[given.nodes], axis=0).max() < 5e-3
+
+
+def test_contact_places_next_to_each_other_divide_what_is_there(attachment, helpers):
+    """Two frames above one place, 0.3 mm aside: each was held by a seventh of a millimetre."""
+    mesh = quadratic_mesh(*helpers.box((12, 9, 7), (0.12, 0.09, 0.07), origin=(-0.06, -0.045, -0.07)))
+    at = [attachment("/a", 0.0, 0.0, 0.05), attachment("/b", 0.0003, 0.0, 0.08)]
+    patches = interface_patches(mesh, at, -1.0, "/casting")
+    assert len(patches) == 2 and not np.intersect1d(patches[0].nodes, patches[1].nodes).size
+    assert all(np.ptp(mesh.nodes[patch.nodes], axis=0).max() > 0.02 for patch in patches)

@@ -15,7 +15,7 @@ PLACES = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0], [0.0, 0.05, 0.01], [1e-6, 
 def test_balls_contain_the_points_that_are_nearer_by_a_factor():
     points = np.random.default_rng(3).uniform(-0.06, 0.06, (4000, 3))
     distance = np.linalg.norm(points[:, None] - PLACES[None], axis=2)
-    balls = balls_between(PLACES, 0, 0.1)
+    balls = balls_between(PLACES, 0, 1e-4)
     expected = distance[:, 0] <= 0.45 / 0.55 * distance[:, 1:3].min(axis=1)  # the last place is the same one
     assert len(balls) == 2 and np.array_equal(within(points, balls), expected) and 100 < expected.sum() < 3900
     # from the own place towards the other, as far as the largest patch
@@ -23,7 +23,7 @@ def test_balls_contain_the_points_that_are_nearer_by_a_factor():
 
 
 def test_balls_that_contain_the_sphere_of_a_patch_are_left_out():
-    balls = balls_between(PLACES, 0, 0.1)
+    balls = balls_between(PLACES, 0, 1e-4)
     assert reached_by(balls, PLACES[0], 0.0089) == () and reached_by(balls, PLACES[0], 0.0091) == (balls[0],)
     assert reached_by(balls, PLACES[0], 0.03) == tuple(balls)
 

@@ -130,15 +130,23 @@ def least_radius(triangles: Array) -> float:
 
     Args:
         triangles: Surface [m], shape [k, 3, 3], outward.
+    """
+    size = float(np.linalg.norm(np.ptp(triangles.reshape(-1, 3), axis=0)))
+    return min(_LEAST_RADIUS * radius_alike(triangles), _LEAST_PART * size)
+
+
+def radius_alike(triangles: Array) -> float:
+    """Radius at which a patch turns on its ground as easily as the body bends [m].
+
+    Args:
+        triangles: Surface [m], shape [k, 3, 3], outward.
 
     Source: Johnson 1985, 3.6, a rigid disc on a half space under a moment: 8 G a^3 / (3 (1 - nu)); a bar: E I / L.
     """
     volume = abs(float(np.linalg.det(triangles).sum())) / 6.0
-    extent = np.ptp(triangles.reshape(-1, 3), axis=0)
-    length, size = float(extent.max()), float(np.linalg.norm(extent))
+    length = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
     bar = 2.0 * (1.0 + _POISSON) * volume**2 / (12.0 * length**3)  # over G; a square section of the mean area
-    alike = (3.0 / 8.0 * (1.0 - _POISSON) * bar) ** (1.0 / 3.0)
-    return float(min(_LEAST_RADIUS * alike, _LEAST_PART * size))
+    return float((3.0 / 8.0 * (1.0 - _POISSON) * bar) ** (1.0 / 3.0))
 
 
 def _width_at(closest: Array, gaps: Array, triangles: Array, size: float) -> float:

@@ -9,7 +9,15 @@ import numpy as np
 
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
-from calmotion.mesh.patches.automatic_patch import ROOM, Skin, automatic_radius, end_face, nodes_of_area
+from calmotion.mesh.patches.automatic_patch import (
+    ROOM,
+    Skin,
+    automatic_radius,
+    end_face,
+    least_radius,
+    nodes_of_area,
+    radius_alike,
+)
 from calmotion.mesh.patches.contact_place import contact_place
 from calmotion.mesh.patches.joint_places import TIE, Ball, balls_between, cut_at, nearest_apart, reached_by, within
 from calmotion.mesh.patches.named_patch import named_patch
@@ -23,6 +31,7 @@ from calmotion.model.meshes import CutPatch
 _GROWTH = 1.25
 _FEWEST = 6  # nodes of a triangle
 _ON = 1e-7  # of the diagonal: distance of a node from the triangle that it is on
+_LEAST = 0.01  # of the size of a body: radius of a patch, which is then a fiftieth of the body across
 _SPREAD = 1e-3  # second largest over largest extent below which nodes are on a line; the end of a thin strip is not
 
 
@@ -92,6 +101,8 @@ def interface_patches(
     skin = meshed or mesh
     measured = skin.nodes[skin.surface[:, :3]]
     groups = at_one_place(attachments, nearest_apart(measured, radius))
+    least = min(_LEAST * size, least_radius(measured)) if radius < 0.0 else 0.0
+    one = max(least / ROOM, TIE * size)  # places that are nearer to each other divide what is there
     surface = mesh.surface_nodes
     named = _named_patches(mesh, attachments, groups, body)
     frames = [attachments[group[0]].frame for group in groups]
@@ -118,13 +129,13 @@ def interface_patches(
         free = surface[~taken]
         candidates = surface[(nearest == k) & ~taken]
         known = cut_at(frames[k].position, cut, size)
-        patch = None if known is None else _cut_patch(mesh, candidates, known, group, size)
+        patch = None if known is None else _cut_patch(mesh, candidates, known, group, size, least)
         if patch is None:
-            balls = balls_between(centers, k, size)
+            balls = balls_between(centers, k, one)
             candidates = candidates[within(mesh.nodes[candidates], balls)]
             others = np.linalg.norm(np.delete(centers, k, axis=0) - centers[k], axis=1)
-            room = float(others.min(initial=np.inf, where=others > TIE * size))
-            place = _Place(centers[k], frames[k].axis, skin, measured, room)
+            room = float(others.min(initial=np.inf, where=others > one))
+            place = _Place(centers[k], frames[k].axis, skin, measured, room, least)
             patch = _patch(mesh, candidates, free, place, attachments[group[0]].path, group, radius, body)
             if patch.center is not None:
                 patch = replace(patch, balls=reached_by(balls, patch.center, patch.radius))
@@ -158,13 +169,13 @@ def at_one_place(attachments: Sequence[AttachmentFrame], apart: float) -> list[l
 
 
 def _cut_patch(
-    mesh: QuadraticMesh, candidates: IntArray, cut: CutPatch, group: list[int], size: float
+    mesh: QuadraticMesh, candidates: IntArray, cut: CutPatch, group: list[int], size: float, least: float
 ) -> InterfacePatch | None:
-    """The patch of the nodes on the triangles of a cut patch; None where nearer joints have all of them."""
+    """The patch of the nodes on the triangles of a cut patch; None where nearer joints have too many of them."""
     corners = np.arange(3 * len(cut.triangles)).reshape(-1, 3)
     near = NearbyTriangles(cut.triangles.reshape(-1, 3), corners, _ON * size)
     nodes = candidates[np.isfinite(near.closest(mesh.nodes[candidates])[:, 0])]
-    if not spans_a_plane(mesh.nodes[nodes]):
+    if not _carries(mesh.nodes[nodes], least):
         return None
     extent = float(np.linalg.norm(mesh.nodes[nodes] - cut.origin, axis=1).max())
     return InterfacePatch(nodes=nodes.astype(np.int32), attachments=tuple(group), radius=extent)
@@ -219,6 +230,7 @@ class _Place:
         skin: The surface that is measured.
         triangles: Of it [m], shape [k, 3, 3].
         room: Distance to the next place [m].
+        least: Least radius of what is held there [m]; what is smaller gives way to the next larger seat.
     """
 
     center: Array
@@ -226,17 +238,21 @@ class _Place:
     skin: Skin
     triangles: Array
     room: float
+    least: float
 
     def end_and_radius(self) -> tuple[bool, float]:
         """Whether the joint holds an end face, and the radius of what it holds [m]."""
         closest = closest_on_triangles(self.center, self.triangles)
         gaps = np.linalg.norm(closest - self.center, axis=1)
         face = end_face(self.skin, self.center, self.triangles, closest, gaps, self.room)
-        if spans_a_plane(self.skin.nodes[face]):
+        if _carries(self.skin.nodes[face], self.least):
             return True, float(np.linalg.norm(self.skin.nodes[face] - self.center, axis=1).max())
         seat = seat_radius(self.center, self.axis, self.triangles)
         if seat is None:
-            return False, automatic_radius(self.center, self.triangles, closest, gaps, self.room)
+            radius = automatic_radius(self.center, self.triangles, closest, gaps, self.room)
+            if spans_a_plane(self.skin.nodes[face]):  # the end of a detail: what carries it is not measured there
+                radius = max(radius, min(radius_alike(self.triangles), ROOM * self.room))
+            return False, radius
         return False, min(seat, max(ROOM * self.room, 1.25 * float(gaps.min())))
 
 
@@ -261,7 +277,7 @@ def _patch(
         face = np.zeros(0, dtype=np.int32)
         if is_end:
             face = np.intersect1d(end_face(mesh, center, triangles, closest, gaps, place.room), candidates)
-        if spans_a_plane(mesh.nodes[face]):
+        if _carries(mesh.nodes[face], place.least):
             extent = float(np.linalg.norm(mesh.nodes[face] - center, axis=1).max())
             return InterfacePatch(nodes=face.astype(np.int32), attachments=tuple(group), radius=extent)
     nodes = nodes_of_area(mesh, candidates, center, radius, place.axis, given=not automatic)
@@ -269,11 +285,12 @@ def _patch(
         # elements larger than the radius: the nearest surface triangle is the smallest patch that carries a moment
         touched = np.intersect1d(mesh.surface[gaps <= gap + 1e-9 * size].ravel(), candidates)
         nodes = np.union1d(nodes, touched)
-    while automatic and not spans_a_plane(mesh.nodes[nodes]) and radius < size:
+    while automatic and not _carries(mesh.nodes[nodes], place.least) and radius < size:
         radius *= _GROWTH
         nodes = nodes_of_area(mesh, candidates, center, radius, place.axis)
-    if automatic and not spans_a_plane(mesh.nodes[nodes]):
-        nodes = _nearest_spanning(mesh, free, center)  # frames so near to each other that one has hardly any surface
+    if automatic and not _carries(mesh.nodes[nodes], place.least):
+        # frames so near to each other that one has hardly any surface
+        nodes = _nearest_spanning(mesh, free, center, place.least)
     if not spans_a_plane(mesh.nodes[nodes]):
         raise ShotError(
             f"the surface near the attachment frame of {path} is too small to carry a joint",
@@ -283,11 +300,11 @@ def _patch(
     return InterfacePatch(nodes=nodes.astype(np.int32), attachments=tuple(group), radius=radius, center=center)
 
 
-def _nearest_spanning(mesh: QuadraticMesh, free: IntArray, center: Array) -> IntArray:
+def _nearest_spanning(mesh: QuadraticMesh, free: IntArray, center: Array, least: float) -> IntArray:
     """The nearest nodes that carry a moment, of those that no other patch has."""
     order = free[np.argsort(np.linalg.norm(mesh.nodes[free] - center, axis=1), kind="stable")]
     for count in range(_FEWEST, len(order) + 1):
-        if spans_a_plane(mesh.nodes[order[:count]]):
+        if _carries(mesh.nodes[order[:count]], least):
             return np.sort(order[:count])
     return order
 
@@ -298,3 +315,8 @@ def spans_a_plane(points: Array) -> bool:
         return False
     extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return bool(extent[1] > _SPREAD * extent[0])
+
+
+def _carries(points: Array, least: float) -> bool:
+    """Whether points span a plane and are as far from their mean as a patch must be wide, `least` [m]."""
+    return spans_a_plane(points) and float(np.linalg.norm(points - points.mean(axis=0), axis=1).max()) >= least

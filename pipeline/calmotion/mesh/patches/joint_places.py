@@ -42,7 +42,7 @@ def cut_at(position: Array, cut: Sequence[CutPatch], size: float) -> CutPatch | 
     return next((patch for patch in cut if np.linalg.norm(patch.origin - position) < SAME * size), None)
 
 
-def balls_between(places: Array, own: int, size: float) -> list[Ball]:
+def balls_between(places: Array, own: int, one: float) -> list[Ball]:
     """Balls that a patch keeps to, so that surface is left between it and the patches around other places.
 
     In each of them are the points that are nearer to the own place than to another one by a factor, with which they
@@ -52,7 +52,7 @@ def balls_between(places: Array, own: int, size: float) -> list[Ball]:
     Args:
         places: Of all patches [m], shape [k, 3].
         own: Index of the own place.
-        size: Of the body [m].
+        one: Distance below which places are one [m].
 
     Source: circles of Apollonius: the points whose distances from two places have one ratio.
     """
@@ -62,7 +62,7 @@ def balls_between(places: Array, own: int, size: float) -> list[Ball]:
     return [
         (places[own] - ratio**2 / (1.0 - ratio**2) * step, float(ratio / (1.0 - ratio**2) * length))
         for step, length in zip(away, distance, strict=True)
-        if length > TIE * size
+        if length > one
     ]
 
 

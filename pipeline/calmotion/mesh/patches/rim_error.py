@@ -69,29 +69,39 @@ def rim_edges(triangles: Array) -> int:
 def compliance_error(
     rims: Sequence[tuple[float, float]], material: ElasticMaterial, omega_squared: Array, patch_motion: Array
 ) -> float:
-    """Relative error of the compliance of a body by the rims of its patches.
+    """Relative error of the compliance of a body by the rims of its patches: that of the third power of their radii.
+
+    Args:
+        rims: `rim_error` of the root patch, and of each moving patch.
+        material, omega_squared, patch_motion: As of `shares_of_patches`.
+    """
+    if not len(omega_squared) or not len(patch_motion):
+        return 0.0
+    shares = shares_of_patches([radius for _, radius in rims], material, omega_squared, patch_motion)
+    found = [3.0 * error * min(float(share), 1.0) for (error, _), share in zip(rims, shares, strict=True)]
+    return float(found[0] + max(found[1:]))
+
+
+def shares_of_patches(
+    radii: Sequence[float], material: ElasticMaterial, omega_squared: Array, patch_motion: Array
+) -> Array:
+    """What patches turn by on the ground under them, of what a body turns by, shape [1 + p]; may exceed one.
 
     A patch turns on the ground under it as a rigid disc on a half space does; its radius matters by the share of that
     in the compliance of the body.
 
     Args:
-        rims: `rim_error` of the root patch, and of each moving patch.
+        radii: Of the root patch, and of each moving patch [m].
         material: Of the body.
         omega_squared: Of its linear modes [1/s^2], shape [r].
         patch_motion: Motion of the moving patches in them, shape [p, 6, r].
 
     Source: Johnson, Contact Mechanics, 1985, 3.6: a moment turns a disc of radius a by 3 (1 - nu) / (8 G a^3).
     """
-    if not len(omega_squared) or not len(patch_motion):
-        return 0.0
     shear = material.youngs_modulus / (2.0 * (1.0 + material.poissons_ratio))
     turned = patch_motion[:, 3:]
     whole = np.linalg.eigvalsh((turned / omega_squared) @ turned.transpose(0, 2, 1))[:, -1]
     # the end that the body turns farthest at also turns by what the root patch does
     of_each = np.concatenate([[whole.max()], whole])
-    found = []
-    for (error, radius), compliance in zip(rims, of_each, strict=True):
-        own = 3.0 * (1.0 - material.poissons_ratio) / (8.0 * shear * max(radius, np.finfo(float).tiny) ** 3)
-        share = own / compliance if compliance > own else 1.0
-        found.append(3.0 * error * share)
-    return float(found[0] + max(found[1:]))
+    own = 3.0 * (1.0 - material.poissons_ratio) / (8.0 * shear * np.maximum(radii, np.finfo(float).tiny) ** 3)
+    return np.asarray(own / np.maximum(of_each, np.finfo(float).tiny))

@@ -1,0 +1,86 @@
+"""Joints whose seats, not the body, decide how far a flexible body bends, where nobody has said how large they are.
+
+A patch turns on the ground under it, the more the smaller it is. Where this is most of what a body turns by, its
+frequencies are those of the patch: with half the radius the first one is up to 2.8 times lower.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calmotion.arrays import Array, IntArray
+from calmotion.mesh.patches.automatic_patch import radius_alike
+from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches, spans_a_plane
+from calmotion.mesh.patches.rim_error import shares_of_patches
+from calmotion.model.character import Body, ElasticMaterial
+from calmotion.model.meshes import FEMesh
+from calmotion.reduction.discretization_error import clamped_modes
+from calmotion.reduction.elements.assembly import FEModel, assemble
+
+# Of what a body turns by at its end, from which a patch is looked at. With half the radius a patch turns eight times as
+# far, and the frequency is half where that is 3/7 of what counts for it: of a bar, 12.4 E I / L^3 and m / 3 for its
+# bending and for its turning on a spring make that 0.24 of the compliance at its end
+_SHARE = 0.15
+_FALLS = 2.0  # factor by which the first frequency falls with half the radius, from which it is told
+_FEWEST = 6  # nodes of a triangle
+
+
+def weak_patch(
+    model: FEModel, material: ElasticMaterial, radii: Sequence[float], omega_squared: Array, patch_motion: Array
+) -> int | None:
+    """The patch that gives way most, 0 for the root patch, where that is much of what a body turns by; else None.
+
+    It is found by what a reduction has, without a mode more.
+
+    Args:
+        model: Full model.
+        material: Of its matrices.
+        radii: Of the root patch, and of each moving patch [m].
+        omega_squared, patch_motion: As of `shares_of_patches`.
+    """
+    if len(patch_motion) and len(omega_squared):
+        shares = shares_of_patches(radii, material, omega_squared, patch_motion)
+    else:
+        alike = radius_alike(model.mesh.nodes[model.mesh.surface[:, :3]])
+        shares = np.array([alike**3 / (alike**3 + radii[0] ** 3)])
+    worst = int(shares.argmax())
+    return worst if shares[worst] > _SHARE else None
+
+
+def weak_seat_note(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], weak: int) -> str:
+    """What a body would do with half the radius of a seat; empty where that matters little, or is as someone said.
+
+    Args:
+        mesh: Of the body.
+        body: With `flexible` settings.
+        attachments: Its attachment frames.
+        weak: Index of that of the seat.
+    """
+    settings, at = body.flexible, attachments[weak]
+    assert settings is not None
+    if settings.interface_radius >= 0.0 or at.surface is not None:
+        return ""
+    model = assemble(mesh.points, mesh.tets, settings.material, None if body.mass is None else body.mass.mass)
+    patches = interface_patches(model.mesh, attachments, settings.interface_radius, body.path, mesh.patches)
+    held = next(patch.nodes for patch in patches if weak in patch.attachments)
+    half = _inner_half(model.mesh.nodes, held, at.frame.position)
+    stiffness = np.sqrt(mesh.quality.stiffness_factor)
+    own, less = (float(stiffness * clamped_modes(model, 1, nodes)[0][0]) for nodes in (held, half))
+    if own <= _FALLS * less:
+        return ""
+    return (
+        f"{body.path}: how stiff it is depends on how much {at.path} holds of it, which the shot does not say: held "
+        f"there alone, its first frequency is {own:.4g} Hz, with half the radius {less:.4g} Hz (a GeomSubset of family "
+        "calmInterface tells)"
+    )
+
+
+def _inner_half(points: Array, nodes: IntArray, origin: Array) -> IntArray:
+    """The nodes of a patch in the nearer half of the distances that it has from the origin of its frame."""
+    distance = np.linalg.norm(points[nodes] - origin, axis=1)
+    half = nodes[distance <= 0.5 * (distance.min() + distance.max())]
+    if spans_a_plane(points[half]):
+        return np.asarray(half)
+    return np.asarray(nodes[np.argsort(distance, kind="stable")][: max(_FEWEST, len(nodes) // 4)])
