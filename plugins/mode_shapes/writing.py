@@ -12,7 +12,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.model import Body
 from calmotion.reduction.damping import modal_damping
-from calmotion.reduction.inertia_integrals import inertia_integrals
+from calmotion.reduction.inertia import inertia_integrals
 from calmotion.support.files import replaced, write_text
 from calmotion.support.naming import distinct_names
 

@@ -53,7 +53,7 @@ class AnalyseShot(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.support.memory import available_memory
-        from calmotion.tolerance.expected_cost import expected_cost, refuse_unaffordable
+        from calmotion.tolerance.cost import expected_cost, refuse_unaffordable
         from calmotion.tolerance.simplification.analysis import analyse
 
         source, paths = context.get(Source), context.get(OutputPaths)
@@ -85,7 +85,7 @@ class RefineReduction(Operator):
         return "its plugin cannot repeat the reduction" if reduced is not None and reduced.reduction is None else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.tolerance.converged_reduction import converged_reduction
+        from calmotion.tolerance.reduction import converged_reduction
 
         source, reduction = context.get(Source), context.get(ReducedBodies).reduction
         assert reduction is not None
@@ -125,7 +125,7 @@ class PlanStep(Operator):
         check_simulation(context.get(Character), context.get(Animation), run_settings(context.get(Source)))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.tolerance.simulate_to_tolerance import planned_step
+        from calmotion.tolerance.simulation import planned_step
 
         context.progress(0.0, "simulating the shot as animated")
         options = run_settings(context.get(Source), context.get(ModelChoices))

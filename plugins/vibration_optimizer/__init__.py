@@ -107,7 +107,7 @@ class SimulateShot(Operator):
             check_simulation(character, animation, _options(context))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
+        from calmotion.tolerance.simulation import simulate_to_tolerance
 
         shot, shaped, converged = compiled_in(context.get), context.get(ShapedTracks), context.get(ConvergedReduction)
         if shaped is not None:

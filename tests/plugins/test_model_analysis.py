@@ -89,7 +89,7 @@ def test_of_a_long_shot_an_inspection_simulates_the_busiest_part(host, monkeypat
     shot, seen = mixed_arm(), []
     monkeypatch.setattr(sys.modules[host.operators["accuracy.step"].__module__], "LONG_SHOT", 0.25)
     monkeypatch.setattr(
-        "calmotion.tolerance.simulate_to_tolerance.planned_step",
+        "calmotion.tolerance.simulation.planned_step",
         lambda shot, options: seen.append(shot) or Simplification("time step 2 ms", "planned"),
     )
     given = [shot.character, shot.animation, compile_shot(shot.character, shot.animation), _source("inspect")]

@@ -5,7 +5,7 @@ from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
+from calmotion.tolerance.simulation import simulate_to_tolerance
 from calmotion.tolerance.step_error import distance, frames_of, simulate_at
 from hypothesis import assume, event, given
 from hypothesis import strategies as st

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from boxes import quadratic_shapes
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.inertia_integrals import inertia_integrals
+from calmotion.reduction.inertia import inertia_integrals
 
 RELATIVE = 1e-12
 

@@ -12,7 +12,7 @@ from calmotion.model import Animation, Track
 from calmotion.model.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.tolerance.simulate_to_tolerance import intended_positions
+from calmotion.tolerance.simulation import intended_positions
 from calmotion.tolerance.step_error import simulate_at
 from made_shots import soft_linkage_shot
 

@@ -16,8 +16,8 @@ from calmotion.model.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.testing import host_with, run_operator
-from calmotion.tolerance.converged_reduction import converged_reduction
-from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
+from calmotion.tolerance.reduction import converged_reduction
+from calmotion.tolerance.simulation import simulate_to_tolerance
 from calmotion.tolerance.step_error import frames_of
 from mesher_links import PLUGIN
 from swung_beam import square_beam, swing

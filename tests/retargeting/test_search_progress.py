@@ -6,7 +6,7 @@ from calmotion.model.run import RunSettings
 from calmotion.retargeting.search_progress import SearchProgress, SuccessiveSearches, share_of_pass
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.tolerance.simulate_to_tolerance import FINDING
+from calmotion.tolerance.simulation import FINDING
 
 
 def fractions(gains, enough=1e-5):

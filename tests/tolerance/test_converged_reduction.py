@@ -10,10 +10,10 @@ from calmotion.simulation import body_reduction
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.body_reduction import reduced_shot, reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.tolerance import converged_reduction as module
-from calmotion.tolerance.converged_reduction import converged_reduction
+from calmotion.tolerance import reduction as module
 from calmotion.tolerance.integrator_choice import FAST
 from calmotion.tolerance.pod_subspace import ReferenceRun
+from calmotion.tolerance.reduction import converged_reduction
 from calmotion.tolerance.step_error import distance, simulate_at
 
 STEP = 1 / 480

@@ -10,7 +10,7 @@ from calmotion.model.run import RunSettings
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.error_budget import with_budget
-from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
+from calmotion.tolerance.simulation import simulate_to_tolerance
 
 TOLERANCE = 2e-3
 

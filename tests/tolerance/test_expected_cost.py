@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.model.run import RunSettings
-from calmotion.tolerance.expected_cost import ExpectedCost, expected_cost, readable_hours, refuse_unaffordable
+from calmotion.tolerance.cost import ExpectedCost, expected_cost, readable_hours, refuse_unaffordable
 
 
 def longer(animation, factor):

@@ -11,7 +11,7 @@ from calmotion.simulation.bodies import with_elasticity
 from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.tolerance import simulate_again
 from calmotion.tolerance.reduced_bodies import RunMemory
-from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
+from calmotion.tolerance.simulation import simulate_to_tolerance
 from calmotion.tolerance.step_error import distance, frames_of
 
 TOLERANCE = 1e-3
@@ -50,7 +50,7 @@ def test_an_edit_keeps_step_and_subspaces_and_the_tolerance(shot, first, monkeyp
     assert memory.step > 0.0 and memory.projected is not None and memory.integrator
     moved = edited(shot, 1.02)
     anew = simulate_to_tolerance(moved, OPTIONS, quiet)
-    monkeypatch.setattr("calmotion.tolerance.simulate_to_tolerance.project_to_tolerance", None)  # not needed
+    monkeypatch.setattr("calmotion.tolerance.simulation.project_to_tolerance", None)  # not needed
     again = simulate_to_tolerance(moved, OPTIONS, quiet, memory=memory)
     assert again.step_s == pytest.approx(before.step_s) and again.dof == before.dof
     assert distance(positions(again, moved), positions(anew, moved)) < again.accuracy.estimated_m + TOLERANCE / 4

@@ -14,10 +14,10 @@ from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.simulation.bodies import with_elasticity
 from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.tolerance import simulate_to_tolerance as to_tolerance
+from calmotion.tolerance import simulation as to_tolerance
 from calmotion.tolerance import step_choice
 from calmotion.tolerance.pod_subspace import ProjectedShot
-from calmotion.tolerance.simulate_to_tolerance import found_tracks, planned_step, simulate_to_tolerance
+from calmotion.tolerance.simulation import found_tracks, planned_step, simulate_to_tolerance
 from calmotion.tolerance.step_choice import WHOLE
 from calmotion.tolerance.step_error import CLOSED_GAP, distance, frames_of, simulate_at
 

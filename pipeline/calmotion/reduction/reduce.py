@@ -22,7 +22,7 @@ from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.damping import damped, ratio_of_parts
 from calmotion.reduction.elements.assembly import FEModel, assemble
 from calmotion.reduction.elements.embedding import Embedding, embed
-from calmotion.reduction.inertia_integrals import inertia_integrals
+from calmotion.reduction.inertia import inertia_integrals
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
 from calmotion.reduction.reduced_body import Elasticity, InterfaceStiffness, Marker, ReducedBody
 from calmotion.reduction.scaled_stiffness import with_interface_stiffness

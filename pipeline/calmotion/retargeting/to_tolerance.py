@@ -28,7 +28,7 @@ from calmotion.simulation.inputs.open_chains import refused_gap
 from calmotion.simulation.simulate import Progress
 from calmotion.tolerance.pod_subspace import ProjectedShot, ReferenceRun
 from calmotion.tolerance.reduced_bodies import SUBSPACES, TIME_STEP, RunMemory
-from calmotion.tolerance.simulate_to_tolerance import (
+from calmotion.tolerance.simulation import (
     FINDING,
     HELD,
     allowed_by_subspaces,

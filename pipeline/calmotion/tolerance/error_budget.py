@@ -7,7 +7,9 @@ from dataclasses import replace
 from calmotion.model import Character, Result
 from calmotion.model.budget import CHOICES, MESH, PATCHES, REDUCTION, SEARCH, SEARCH_SHARE, STEP, SUBSPACE, BudgetEntry
 from calmotion.model.tolerance import tolerance_of
-from calmotion.tolerance import converged_reduction, simulate_to_tolerance, step_choice
+from calmotion.tolerance import reduction as converged_reduction
+from calmotion.tolerance import simulation as simulate_to_tolerance
+from calmotion.tolerance import step_choice
 from calmotion.tolerance.meshes import mesh_budget
 
 

@@ -157,7 +157,7 @@ def _expected(
 ) -> dict[str, Any]:  # fmt: skip
     """What `optimize` is expected to take: windows, memory and time; of the order of the real ones."""
     from calmotion.retargeting.windows.plan import overlap_time, plan_windows, window_length
-    from calmotion.tolerance.expected_cost import expected_cost
+    from calmotion.tolerance.cost import expected_cost
 
     options, given = RunSettings(), (settings or {}).get("retarget.optimize", {}).get("window")
     if given is not None:

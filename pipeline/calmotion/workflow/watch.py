@@ -125,7 +125,7 @@ class Watch:
         """Whether the reduced bodies of the last run do for the motion."""
         from calmotion.model.tolerance import tolerance_of
         from calmotion.simulation.body_reduction import load_envelopes
-        from calmotion.tolerance.converged_reduction import SHARE
+        from calmotion.tolerance.reduction import SHARE
 
         if reduction is None or reduction.loads is None or data.get(FEMeshes) is not self._last.get(FEMeshes):
             return False

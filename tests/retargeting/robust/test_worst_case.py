@@ -15,7 +15,7 @@ from calmotion.retargeting.robust.worst_case import WorstCase
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.prepare import prepare
-from calmotion.tolerance.simulate_to_tolerance import found_tracks
+from calmotion.tolerance.simulation import found_tracks
 from posed import ignore_progress, looped
 
 OPTIONS = RunSettings(step=1 / 120)

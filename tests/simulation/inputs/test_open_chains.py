@@ -24,7 +24,7 @@ from calmotion.retargeting.optimize import optimize_shot
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.tolerance.simplification.analysis import analyse
-from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
+from calmotion.tolerance.simulation import simulate_to_tolerance
 from posed import ignore_progress
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])

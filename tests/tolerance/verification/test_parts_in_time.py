@@ -6,7 +6,7 @@ from calmotion.errors import ShotError
 from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.support.processes.workers import Fault
-from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
+from calmotion.tolerance.simulation import simulate_to_tolerance
 from calmotion.tolerance.verification.parts_in_time import (
     Elsewhere,
     TimePart,

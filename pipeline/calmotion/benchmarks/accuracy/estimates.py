@@ -31,10 +31,10 @@ from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
 from calmotion.simulation.body_reduction import BodyReduction, reduction_for
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
-from calmotion.tolerance.converged_reduction import converged_reduction
 from calmotion.tolerance.integrator_choice import by_fast_scheme
 from calmotion.tolerance.pod_subspace import ReferenceRun, project_to_subspace, reference_run
-from calmotion.tolerance.simulate_to_tolerance import simulate_to_tolerance
+from calmotion.tolerance.reduction import converged_reduction
+from calmotion.tolerance.simulation import simulate_to_tolerance
 from calmotion.tolerance.step_error import StepRun, distance, frames_of, simulate_at
 
 HONEST, LIMIT = (0.05, 1.0), 1.5  # where errors over estimates are to be, and what none may exceed

@@ -25,9 +25,9 @@ from calmotion.model.run import RunSettings
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.tolerance.converged_reduction import converged_reduction
+from calmotion.tolerance.reduction import converged_reduction
 from calmotion.tolerance.simplification.analysis import analyse
-from calmotion.tolerance.simulate_to_tolerance import found_tracks, simulate_to_tolerance
+from calmotion.tolerance.simulation import found_tracks, simulate_to_tolerance
 from calmotion.tolerance.step_error import distance, frames_of
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)

@@ -12,9 +12,9 @@ from calmotion.model.tolerance import tolerance_of
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
-from calmotion.tolerance.converged_reduction import converged_reduction
 from calmotion.tolerance.integrator_choice import by_fast_scheme
-from calmotion.tolerance.simulate_to_tolerance import project_to_tolerance
+from calmotion.tolerance.reduction import converged_reduction
+from calmotion.tolerance.simulation import project_to_tolerance
 from calmotion.tolerance.step_choice import chosen_step
 
 STEPS = (1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 960, 1 / 1920)

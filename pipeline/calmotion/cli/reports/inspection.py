@@ -113,7 +113,7 @@ def _expected(row: dict[str, Any]) -> str:
     """What `optimize` is expected to take, as a sentence."""
     from rich.filesize import decimal
 
-    from calmotion.tolerance.expected_cost import readable_hours
+    from calmotion.tolerance.cost import readable_hours
 
     windows = ""
     if row["windows"] > 1:

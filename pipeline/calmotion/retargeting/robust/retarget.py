@@ -29,7 +29,7 @@ from calmotion.retargeting.robust.worst_case import WorstCase
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
-from calmotion.tolerance.simulate_to_tolerance import found_tracks
+from calmotion.tolerance.simulation import found_tracks
 
 ROUNDS = 6  # most searches with other weights
 FALLING = 0.98  # of the largest error: a smaller gain ends them

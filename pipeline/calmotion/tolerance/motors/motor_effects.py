@@ -25,7 +25,7 @@ from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.prepare import Prepared, failure_error, prepare
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.tolerance.integrator_choice import by_fast_scheme
-from calmotion.tolerance.simulate_to_tolerance import own_step
+from calmotion.tolerance.simulation import own_step
 
 
 def with_gains_used(character: Character) -> Character:

@@ -18,7 +18,7 @@ from calmotion.simulation.simulate import Progress
 from calmotion.tolerance.integrator_choice import by_fast_scheme
 from calmotion.tolerance.meshes.mesh_budget import MOST_NODES, mesh_error
 from calmotion.tolerance.pod_subspace import project_to_subspace
-from calmotion.tolerance.simulate_to_tolerance import found_tracks
+from calmotion.tolerance.simulation import found_tracks
 from calmotion.tolerance.step_error import StepRun, distance, frames_of, simulate_at
 from calmotion.tolerance.verification.parts_in_time import (
     Elsewhere,

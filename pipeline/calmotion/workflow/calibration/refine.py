@@ -16,7 +16,7 @@ from calmotion.model.run import OutputPaths, RunSettings
 from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import random_scenarios, uncertain_parameters
 from calmotion.tolerance.reduced_bodies import compiled_in
-from calmotion.tolerance.simulate_to_tolerance import found_tracks
+from calmotion.tolerance.simulation import found_tracks
 from calmotion.workflow.calibration.calibrate import CalibratedShot, calibrate
 from calmotion.workflow.commands import optimize, simulate
 from calmotion.workflow.results import OptimizationResult, SimulationResult

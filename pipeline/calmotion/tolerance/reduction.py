@@ -22,7 +22,7 @@ from calmotion.simulation.inputs.time_grid import MAX_STEP
 from calmotion.tolerance.meshes.mesh_budget import mesh_error, meshes_to_tolerance
 from calmotion.tolerance.pod_subspace import ReferenceRun, reference_run
 from calmotion.tolerance.reduced_bodies import ConvergedReduction
-from calmotion.tolerance.simulate_to_tolerance import OF_SHAKE, intended_positions
+from calmotion.tolerance.simulation import OF_SHAKE, intended_positions
 from calmotion.tolerance.step_error import distance
 
 SHARE = 0.4  # of the tolerance, that what is left out may take
