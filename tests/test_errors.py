@@ -6,7 +6,6 @@ import pickle
 import pytest
 from calmotion.errors import ShotError, ShotErrors, each, failure_of_machine
 from calmotion.host import SettingError
-from calmotion.workflow.importing.converters import BrokenMeshes
 from calmotion.workflow.problems import Problem, RunError
 
 
@@ -41,14 +40,12 @@ def test_other_exceptions_are_none(error):
         SettingError("bad", path="--step", found=1.0, remedy="Write another"),
         ShotErrors([ShotError("one", path="/a"), ShotError("two", path="/b")]),
         RunError([Problem(ShotError("one", path="/a"), "usd.read", "usd_reader"), Problem(ShotError("two"))]),
-        BrokenMeshes("robot.urdf", ["a.obj", "b.obj"]),
     ],
 )
 def test_errors_travel_between_processes(error):
     back = pickle.loads(pickle.dumps(error))
     assert type(back) is type(error) and str(back) == str(error) and back.as_dict() == error.as_dict()
     assert [str(one) for one in each(back)] == [str(one) for one in each(error)]
-    assert getattr(back, "files", ()) == getattr(error, "files", ())
     assert [row.as_dict() for row in getattr(back, "problems", ())] == [
         row.as_dict() for row in getattr(error, "problems", ())
     ]

@@ -126,9 +126,9 @@ def test_a_show_on_two_workers(tmp_path):
 
 
 def needs_converters():
-    from calmotion.workflow.importing.converters import VARIABLE, environment_folder
-
-    if not os.environ.get(VARIABLE) and not (environment_folder() / "ready").is_file():
+    converters = pytest.importorskip("calmotion_plugins.robot_import.converters")
+    variable = converters.VARIABLE
+    if not os.environ.get(variable) and not (converters.environment_folder() / "ready").is_file():
         pytest.skip(
-            f"the converters are not here: name their environment with {VARIABLE}, or run calmotion import once"
+            f"the converters are not here: name their environment with {variable}, or run calmotion import once"
         )

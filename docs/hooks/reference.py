@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import os
 import re
@@ -105,7 +106,7 @@ def subcommands(parser: Any) -> list[tuple[str, Any]]:
 
 
 def python_interface() -> str:
-    """Signatures and docstrings of what `calmotion` exports."""
+    """Signatures and docstrings of what `calmotion` and the bundled plugins export."""
     import calmotion
 
     lines = [
@@ -114,13 +115,28 @@ def python_interface() -> str:
         "`import calmotion as cm`. The [tutorial](../tutorial_python.md) shows it at work.",
         "",
     ]
-    exported = [(name, getattr(calmotion, name)) for name in calmotion.__all__ if not name.startswith("_")]
     for title, kind in (("Functions", inspect.isfunction), ("Classes", inspect.isclass)):
         lines += [f"## {title}", ""]
-        for name, thing in exported:
-            if kind(thing):
+        for name in calmotion.__all__:
+            if kind(thing := getattr(calmotion, name)):
                 lines += entry(name, thing, 3)
+    for plugin in sorted((ROOT / "plugins").glob("*/plugin.toml")):
+        lines += plugin_interface(plugin.parent.name)
     return "\n".join(lines)
+
+
+def plugin_interface(plugin: str) -> list[str]:
+    """What `calmotion_plugins.PLUGIN` offers besides its operators."""
+    from calmotion.host import Operator
+
+    module = importlib.import_module(f"calmotion_plugins.{plugin}")
+    lines = []
+    for name in getattr(module, "__all__", ()):
+        thing = getattr(module, name)
+        operator = inspect.isclass(thing) and issubclass(thing, Operator)
+        if name not in ("register", "unregister") and not operator:
+            lines += entry(name, thing, 3)
+    return [f"## calmotion_plugins.{plugin}", "", *lines] if lines else []
 
 
 def entry(name: str, thing: Any, level: int) -> list[str]:

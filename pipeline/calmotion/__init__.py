@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from calmotion.workflow.calibration.refine import RefinedShot, refine
     from calmotion.workflow.commands import inspect, optimize, rig, simulate, verify
     from calmotion.workflow.exporting.export import Export, export
-    from calmotion.workflow.importing.robot import ImportedRobot, import_robot
     from calmotion.workflow.inspection import Inspection
     from calmotion.workflow.installation.warmup import Warmup, warmup
     from calmotion.workflow.problems import Cancelled, RunError
@@ -41,7 +40,6 @@ __all__ = [
     "Cancelled",
     "ExcitedShot",
     "Export",
-    "ImportedRobot",
     "Inspection",
     "JobResult",
     "MotorMotion",
@@ -63,7 +61,6 @@ __all__ = [
     "excite",
     "batch",
     "export",
-    "import_robot",
     "inspect",
     "open_shot",
     "optimize",
@@ -87,7 +84,6 @@ _HOMES = {
     "workflow.batch.run": ("batch",),
     "workflow.commands": ("inspect", "optimize", "rig", "simulate", "verify"),
     "workflow.exporting.export": ("Export", "export"),
-    "workflow.importing.robot": ("ImportedRobot", "import_robot"),
     "workflow.inspection": ("Inspection",),
     "workflow.installation.warmup": ("Warmup", "warmup"),
     "workflow.problems": ("Cancelled", "RunError"),

@@ -11,12 +11,12 @@ def imported(package: str, homes: Mapping[str, tuple[str, ...]], name: str) -> A
     """The object of a public name, for the `__getattr__` of a package.
 
     Args:
-        homes: Module, without `calmotion.`, to the names that it defines.
+        homes: Module, without `calmotion.`, to the names that it defines; `.module` is one of the package itself.
 
     Raises:
         AttributeError: The package has no such name.
     """
     for module, names in homes.items():
         if name in names:
-            return getattr(import_module(f"calmotion.{module}"), name)
+            return getattr(import_module(module if module.startswith(".") else f"calmotion.{module}", package), name)
     raise AttributeError(f"module {package!r} has no attribute {name!r}")

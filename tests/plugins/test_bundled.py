@@ -23,6 +23,7 @@ from calmotion.testing import check_plugin
         "motion_table",
         "recording_readers",
         "rerun_logger",
+        "robot_import",
         "skel_rigger",
         "table_writer",
         "usd_reader",
@@ -43,7 +44,8 @@ def test_no_bundled_plugin_is_missing_here(repository):
 @pytest.mark.parametrize("name", ["bvh_reader", "table_writer"])
 def test_external_plugins_use_only_the_public_interface(repository, name):
     public = (
-        "calmotion.errors", "calmotion.support.files", "calmotion.support.memory", "calmotion.host", "calmotion.model",
+        "calmotion.arrays", "calmotion.errors", "calmotion.support.files", "calmotion.support.memory", "calmotion.host",
+        "calmotion.model",
     )  # fmt: skip
     for file in (repository / "plugins" / name).glob("*.py"):
         for node in ast.walk(ast.parse(file.read_text())):

@@ -106,6 +106,7 @@ def test_what_inspect_promises_of_an_imported_position_actuator_is_what_mujoco_d
 ):
     """An arm of 0.5 m on kp 2000, kv 100, and a table of its angles as commands: 87.65 mm."""
     mujoco = pytest.importorskip("mujoco")
+    pytest.importorskip("calmotion_plugins.robot_import")
     folder, shot = shared_data / "field" / "mjcf_position_actuator", tmp_path / "arm.usda"
     if not folder.is_dir():
         pytest.skip("the arm is not here")

@@ -67,11 +67,7 @@ def test_a_shot_is_named_everywhere_but_in_the_place_of_a_shot(tmp_path, name, c
     assert remedy_for(tmp_path / name, "usd") is None
 
 
-def test_a_shot_in_the_place_of_a_robot_or_of_settings_needs_no_import(tmp_path):
-    from calmotion.workflow.importing.descriptions import read_description
-
+def test_a_shot_in_the_place_of_settings_needs_no_import(tmp_path):
     (tmp_path / "shot.usda").write_text('#usda 1.0\ndef Xform "Robot" {}\n')
-    with pytest.raises(ShotError, match="It needs no import"):
-        read_description(str(tmp_path / "shot.usda"), {})
     with pytest.raises(SettingError, match="It needs no import"):
         read_settings_file(tmp_path / "shot.usda")

@@ -15,7 +15,6 @@ from calmotion.host.manifest import read_manifest
 from calmotion.host.settings import read_settings_file
 from calmotion.rigging.materials import read_materials
 from calmotion.support.reading import read_toml
-from calmotion.workflow.importing.descriptions import _root
 
 
 def disabled(folder):
@@ -36,7 +35,6 @@ READERS = {
     "disabled plugins": disabled,
     "a manifest": manifest,
     "materials": lambda folder: read_materials(folder / "file"),
-    "a robot": lambda folder: _root(str(folder / "file")),
 }
 
 
@@ -48,7 +46,7 @@ def test_a_named_pipe_is_refused(tmp_path, name):
     assert "named pipe" in error.value.message()
 
 
-@pytest.mark.parametrize("name", [name for name in READERS if name != "a robot"])
+@pytest.mark.parametrize("name", READERS)
 def test_values_that_are_nested_too_deeply_are_refused(tmp_path, name):
     (tmp_path / "file").write_text("a = " + 100_000 * "[")
     with pytest.raises((SettingError, PluginError, ShotError)) as error:

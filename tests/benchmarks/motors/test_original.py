@@ -32,6 +32,7 @@ ARM = """<mujoco model="arm">
 @pytest.fixture
 def arm(tmp_path, calmotion):
     pytest.importorskip("mujoco")
+    pytest.importorskip("calmotion_plugins.robot_import")
     times = np.arange(73) / 60.0
     wave = 1.0 - np.cos(2 * np.pi * np.clip(times - 0.1, 0.0, 1.0))
     table = np.column_stack([times, 0.3 * wave, -0.4 * wave])

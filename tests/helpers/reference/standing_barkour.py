@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import calmotion as cm
 import numpy as np
+import pytest
 from calmotion.usd import schemas
 from pxr import Gf, Usd, UsdGeom, UsdPhysics
 from scipy.optimize import least_squares
@@ -94,7 +94,8 @@ def stand(source: Path, folder: Path, chassis, toes=None, away=None, flexible=()
             columns[hinge.path.rsplit("/", 1)[-1]] = values
     np.savez(folder / "motion.npz", **columns)
     layer = folder / "standing.usda"
-    cm.import_robot(source, layer=layer, motion=folder / "motion.npz", targets=["chassis"], flexible=list(flexible))
+    robots = pytest.importorskip("calmotion_plugins.robot_import")
+    robots.import_robot(source, layer=layer, motion=folder / "motion.npz", targets=["chassis"], flexible=list(flexible))
     stage = Usd.Stage.Open(str(layer))
     for leg in legs:
         toe = UsdGeom.Xform.Define(stage, leg.shank.GetPath().AppendChild("Toe"))

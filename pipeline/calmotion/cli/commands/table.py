@@ -47,9 +47,6 @@ BUILT_IN = {
     "sequence": BuiltIn("shows.sequence", "retarget clips and all transitions between them"),
     "submit": BuiltIn("shows.submit", "write a job template for a render farm (OpenJD)"),
     "export": BuiltIn("shots.export", "write the motor curves for a controller, and measure what playing them costs"),
-    "import": BuiltIn(
-        "robots.import_robot", "make a shot from a URDF, MJCF or USD robot, with a motion, flexible links and targets"
-    ),
     "rig": BuiltIn("robots.rig", "make a robot from a skinned character: bodies, joints, motors, targets"),
     "motors": BuiltIn("robots.motors", "list real motors that a joint can name, with their sources"),
     "materials": BuiltIn("robots.materials", "list materials for flexible links, with their sources"),
@@ -60,7 +57,7 @@ BUILT_IN = {
     "doctor": BuiltIn("setup.doctor", "check the installation and the machine, and say what to do"),
 }
 # The bundled plugins that bring commands: whoever deletes one is told where its command went.
-BROUGHT_BY: dict[str, str] = {}
+BROUGHT_BY: dict[str, str] = {"import": "robot_import"}
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,14 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.support.files import is_special, refuse_special
 from calmotion.support.foreign_files import remedy_for
 from calmotion.support.naming import nearest
-from calmotion.workflow.importing.mjcf import (
+
+from .mjcf import (
     refuse_curved_followers,
     refuse_other_masses,
     refuse_several_joints,
     unread,
 )
-from calmotion.workflow.importing.repairs import (
+from .repairs import (
     PACKAGE,
     faults,
     in_package,

@@ -52,7 +52,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.host import SettingError
-    from calmotion.workflow.importing.robot import import_robot
+
+    from .robot import import_robot
 
     packages = dict(text.partition("=")[::2] for text in args.package)
     for name, folder in packages.items():

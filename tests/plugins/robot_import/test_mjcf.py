@@ -2,7 +2,7 @@
 
 import pytest
 from calmotion.errors import ShotError
-from calmotion.workflow.importing.descriptions import read_description
+from calmotion_plugins.robot_import.descriptions import read_description
 
 HINGE = '<joint name="{}" axis="0 1 0"/>'
 

@@ -14,7 +14,8 @@ from pathlib import Path
 from calmotion.errors import ShotError
 from calmotion.support import files
 from calmotion.support.caching.cache_folder import cache_folder
-from calmotion.workflow.importing.descriptions import URDF, Description
+
+from .descriptions import URDF, Description
 
 PACKAGES = ("urdf-usd-converter>=0.3.4,<0.4", "mujoco-usd-converter>=0.8,<0.9")
 VARIABLE = "CALMOTION_CONVERTERS"  # names an environment that has them

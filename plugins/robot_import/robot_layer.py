@@ -9,18 +9,18 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-
 from calmotion.errors import ShotError, raise_all
 from calmotion.model import MotorTracks
 from calmotion.rigging.materials import Material
 from calmotion.support.naming import nearest
 from calmotion.usd import stages
 from calmotion.usd.diagnostics import quiet
-from calmotion.usd.importing.robot_motors import author_motors, named, shift_limits
 from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.rigging.materials import author_material
 from calmotion.usd.schemas import is_applied
 from calmotion.usd.units import StageUnits, units_of
+
+from .robot_motors import author_motors, named, shift_limits
 
 if TYPE_CHECKING:
     from pxr import Sdf, Usd

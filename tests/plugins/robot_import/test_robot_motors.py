@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.usd.reading import read_shot
+from calmotion_plugins.robot_import import import_robot
 from generic_arm import generic
 from pxr import Sdf, UsdPhysics
 from small_shots import BASE, ELBOW, FORE, SHOULDER, TARGET_POSITION, clear_mass, write_arm
@@ -33,7 +33,7 @@ def test_a_usd_robot_gets_motors_and_a_motion_where_it_is(tmp_path):
     robot = write_arm(tmp_path / "robots" / "arm.usda", undriven)
     (tmp_path / "wave.csv").write_text("time_s,shoulder,elbow\n0,0,0.1\n0.04,0.1,0.2\n0.08,0.3,0.2\n")
     before = robot.read_bytes()
-    made = cm.import_robot(robot, layer=tmp_path / "shot.usda", motion=tmp_path / "wave.csv")
+    made = import_robot(robot, layer=tmp_path / "shot.usda", motion=tmp_path / "wave.csv")
     assert made.folder == "" and robot.read_bytes() == before
     layer = Sdf.Layer.FindOrOpen(str(tmp_path / "shot.usda"))
     assert list(layer.subLayerPaths) == ["./robots/arm.usda"]
@@ -44,19 +44,19 @@ def test_a_usd_robot_gets_motors_and_a_motion_where_it_is(tmp_path):
 
 def test_a_usd_robot_keeps_its_animation_and_clock_and_the_rest_moves_freely(tmp_path):
     robot = write_arm(tmp_path / "arm.usda", lambda stage: undriven(stage, [ELBOW]))
-    made = cm.import_robot(robot, layer=tmp_path / "shot.usda")
+    made = import_robot(robot, layer=tmp_path / "shot.usda")
     expected = read_shot(str(robot))[1]
     assert len(made.character.motors) == 1 and any("--motors all" in note for note in made.notes)
     np.testing.assert_allclose(made.animation.frame_times, expected.frame_times)
     np.testing.assert_allclose(made.animation.tracks[0].values, expected.tracks[0].values)
-    both = cm.import_robot(robot, layer=tmp_path / "shot.usda", motors=["all"])
+    both = import_robot(robot, layer=tmp_path / "shot.usda", motors=["all"])
     assert [motor.path for motor in both.character.motors] == [SHOULDER, ELBOW]
 
 
 def test_axes_of_a_generic_joint_are_named_and_driven(tmp_path):
     robot = write_arm(tmp_path / "arm.usda", lambda s: (undriven(s), generic(s, ELBOW, ["rotX", "rotZ"])))
     (tmp_path / "wave.csv").write_text("time_s,elbow.rotZ\n0,0\n0.04,0.1\n0.08,0.3\n")
-    made = cm.import_robot(robot, layer=tmp_path / "shot.usda", motion=tmp_path / "wave.csv", motors=["elbow.*"])
+    made = import_robot(robot, layer=tmp_path / "shot.usda", motion=tmp_path / "wave.csv", motors=["elbow.*"])
     assert [motor.path for motor in made.character.motors] == [f"{ELBOW}.rotX", f"{ELBOW}.rotZ"]
     np.testing.assert_allclose(made.animation.tracks[1].values, [0.0, 0.1, 0.3], atol=1e-6)
 
@@ -70,10 +70,10 @@ def test_not_all_joints_of_a_closed_chain_can_be_motors(tmp_path):
 
     robot = write_arm(tmp_path / "arm.usda", closed)
     with pytest.raises(ShotError, match="closed chain") as refused:
-        cm.import_robot(robot, layer=tmp_path / "shot.usda")
+        import_robot(robot, layer=tmp_path / "shot.usda")
     assert refused.value.attribute == "--motors" and "shoulder, elbow, close" in str(refused.value.found)
     assert not (tmp_path / "shot.usda").exists()
-    made = cm.import_robot(robot, layer=tmp_path / "shot.usda", motors=["shoulder"])
+    made = import_robot(robot, layer=tmp_path / "shot.usda", motors=["shoulder"])
     assert [motor.path for motor in made.character.motors] == [SHOULDER]
 
 
@@ -85,15 +85,15 @@ def test_a_robot_without_hinges_and_sliders_is_refused(tmp_path):
 
     robot = write_arm(tmp_path / "arm.usda", balls)
     with pytest.raises(ShotError, match="no joint that a motor can drive") as refused:
-        cm.import_robot(robot, layer=tmp_path / "shot.usda")
+        import_robot(robot, layer=tmp_path / "shot.usda")
     assert "PhysicsSphericalJoint" in str(refused.value.found) and "leave it passive" in refused.value.remedy
 
 
 def test_solid_gives_bodies_without_mass_that_of_their_geometry(tmp_path):
     robot = write_arm(tmp_path / "arm.usda", lambda s: (undriven(s), clear_mass(s, FORE)))
     with pytest.raises(ShotError, match="without mass"):
-        cm.import_robot(robot, layer=tmp_path / "shot.usda")
-    made = cm.import_robot(robot, layer=tmp_path / "shot.usda", solid="abs")
+        import_robot(robot, layer=tmp_path / "shot.usda")
+    made = import_robot(robot, layer=tmp_path / "shot.usda", solid="abs")
     fore = next(body for body in made.character.bodies if body.path == FORE)
     assert fore.mass.mass == pytest.approx(1050.0 * 0.4 * 0.04**2, rel=0.05)
 
@@ -101,4 +101,4 @@ def test_solid_gives_bodies_without_mass_that_of_their_geometry(tmp_path):
 def test_the_robot_itself_is_never_written_to(tmp_path):
     robot = write_arm(tmp_path / "arm.usda", undriven)
     with pytest.raises(ShotError, match="never written to"):
-        cm.import_robot(robot, layer=robot)
+        import_robot(robot, layer=robot)

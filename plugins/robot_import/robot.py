@@ -11,24 +11,24 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-
 from calmotion.errors import ShotError
 from calmotion.host import Host, SettingError, has_no_unit, open_host, parse_quantity
 from calmotion.model import Animation, Character, MotorTracks
 from calmotion.model.run import Source
 from calmotion.rigging.materials import Material, material_named
 from calmotion.support.files import try_writing
-from calmotion.usd.importing.robot_layer import FlexibleLinks, RobotOptions, robot_layer
 from calmotion.usd.layers import EXTENSIONS, refuse_input_as_output, write_layer
 from calmotion.usd.reading.shot import read_shot
 from calmotion.usd.writing.root import relative_asset
 from calmotion.version import __version__
-from calmotion.workflow.importing.converters import BrokenMeshes, convert, converter_python, temporary_folder
-from calmotion.workflow.importing.descriptions import USD, Description, read_description, repaired
-from calmotion.workflow.importing.doubts import doubts
 from calmotion.workflow.materials import known_materials
 from calmotion.workflow.problems import problems_of, value_of
 from calmotion.workflow.shot import Given, Path, read_settings
+
+from .converters import BrokenMeshes, convert, converter_python, temporary_folder
+from .descriptions import USD, Description, read_description, repaired
+from .doubts import doubts
+from .robot_layer import FlexibleLinks, RobotOptions, robot_layer
 
 FRAMES_PER_SECOND = 60.0
 _UNIFORM = (10.0, 240.0)  # rates of motions that become the rate of the frames [Hz]

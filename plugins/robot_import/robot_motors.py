@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-
 from calmotion.errors import ShotError, raise_all
 from calmotion.model import MotorTracks
 from calmotion.support.naming import nearest

@@ -3,7 +3,7 @@
 import dataclasses
 
 from calmotion.usd.reading.shot import read_shot
-from calmotion.workflow.importing.doubts import doubts
+from calmotion_plugins.robot_import.doubts import doubts
 from small_shots import FORE, write_arm
 
 

@@ -16,7 +16,7 @@ import sys
 import numpy as np
 import pytest
 import yaml
-from calmotion.workflow.importing.converters import VARIABLE, environment_folder
+from calmotion_plugins.robot_import.converters import VARIABLE, environment_folder
 
 ROWS = slice(300, 421)  # two seconds
 RIGHT_ARM = 29  # first of its seven columns: shoulder pitch, roll, yaw, elbow, wrist roll, pitch, yaw

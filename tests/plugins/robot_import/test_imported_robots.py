@@ -13,9 +13,10 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.model.curves import commanded_curves
-from calmotion.workflow.importing.converters import VARIABLE, converter_python, environment_folder
+from calmotion_plugins.robot_import import import_robot
+from calmotion_plugins.robot_import.converters import VARIABLE, converter_python, environment_folder
 
-PROGRAM = Path(__file__).resolve().parents[1] / "helpers" / "reference" / "mujoco_inverse.py"
+PROGRAM = Path(__file__).resolve().parents[2] / "helpers" / "reference" / "mujoco_inverse.py"
 RATE, EVERY = 1920, 16  # steps a second of the simulation, and how many of them are compared
 SHARED = ("sources/so101/so101_new_calib.urdf", "sources/so101/so101_new_calib.xml", "sources/xarm7/xarm7_nohand.xml")
 # of the package example-robot-data, whose folder `robots` is named by CALMOTION_ROBOTS
@@ -40,7 +41,7 @@ pytestmark = pytest.mark.skipif(
 
 def performed(robot: Path, folder: Path) -> cm.SimulationResult:
     """A robot that performs a smooth motion of all joints that lead, from rest to rest within a second."""
-    made = cm.import_robot(robot, layer=folder / "robot.usda", solid="abs")
+    made = import_robot(robot, layer=folder / "robot.usda", solid="abs")
     character = made.character
     joints = [character.joints[motor.joint] for motor in character.motors if motor.follows is None]
     times = np.arange(61) / 60.0
@@ -50,7 +51,7 @@ def performed(robot: Path, folder: Path) -> cm.SimulationResult:
         swing = 0.5 * (1.0 - np.cos(2.0 * np.pi * times)) * np.sin(2.0 * np.pi * times * (0.5 + 0.1 * k))
         columns.append(0.5 * (low + high) + 0.35 * (high - low) * swing)
     np.savez(folder / "wave.npz", time_s=times, **{j.name: c for j, c in zip(joints, columns, strict=True)})
-    cm.import_robot(robot, layer=folder / "robot.usda", solid="abs", motion=folder / "wave.npz")
+    import_robot(robot, layer=folder / "robot.usda", solid="abs", motion=folder / "wave.npz")
     shot = cm.open_shot(folder / "robot.usda")
     return cm.simulate(shot, step=1.0 / RATE, integrator="bdf2", pre_roll=0.0)
 

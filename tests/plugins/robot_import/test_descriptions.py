@@ -6,7 +6,7 @@ import os
 
 import pytest
 from calmotion.errors import ShotError
-from calmotion.workflow.importing.descriptions import read_description
+from calmotion_plugins.robot_import.descriptions import read_description
 
 BOX = '<geometry><box size="1 1 1"/></geometry>'
 MASS = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -119,3 +119,16 @@ def test_a_pipe_in_the_place_of_a_file_of_an_mjcf_robot_is_refused(tmp_path, whe
 def test_files_of_an_mjcf_robot_are_allowed_also_if_they_include_each_other(tmp_path):
     (tmp_path / "robot.xml").write_text('<mujoco><include file="robot.xml"/><include file="none.xml"/></mujoco>')
     assert read_description(str(tmp_path / "robot.xml"), {}).kind == "mjcf"
+
+
+def test_a_shot_in_the_place_of_a_robot_needs_no_import(tmp_path):
+    (tmp_path / "shot.usda").write_text('#usda 1.0\ndef Xform "Robot" {}\n')
+    with pytest.raises(ShotError, match="It needs no import"):
+        read_description(str(tmp_path / "shot.usda"), {})
+
+
+def test_a_named_pipe_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "robot.urdf")
+    with pytest.raises(ShotError) as error:
+        read_description(str(tmp_path / "robot.urdf"), {})
+    assert "named pipe" in error.value.message()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import stat
 import sys
 import time
@@ -10,9 +11,9 @@ from pathlib import Path
 
 import pytest
 from calmotion.errors import ShotError
-from calmotion.workflow.importing import converters
-from calmotion.workflow.importing.converters import convert, converter_python
-from calmotion.workflow.importing.descriptions import Description
+from calmotion_plugins.robot_import import converters
+from calmotion_plugins.robot_import.converters import BrokenMeshes, convert, converter_python
+from calmotion_plugins.robot_import.descriptions import Description
 
 if os.name == "nt":
     pytest.skip("scripts stand in for the converters", allow_module_level=True)
@@ -157,3 +158,9 @@ def test_an_environment_that_another_user_can_write_is_made_anew(tmp_path, monke
     for _ in range(2):
         converter_python(None, lambda text: None)
         assert made == [folder]
+
+
+def test_an_error_travels_between_processes():
+    error = BrokenMeshes("robot.urdf", ["a.obj", "b.obj"])
+    back = pickle.loads(pickle.dumps(error))
+    assert type(back) is BrokenMeshes and back.as_dict() == error.as_dict() and back.files == error.files

@@ -11,9 +11,10 @@ from pathlib import Path
 import calmotion as cm
 import numpy as np
 import pytest
-from calmotion.workflow.importing import robot as importing
-from calmotion.workflow.importing.converters import VARIABLE, environment_folder, temporary_folder
-from calmotion.workflow.importing.robot import flexible_links, frames_per_second
+from calmotion_plugins.robot_import import import_robot
+from calmotion_plugins.robot_import import robot as importing
+from calmotion_plugins.robot_import.converters import VARIABLE, environment_folder, temporary_folder
+from calmotion_plugins.robot_import.robot import flexible_links, frames_per_second
 from converted_arm import CONVERTED, ELBOW, PAN
 
 BOX = '<visual><geometry><box size="0.4 0.04 0.04"/></geometry><origin xyz="0.2 0 0"/></visual>'
@@ -67,16 +68,16 @@ def test_a_robot_with_a_motion_becomes_a_shot(converted, robot, tmp_path, calmot
 
 
 def test_a_failed_import_leaves_everything_as_it_was(converted, robot, tmp_path):
-    cm.import_robot(robot, layer=tmp_path / "shot.usda", solid="abs")
+    import_robot(robot, layer=tmp_path / "shot.usda", solid="abs")
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     for wrong in ({"flexible": ["wheel*=abs"]}, {"solid": None}, {"targets": ["wheel"]}):
         with pytest.raises(cm.ShotError):
-            cm.import_robot(robot, layer=tmp_path / "shot.usda", **({"solid": "abs"} | wrong))
+            import_robot(robot, layer=tmp_path / "shot.usda", **({"solid": "abs"} | wrong))
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
 def test_an_import_whose_layer_cannot_be_moved_leaves_the_former_folder(converted, robot, tmp_path, monkeypatch):
-    cm.import_robot(robot, layer=tmp_path / "shot.usda", solid="abs")
+    import_robot(robot, layer=tmp_path / "shot.usda", solid="abs")
     (tmp_path / "shot_robot" / "former").touch()
     replace = os.replace
 
@@ -87,14 +88,14 @@ def test_an_import_whose_layer_cannot_be_moved_leaves_the_former_folder(converte
 
     monkeypatch.setattr(os, "replace", refused)
     with pytest.raises(cm.ShotError, match="cannot be written"):
-        cm.import_robot(robot, layer=tmp_path / "shot.usda", solid="abs")
+        import_robot(robot, layer=tmp_path / "shot.usda", solid="abs")
     assert (tmp_path / "shot_robot" / "former").exists()
 
 
 def test_a_folder_of_someone_else_is_not_replaced(converted, robot, tmp_path):
     (tmp_path / "shot_robot").mkdir()
     with pytest.raises(cm.ShotError, match="was not made by an import"):
-        cm.import_robot(robot, layer=tmp_path / "shot.usda", solid="abs")
+        import_robot(robot, layer=tmp_path / "shot.usda", solid="abs")
 
 
 @pytest.mark.parametrize(
@@ -137,7 +138,7 @@ def _tracks(times):
     reason=f"the converters are not here: name their environment with {VARIABLE}, or run calmotion import once",
 )
 def test_the_real_converter_makes_a_shot(robot, tmp_path):
-    made = cm.import_robot(robot, layer=tmp_path / "shot.usda", motion=tmp_path / "wave.csv", solid="abs",
+    made = import_robot(robot, layer=tmp_path / "shot.usda", motion=tmp_path / "wave.csv", solid="abs",
                            flexible=["upper*=abs"], targets=["tool0"])  # fmt: skip
     character = made.character
     assert [joint.name for joint in character.joints] == ["shoulder-pan", "elbow"]
@@ -161,7 +162,7 @@ def test_a_wall_needs_a_unit(text):
 def test_what_a_killed_import_left_is_removed_by_the_next(robot, tmp_path):
     code = f"""
 import os
-from calmotion.workflow.importing import robot
+from calmotion_plugins.robot_import import robot
 robot.convert = lambda *arguments: os._exit(9)
 robot.converter_python = lambda named, tell: "python"
 robot.import_robot({str(robot)!r}, layer={str(tmp_path / "out" / "shot.usda")!r})
