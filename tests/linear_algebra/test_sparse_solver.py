@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.linear_algebra.multifrontal import NotPositiveDefinite
+from calmotion.linear_algebra import multifrontal
+from calmotion.linear_algebra.multifrontal import FactorsTooLarge, NotPositiveDefinite
 from calmotion.linear_algebra.sparse_solver import SparseSolver
 from calmotion.reduction.elements.assembly import assemble
 from scipy.sparse import block_diag, csr_matrix, diags, identity
@@ -85,6 +86,17 @@ def test_a_matrix_that_is_not_positive_definite_is_refused(helpers, steel):
         SparseSolver(K)
     with pytest.raises(NotPositiveDefinite):
         SparseSolver(csr_matrix(np.array([[np.nan]])))
+
+
+def test_factors_that_do_not_fit_into_the_memory_are_refused(stiffness, monkeypatch):
+    K, points = stiffness
+    needed = 8.0 * SparseSolver(K, points).entries
+    monkeypatch.setattr(multifrontal, "available_memory", lambda: needed)
+    with pytest.raises(FactorsTooLarge, match=f"{len(points)} nodes") as refused:
+        SparseSolver(K, points)
+    assert refused.value.attribute == "calm:flexible:elementSize"
+    monkeypatch.setattr(multifrontal, "available_memory", lambda: 2.0 * needed)
+    SparseSolver(K, points)
 
 
 def test_a_scaled_matrix_has_the_same_factors():

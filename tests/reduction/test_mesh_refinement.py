@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calmotion.linear_algebra.multifrontal import FactorsTooLarge
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.tetrahedra import measure_quality, tet_volumes
 from calmotion.model import Body, FEMesh, FlexibleSettings
@@ -79,6 +80,19 @@ def test_the_first_frequencies_are_refined_to_the_wanted_error(helpers, beam, fr
     assert off < 0.02 and left < 0.5 * off and left < fine.quality.frequency_error
     kept = refined_for_frequencies(coarse, beam, carrier, Effort(0.02, 0))  # no nodes are allowed
     assert np.array_equal(kept.tets, coarse.tets) and kept.quality.stiffness_factor == 1.0
+
+
+def test_refinement_ends_where_the_memory_does(helpers, beam, monkeypatch):
+    def estimate(mesh, *arguments, **named):
+        if len(mesh.tets) > len(coarse.tets):
+            raise FactorsTooLarge("there is not enough memory")
+        return frequency_estimate(mesh, *arguments, **named)
+
+    coarse = mesh_of(helpers, (8, 1, 1))
+    monkeypatch.setattr(mesh_refinement, "frequency_estimate", estimate)
+    with recomputed():
+        kept = refined_for_frequencies(coarse, beam, helpers.frame(0, 0, 0), Effort(0.02, 15_000))
+    assert len(kept.tets) == len(coarse.tets) and kept.quality.frequency_error > 0.02
 
 
 def test_more_nodes_are_spent_on_meshes_with_a_poor_estimate():

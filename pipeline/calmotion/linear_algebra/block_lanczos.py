@@ -15,7 +15,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.linear_algebra.blas_threads import one_blas_thread
-from calmotion.linear_algebra.sparse_solver import Solver
+from calmotion.linear_algebra.sparse_solver import SparseSolver
 
 _WIDTH = 8  # vectors of a block
 _CONVERGED = 1e-10  # residual over the eigenvalue of the inverse; the error of the frequency is its square
@@ -25,7 +25,7 @@ _MOST_STEPS = 200
 
 
 def lowest_by_lanczos(
-    K: Any, M: Any, count: int, shift: float, solver: Solver, below: float | None, most: int
+    K: Any, M: Any, count: int, shift: float, solver: SparseSolver, below: float | None, most: int
 ) -> tuple[Array, Array]:
     """Lowest eigenpairs of K x = value M x.
 
@@ -48,7 +48,7 @@ def lowest_by_lanczos(
 
 
 def _lanczos(
-    K: Any, M: Any, count: int, shift: float, solver: Solver, below: float | None, most: int
+    K: Any, M: Any, count: int, shift: float, solver: SparseSolver, below: float | None, most: int
 ) -> tuple[Array, Array]:
     n = K.shape[0]
     width = min(_WIDTH, max(2, count // 2), n)

@@ -15,9 +15,17 @@ from typing import Any
 import numpy as np
 
 from calmotion.arrays import Array
+from calmotion.errors import ShotError
 from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.linear_algebra.nested_dissection import Dissection
 from calmotion.support.compilation import kernel
+from calmotion.support.memory import available_memory
+
+_OF_AN_ENTRY = 12.0  # bytes: the number itself, and the complements, 0.16 to 0.37 times as many
+
+
+class FactorsTooLarge(ShotError):
+    """The factors of a matrix would not fit into the memory that this process can take."""
 
 
 class NotPositiveDefinite(ArithmeticError):
@@ -94,6 +102,7 @@ class MultifrontalCholesky:
 
     Raises:
         NotPositiveDefinite: The matrix is not positive definite.
+        FactorsTooLarge: There is not enough memory for them.
     """
 
     def __init__(self, matrix: Any, graph: Any, dissection: Dissection, block: int):
@@ -106,6 +115,7 @@ class MultifrontalCholesky:
         # one array for all blocks: the system then uses large pages
         offset = np.concatenate([[0], np.cumsum(size * (size + outer))])
         self.entries = int(offset[-1])
+        _require_memory(self.entries, len(order))
         self._factors = np.zeros(self.entries)
         self._diagonal, self._below = [], []
         for at, k, m in zip(offset[:-1], size, outer, strict=True):
@@ -165,6 +175,16 @@ class MultifrontalCholesky:
         out = np.empty_like(x)
         out[self._order] = x
         return out
+
+
+def _require_memory(entries: int, nodes: int) -> None:
+    needed, free = _OF_AN_ENTRY * entries, available_memory()
+    if needed > free:
+        raise FactorsTooLarge(
+            f"there is not enough memory for a mesh of {nodes} nodes", attribute="calm:flexible:elementSize",
+            found=f"{needed / 1e9:.1f} GB are needed, {free / 1e9:.1f} GB can be taken",
+            remedy="Author a larger calm:flexible:elementSize, end other programs, or use a machine with more memory.",
+        )  # fmt: skip
 
 
 def _borders(graph: Any, dissection: Dissection) -> list[Any]:

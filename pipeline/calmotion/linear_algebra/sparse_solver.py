@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -12,23 +12,6 @@ from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.linear_algebra.multifrontal import MultifrontalCholesky
 from calmotion.linear_algebra.nested_dissection import dissect
 from calmotion.support import interrupts
-
-
-class Solver(Protocol):
-    """A solver of the systems of a symmetric positive definite matrix."""
-
-    @property
-    def entries(self) -> int:
-        """Number of entries of its factors."""
-
-    def solve(self, b: Array, start: Array | None = None, left: Array | None = None) -> Array:
-        """x with matrix @ x = b, both of shape [n] or [n, k].
-
-        Args:
-            b: Right-hand sides.
-            start: Rough solutions, such as those of a coarser mesh.
-            left: Energy x @ matrix @ x of the error that may be left, shape [k]; None: little. Factors leave none.
-        """
 
 
 class SparseSolver:
@@ -79,8 +62,8 @@ class SparseSolver:
         """Number of entries of the factor; 0 where they are those of another body."""
         return self._factors.entries if self._turn is None else 0
 
-    def solve(self, b: Array, start: Array | None = None, left: Array | None = None) -> Array:
-        """As of `Solver`."""
+    def solve(self, b: Array) -> Array:
+        """x with matrix @ x = b, both of shape [n] or [n, k]."""
         interrupts.check()  # in a thread, where no signal arrives
         columns = b.reshape(len(b), -1)
         with one_blas_thread():

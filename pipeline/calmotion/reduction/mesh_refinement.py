@@ -14,15 +14,15 @@ from functools import partial
 import numpy as np
 
 from calmotion.arrays import Array, IntArray
+from calmotion.linear_algebra.multifrontal import FactorsTooLarge
 from calmotion.mesh.bisection import bisected
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.quadratic import quadratic_nodes
 from calmotion.mesh.tetrahedra import min_dihedral_deg
 from calmotion.model.character import Body, Frame
 from calmotion.model.meshes import FEMesh, MeshQuality
-from calmotion.reduction.basis.nested_interface_modes import CoarserBody
 from calmotion.reduction.cache import cached_reduction
-from calmotion.reduction.full_order.mesh_estimates import ALGEBRAIC, frequency_estimate, load_estimate
+from calmotion.reduction.full_order.mesh_estimates import frequency_estimate, load_estimate
 from calmotion.reduction.full_order.mesh_extrapolation import (
     Estimate,
     by_shape,
@@ -31,7 +31,6 @@ from calmotion.reduction.full_order.mesh_extrapolation import (
     interface_factors,
     mode_ratios,
 )
-from calmotion.reduction.full_order.nested_modes import NestedModes
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduce import FullBody, full_body, linear_modes
 
@@ -59,7 +58,6 @@ class Effort:
         poor: An error for which more nodes are spent; infinite: none.
         poor_nodes: Largest number of nodes of a mesh with a larger error.
         kept_nodes: Largest number of nodes of the mesh that takes the stiffness of finer ones, if by one factor.
-        algebraic: Relative error of the squares of frequencies of a mesh that the solver may leave.
         bad: An error, that of the volume included, for which still more nodes are spent.
         bad_nodes: Largest number of nodes of a mesh that follows one with a larger error.
         shape: An error by what a mesh leaves out of its surface, with which it stays as it is: no finer one repairs it.
@@ -70,7 +68,6 @@ class Effort:
     poor: float = np.inf
     poor_nodes: int = 0
     kept_nodes: float = np.inf
-    algebraic: float = ALGEBRAIC
     bad: float = np.inf
     bad_nodes: int = 0
     shape: float = np.inf
@@ -229,8 +226,11 @@ def _bisected(
                 break
         if not allowed:
             break
+        try:
+            estimates.append(estimate(finer))
+        except FactorsTooLarge:
+            break  # the error that is left is told
         meshes.append(finer)
-        estimates.append(estimate(meshes[-1]))
     return meshes, estimates
 
 
@@ -299,20 +299,16 @@ def load_estimator(
     body: Body, attachments: Sequence[AttachmentFrame], root: int, loads: LoadEnvelope, tolerance: float,
     known: tuple[FEMesh, FullBody] | None = None,
 ) -> Callable[[FEMesh], Estimate]:  # fmt: skip
-    """Estimates the errors of ever finer meshes under loads; each begins with what the one before has.
+    """Estimates the errors of meshes under loads.
 
     Args:
         body, attachments, root, loads, tolerance: As of `refined_for_loads`.
         known: A mesh and its `full_body`.
     """
-    coarser: list[CoarserBody] = []
 
     def estimate(mesh: FEMesh) -> Estimate:
         full = known[1] if known is not None and mesh is known[0] else full_body(mesh, body, attachments, root)
-        fixed = full.support.fixed(full.model, *coarser)
-        found = load_estimate(linear_modes(mesh, body, attachments, root, loads, tolerance, full), body, mesh.missing)
-        coarser[:] = [fixed.for_finer()]
-        return found
+        return load_estimate(linear_modes(mesh, body, attachments, root, loads, tolerance, full), body, mesh.missing)
 
     return estimate
 
@@ -329,10 +325,7 @@ def refined_for_frequencies(
         effort: How far; errors are those of the compliance, twice those of the frequencies.
         attachments: Frames of all its joints: what is nearer to another joint is not held by the parent's.
     """
-    estimate = partial(
-        frequency_estimate, body=body, carrier=carrier, coarser=NestedModes(), algebraic=effort.algebraic,
-        attachments=attachments,
-    )  # fmt: skip
+    estimate = partial(frequency_estimate, body=body, carrier=carrier, attachments=attachments)
     key = ("for frequencies", mesh, replace(body, surfaces=()), carrier, effort, attachments)
     # the estimates of many links are still large with as many nodes; what the loads need is not known yet
     return cached_reduction(key, lambda: refined(mesh, estimate, effort, one_factor=True))

@@ -45,9 +45,6 @@ def test_a_mesh_is_refined_as_far_as_its_surface_left_time():
     assert nodes[0] == nodes[1] > nodes[2] > nodes[3] == nodes[4] > 30_000
     # by 3.3 ms for each triangle and 0.2 ms for each node
     assert 3.3e-3 * 3_000 + 2e-4 * nodes[2] == pytest.approx(20.0, rel=0.01)
-    # the solver leaves more on dense surfaces alone, and far less than the error from which nodes are spent
-    assert efforts[0].algebraic == efforts[1].algebraic < efforts[2].algebraic == efforts[4].algebraic
-    assert efforts[4].algebraic < 0.02 * efforts[4].poor
     assert all(effort.kept_nodes < effort.poor_nodes and effort.wanted < effort.poor for effort in efforts)
 
 

@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 
 from calmotion.arrays import Array, Indices, IntArray
-from calmotion.linear_algebra.sparse_solver import Solver, SparseSolver, turned
+from calmotion.linear_algebra.sparse_solver import SparseSolver, turned
 from calmotion.model.character import FlexibleSettings
 from calmotion.reduction.basis.natural_modes import lowest_modes, vector_mass
-from calmotion.reduction.basis.nested_interface_modes import Begun, CoarserBody
 from calmotion.reduction.basis.residual_flexibility import residual_vectors
 from calmotion.reduction.basis.static_loads import ACCELERATIONS, UNIFORM, unit_accelerations
 from calmotion.reduction.elements.assembly import FEModel
-from calmotion.reduction.elements.nested_meshes import NestedMeshes
 from calmotion.reduction.elements.rigid_patch import rigid_patch
 
 _DEPENDENT = 1e-12  # mass of a combination of columns of unit mass below which they are linearly dependent
@@ -49,10 +47,9 @@ class FixedInterface:
     K: Any
     M: Any
     mass: Any
-    solver: Solver
+    solver: SparseSolver
     constraint: Array
     _like: Likeness | None = field(default=None, repr=False)
-    _begun: Begun | None = field(default=None, repr=False)
     _normal: dict[float, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
     _inertial: list[tuple[Array, Array]] = field(default_factory=list, init=False, repr=False)
     # links that are alike are reduced in several threads
@@ -61,7 +58,7 @@ class FixedInterface:
     @classmethod
     def of(
         cls, model: FEModel, root: IntArray, patches: Sequence[IntArray], centers: Sequence[Array],
-        like: tuple[FixedInterface, Array] | None = None, coarser: CoarserBody | None = None,
+        like: tuple[FixedInterface, Array] | None = None,
     ) -> FixedInterface:  # fmt: skip
         """Factorise the interior and solve for the constraint modes.
 
@@ -69,7 +66,6 @@ class FixedInterface:
             model, root, patches, centers: As of `reduced_basis`.
             like: A body with the same nodes, and the matrix that turns it to this one (see `SparseSolver.turned`): its
                 factors and modes are taken.
-            coarser: The body on a mesh that this one may be bisected from: a large one then gets no factors.
         """
         nodes = model.mesh.nodes
         n = len(nodes)
@@ -80,23 +76,16 @@ class FixedInterface:
         interior = np.flatnonzero(np.repeat(free, 3))
         mass = vector_mass(model.mass)
         K, M = model.stiffness[interior][:, interior], mass[interior][:, interior]
-        begun = None if coarser is None else coarser.on(model.mesh, free, K)
-        solver: Solver
-        if like is not None:
-            assert isinstance(like[0].solver, SparseSolver)
-            solver = like[0].solver.turned(like[1])
-        else:
-            solver = SparseSolver(K, nodes[free]) if begun is None else begun.solver
+        solver = SparseSolver(K, nodes[free]) if like is None else like[0].solver.turned(like[1])
         constraint = np.zeros((n, 3, 6 * len(patches)))
         for k, (patch, center) in enumerate(zip(patches, centers, strict=True)):
             constraint[patch, :, 6 * k : 6 * k + 6] = rigid_patch(nodes[patch], center)
         flat = constraint.reshape(3 * n, -1)
         if len(patches):
             # static response of the interior to a motion of the patches; the interior rows of `flat` were zero
-            solve = solver.solve if begun is None else begun.constraint
-            flat[interior] = solve(-(model.stiffness @ flat)[interior])
+            flat[interior] = solver.solve(-(model.stiffness @ flat)[interior])
         likeness = None if like is None else Likeness(*like)
-        return cls(model, patches, interior, K, M, mass, solver, flat, likeness, begun)
+        return cls(model, patches, interior, K, M, mass, solver, flat, likeness)
 
     def scaled(self, model: FEModel, factor: float) -> FixedInterface:
         """The same with another stiffness, without a new factorisation.
@@ -105,23 +94,8 @@ class FixedInterface:
             model: The full model with its stiffness times the factor, and the same mass.
             factor: Positive.
         """
-        assert isinstance(self.solver, SparseSolver)
         K, solver, like = factor * self.K, self.solver.scaled(factor), Likeness(self, factor=factor)
         return FixedInterface(model, self.patches, self.interior, K, self.M, self.mass, solver, self.constraint, like)
-
-    def for_finer(self) -> CoarserBody:
-        """What was asked for, for a finer mesh."""
-        mesh = self.model.mesh
-        free = np.zeros(len(mesh.nodes), dtype=bool)
-        free[self.interior[::3] // 3] = True
-        if self._begun is not None:
-            meshes = self._begun.coarser.meshes
-        else:
-            assert isinstance(self.solver, SparseSolver)
-            meshes = NestedMeshes(mesh, free, self.solver)
-        inertial = self._inertial[0][1] if self._inertial else None
-        energy = np.diag(self.patch_stiffness()).copy()
-        return CoarserBody(mesh, free, meshes, self.constraint, energy, inertial, dict(self._normal))
 
     def lowest(self, count: int) -> Array:
         """Constraint modes and enough normal modes for `count` accurate modes of the body, shape [3n, 6p + k]."""
@@ -163,10 +137,9 @@ class FixedInterface:
         least = min(_MOST, len(self.interior))
         with self._lock:
             if bound not in self._normal:
-                found = None if self._begun is None else self._begun.modes(self.K, self.M, bound)
-                if found is None:
-                    found = lowest_modes(self.K, self.M, least, solver=self.solver, below=bound, most=_CANDIDATES)
-                self._normal[bound] = found
+                self._normal[bound] = lowest_modes(
+                    self.K, self.M, least, solver=self.solver, below=bound, most=_CANDIDATES
+                )
         values, vectors = self._normal[bound]
         count = max(least, int(np.count_nonzero(values <= below)) + 1)
         return values[:count], vectors[:, :count]
@@ -222,8 +195,7 @@ class FixedInterface:
         with self._lock:
             if not self._inertial:
                 loads = self._weight(ACCELERATIONS)[self.interior]
-                solve = self.solver.solve if self._begun is None else self._begun.inertial
-                self._inertial.append((loads, solve(loads)))
+                self._inertial.append((loads, self.solver.solve(loads)))
         return self._inertial[0]
 
     def _residual(self, values: Array, vectors: Array, weight: Array, least: float) -> Array:

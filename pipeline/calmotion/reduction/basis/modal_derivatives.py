@@ -24,7 +24,6 @@ from calmotion.model.character import ElasticMaterial
 from calmotion.reduction.basis.craig_bampton import Basis, mode_signs
 from calmotion.reduction.basis.fixed_interface import FixedInterface
 from calmotion.reduction.basis.natural_modes import vector_mass
-from calmotion.reduction.basis.nested_interface_modes import CoarserBody
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, second_order_force
 from calmotion.reduction.elements.patch_rotation import (
@@ -55,12 +54,11 @@ class Support:
         self._fixed[model] = fixed
         return self
 
-    def fixed(self, model: FEModel, coarser: CoarserBody | None = None) -> FixedInterface:
+    def fixed(self, model: FEModel) -> FixedInterface:
         """The body with all interfaces fixed, factorised once.
 
         Args:
             model: Of the body.
-            coarser: As of `FixedInterface.of`.
 
         Raises:
             NotPositiveDefinite: The root patch does not constrain all rigid motions of the body.
@@ -69,7 +67,7 @@ class Support:
             if model in self._fixed:
                 return self._fixed[model]
             with one_blas_thread():
-                self._fixed[model] = FixedInterface.of(model, self.root, self.patches, self.centers, coarser=coarser)
+                self._fixed[model] = FixedInterface.of(model, self.root, self.patches, self.centers)
         return self._fixed[model]
 
 

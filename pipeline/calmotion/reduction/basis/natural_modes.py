@@ -8,7 +8,7 @@ import numpy as np
 
 from calmotion.arrays import Array, Indices
 from calmotion.linear_algebra.block_lanczos import lowest_by_lanczos
-from calmotion.linear_algebra.sparse_solver import Solver, SparseSolver
+from calmotion.linear_algebra.sparse_solver import SparseSolver
 from calmotion.reduction.elements.assembly import FEModel
 
 __all__ = ["SparseSolver", "frequencies", "lowest_modes", "vector_mass"]
@@ -26,7 +26,7 @@ def vector_mass(mass: Any) -> Any:
 
 
 def lowest_modes(
-    K: Any, M: Any, count: int, *, shift: float = 0.0, solver: Solver | None = None, below: float | None = None,
+    K: Any, M: Any, count: int, *, shift: float = 0.0, solver: SparseSolver | None = None, below: float | None = None,
     most: int | None = None, points: Array | None = None,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Lowest eigenpairs of K x = omega^2 M x.

@@ -16,13 +16,11 @@ from calmotion.model.meshes import CutPatch, FEMesh, MissingVolume
 from calmotion.reduction.discretization_error import clamped_modes, element_errors, errors_and_form
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.full_order.mesh_extrapolation import Estimate
-from calmotion.reduction.full_order.nested_modes import NestedModes
 from calmotion.reduction.full_order.shape_change import shape_forms
 from calmotion.reduction.material_laws.choice import amplitudes
 from calmotion.reduction.reduce import LinearModes
 
 _MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
-ALGEBRAIC = 3e-5  # relative error of the squares of frequencies whose mesh is wrong by a hundred times that and more
 
 
 def load_estimate(linear: LinearModes, body: Body, missing: MissingVolume | None = None) -> Estimate:
@@ -63,15 +61,12 @@ def load_estimate(linear: LinearModes, body: Body, missing: MissingVolume | None
 
 
 def frequency_estimate(
-    mesh: FEMesh, body: Body, carrier: Frame | None, coarser: NestedModes | None = None, algebraic: float = ALGEBRAIC,
-    attachments: Sequence[AttachmentFrame] = (),
-) -> Estimate:  # fmt: skip
+    mesh: FEMesh, body: Body, carrier: Frame | None, attachments: Sequence[AttachmentFrame] = ()
+) -> Estimate:
     """Error of the first modes, of which each counts by its compliance relative to that of the first.
 
     Args:
         mesh, body, carrier, attachments: As of `refined_for_frequencies`.
-        coarser: Modes of the meshes that it is bisected from.
-        algebraic: Relative error of the squares of frequencies that may be left with these.
 
     Raises:
         ShotError: Nothing of the mesh is free.
@@ -79,10 +74,7 @@ def frequency_estimate(
     assert body.flexible is not None
     model = assemble(mesh.points, mesh.tets, body.flexible.material)
     clamped = _clamped_nodes(model.mesh, body, carrier, mesh.patches, attachments)
-    if coarser is None or clamped is None or not len(clamped):
-        frequencies, modes = clamped_modes(model, _COUNT, clamped)
-    else:
-        frequencies, modes = coarser.lowest(model, _COUNT, clamped, algebraic)
+    frequencies, modes = clamped_modes(model, _COUNT, clamped)
     if not len(frequencies):
         raise ShotError(
             "its parent joint holds all of the mesh, so that nothing of it can bend", path=body.path,

@@ -38,9 +38,6 @@ _IN_TIME, _OF_TRIANGLE = 100_000, 16.5
 # of 160 links need it, most of all arms of many thin webs, whose frequencies are 8 to 30% too high with 30,000 nodes
 _BAD, _BAD_REFINED = 0.019, 250_000
 _KEPT = 22_000  # nodes of the mesh that takes the stiffness of these, where one factor is enough
-# Relative error of the squares of frequencies that a solver may leave on surfaces of more triangles than these: of the
-# G1's wrist 40% fewer steps, with frequencies that differ by 0.07% where 1.6% are estimated
-_ALGEBRAIC, _DETAILED = 3e-4, 2_000
 _LONGER = 1.5  # factor of the element size where a surface has many details: they are refined where it matters
 _FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
 # Error of the frequencies by what a mesh leaves out of its surface, from which another one follows it within half the
@@ -108,8 +105,7 @@ def effort_after(triangles: int) -> Effort:
 
     least, most = _POOR_REFINED
     poor = int(min(max(_IN_TIME - _OF_TRIANGLE * triangles, least), most))
-    effort = Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, poor, _KEPT, bad=2.0 * _BAD, bad_nodes=_BAD_REFINED)
-    return replace(effort, algebraic=_ALGEBRAIC) if triangles > _DETAILED else effort
+    return Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, poor, _KEPT, bad=2.0 * _BAD, bad_nodes=_BAD_REFINED)
 
 
 def frames_of(character: Character, index: int) -> tuple[Frame, ...]:
