@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
+from calmotion.errors import ShotError
 from calmotion.host import Host, SettingError
 from calmotion.model import Character, Provenance
 from calmotion.model.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
@@ -144,3 +145,17 @@ def requested_files(host: Host, outputs: OutputPaths) -> list[type]:
             )
         kinds.append(kind)
     return kinds
+
+
+def refuse_unwritable(file: str) -> None:
+    """Refuse a file that cannot be written.
+
+    Raises:
+        ShotError: It cannot.
+    """
+    try:
+        try_writing(file)
+    except OSError as error:
+        raise ShotError(
+            "the file cannot be written", path=file, found=error.strerror, remedy="Choose another file."
+        ) from error

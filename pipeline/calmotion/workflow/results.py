@@ -15,8 +15,7 @@ from calmotion.model import Character, Result, Simulation
 from calmotion.model.outputs import CsvFile, Figures, Recording, Verification, Video, WrittenLayer
 from calmotion.model.run import OutputPaths
 from calmotion.model.table import columns, read_only
-from calmotion.workflow.exporting.result_files import no_input
-from calmotion.workflow.run import Outcome, again
+from calmotion.workflow.run import Outcome, again, no_input
 
 if TYPE_CHECKING:
     from calmotion.workflow.problems import Problem

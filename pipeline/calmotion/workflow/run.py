@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,7 +14,14 @@ from calmotion.model import Character, Provenance
 from calmotion.model.run import INTEGRATORS, SHAPERS, OutputPaths, Source
 from calmotion.support import interrupts
 from calmotion.support.foreign_files import remedy_for
-from calmotion.workflow.outputs import files_of, prepare_outputs, refuse_layers, refuse_other_types, requested_files
+from calmotion.workflow.outputs import (
+    files_of,
+    prepare_outputs,
+    refuse_layers,
+    refuse_other_types,
+    refuse_overwriting,
+    requested_files,
+)
 from calmotion.workflow.problems import Cancelled, Problem, problems_of, value_of
 from calmotion.workflow.shot import Shot
 
@@ -276,3 +284,15 @@ def _found_again(value: object, shot: Shot) -> object:
     if isinstance(value, Source):
         return replace(value, path=shot.path, motion=shot.motion)
     return replace(value, shot=shot.path) if isinstance(value, Provenance) else value
+
+
+def no_input(outcome: Outcome, path: str | os.PathLike[str]) -> str:
+    """The path of a file, unless the run of a result read it.
+
+    Raises:
+        SettingError: It did.
+    """
+    files = {"path": os.fspath(path)}
+    refuse_overwriting(outcome.shot.inputs, files)
+    refuse_layers(outcome.shot.path, outcome.require(Provenance), outcome.require(Character), files)
+    return files["path"]

@@ -184,3 +184,15 @@ def read_settings(given: Given) -> Settings:
         ((operator, properties),) = read_assignment(f"{name}=").items()
         tables.append({operator: dict.fromkeys(properties, value)})
     return merge(tables)
+
+
+def with_shot(path: str) -> str:
+    """A USD file with the shot in it: of a layer of results, the root layer beside it."""
+    from calmotion.usd import stages
+    from calmotion.usd.writing.root import root_path
+
+    if os.path.isfile(path) and stages.role_of(stages.open_layer(path)) in stages.RESULTS:
+        root = root_path(path)
+        if os.path.isfile(root):
+            return root
+    return path

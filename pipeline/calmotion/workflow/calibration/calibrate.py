@@ -158,7 +158,7 @@ def compiled_with_sensors(
     """A run that compiles the shot, after everything was refused that does not fit."""
     source = Source("", "", options, measured=measured_prims(recordings))
     if layer is not None:
-        from calmotion.workflow.exporting.controller_files import refuse_unwritable
+        from calmotion.workflow.outputs import refuse_unwritable
 
         refuse_unwritable(layer)
     first = carry_out(
@@ -183,7 +183,7 @@ def compiled_with_sensors(
 def with_sensors(shot: Shot | Path) -> Shot:
     """The shot, to be read again: the prims of sensors are targets of this reading alone."""
     if not isinstance(shot, Shot):
-        from calmotion.workflow.exporting.export import with_shot
+        from calmotion.workflow.shot import with_shot
 
         return Shot(with_shot(os.fspath(shot)))
     return shot.unread()

@@ -154,7 +154,7 @@ def refine(
 def _refuse(shot: str, layer: str) -> None:
     """Refuse what the last step would refuse, before the first one writes the model."""
     from calmotion.usd.writing.root import refuse_layers_of
-    from calmotion.workflow.exporting.controller_files import refuse_unwritable
+    from calmotion.workflow.outputs import refuse_unwritable
 
     refuse_unwritable(layer)
     refuse_layers_of(shot, layer)

@@ -11,9 +11,9 @@ from calmotion.errors import ShotError
 from calmotion.host import Host, SettingError, Settings, nearest
 from calmotion.model import Animation, Character, Provenance, Result
 from calmotion.model.curves import commanded_curves
-from calmotion.support.files import try_writing
 from calmotion.support.naming import distinct_names
 from calmotion.workflow.exporting.command_format import CommandFormat
+from calmotion.workflow.outputs import refuse_unwritable
 from calmotion.workflow.run import Outcome, again
 
 
@@ -82,19 +82,3 @@ def write_commands(
     """
     refuse_unwritable(request.file)
     return again(outcome, WrittenCommands, curves, request, settings=settings)
-
-
-def refuse_unwritable(file: str) -> None:
-    """Refuse a file that cannot be written.
-
-    Raises:
-        ShotError: It cannot.
-    """
-    try:
-        try_writing(file)
-    except OSError as error:
-        raise _unwritable(file, error) from error
-
-
-def _unwritable(file: str, error: OSError) -> ShotError:
-    return ShotError("the commands cannot be written", path=file, found=error.strerror, remedy="Choose another file.")

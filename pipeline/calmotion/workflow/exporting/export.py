@@ -30,7 +30,7 @@ from calmotion.workflow.exporting.given import GivenExport, given_export, refuse
 from calmotion.workflow.outputs import refuse_layers, refuse_overwriting
 from calmotion.workflow.results import SimulationResult
 from calmotion.workflow.run import Hooks, Outcome, Progress, carry_out
-from calmotion.workflow.shot import Given, Path, Shot, read_settings
+from calmotion.workflow.shot import Given, Path, Shot, read_settings, with_shot
 
 HIGHEST = 1000  # rate that is tried [Hz]; a higher one where a higher one is given
 CONVERGED = 0.05  # change of the loss with half the step, over the larger of it and a tenth of the tolerance
@@ -194,18 +194,6 @@ def export(
     compiled = outcome if result is not None else _compiled(opened, given, chosen, hooks)
     made = exporter.measured(written, compiled, search)
     return replace(made, total_wall_s=time.perf_counter() - begin)
-
-
-def with_shot(path: str) -> str:
-    """A USD file with the shot in it: of a layer of results, the root layer beside it."""
-    from calmotion.usd import stages
-    from calmotion.usd.writing.root import root_path
-
-    if os.path.isfile(path) and stages.role_of(stages.open_layer(path)) in stages.RESULTS:
-        root = root_path(path)
-        if os.path.isfile(root):
-            return root
-    return path
 
 
 class _Exporter:

@@ -68,8 +68,8 @@ def write_manifest(result: SimulationResult, path: str | os.PathLike[str]) -> st
         SettingError: The file is read as the shot, or is another output of the result.
         ShotError: It cannot be written.
     """
-    from calmotion.workflow.exporting.result_files import no_input
     from calmotion.workflow.outputs import refuse_overwriting
+    from calmotion.workflow.run import no_input
 
     no_input(result.outcome, path)
     refuse_overwriting({}, {role: file for file, role in _outputs(result)} | {"manifest": os.fspath(path)})

@@ -101,7 +101,7 @@ def parameter_arguments(args: argparse.Namespace) -> dict[str, Any]:
 
 def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.workflow.calibration.calibrate import calibrate
-    from calmotion.workflow.exporting.export import with_shot
+    from calmotion.workflow.shot import with_shot
 
     args.shot = with_shot(args.shot)
     shot = opened_shot(args)

@@ -75,7 +75,8 @@ def _rate(text: str) -> float:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.workflow.exporting.export import export, with_shot
+    from calmotion.workflow.exporting.export import export
+    from calmotion.workflow.shot import with_shot
 
     args.shot = with_shot(args.shot)
     shot = opened_shot(args)

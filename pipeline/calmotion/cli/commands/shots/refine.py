@@ -54,7 +54,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.workflow.calibration.refine import refine
-    from calmotion.workflow.exporting.export import with_shot
+    from calmotion.workflow.shot import with_shot
 
     args.shot = with_shot(args.shot)
     shot = opened_shot(args)

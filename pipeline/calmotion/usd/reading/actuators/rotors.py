@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calmotion.control.motor_types import MotorType
 from calmotion.errors import ShotError
 from calmotion.model.motor import PRESCRIBED, SERVO, Rotor
+from calmotion.rigging.motor_types import MotorType
 from calmotion.usd.dialects import ARMATURE, FRICTION, VISCOUS_FRICTION, Spelling, authored
 from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
 from calmotion.usd.reading.joints import JointPrim

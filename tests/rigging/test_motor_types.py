@@ -6,7 +6,7 @@ import math
 
 import pytest
 from calmotion import ShotError
-from calmotion.control.motor_types import (
+from calmotion.rigging.motor_types import (
     GROUPS,
     QUANTITIES,
     likely_motor_types,
