@@ -55,7 +55,7 @@ class ImportedRobot:
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints."""
-        from calmotion.workflow.plain import plain
+        from calmotion.workflow.json_values import plain
 
         character, frames = self.character, self.animation.frame_times
         report: dict[str, Any] = plain(

@@ -17,7 +17,7 @@ from calmotion.cli.tables import console_on, filled
 from calmotion.errors import ShotError, each, failure_of_machine
 from calmotion.host import Host
 from calmotion.support.memory import was_short
-from calmotion.workflow.plain import plain
+from calmotion.workflow.json_values import plain
 from calmotion.workflow.problems import Problem, RunError
 
 if TYPE_CHECKING:

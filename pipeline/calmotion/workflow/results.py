@@ -171,7 +171,7 @@ class SimulationResult:
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints: plain values, keys as in the USD contract."""
-        from calmotion.workflow.plain import plain
+        from calmotion.workflow.json_values import plain
         from calmotion.workflow.report import run_report
 
         report: dict[str, Any] = plain(

@@ -23,7 +23,7 @@ from calmotion.workflow.batch.attempt import attempt, attempts, stored_report
 from calmotion.workflow.batch.jobs import EXTRAS, LOGS, Job, forget, is_done, jobs_for
 from calmotion.workflow.batch.report import DIED, KEPT, WAITING, BatchResult, JobResult
 from calmotion.workflow.batch.workers import LOCAL, executor_on, finished, refuse_unknown_place, result_of
-from calmotion.workflow.plain import plain
+from calmotion.workflow.json_values import plain
 from calmotion.workflow.run import Progress
 
 MOST_ATTEMPTS = 3

@@ -46,7 +46,7 @@ class ExcitedShot:
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints."""
         from calmotion.version import __version__
-        from calmotion.workflow.plain import plain
+        from calmotion.workflow.json_values import plain
 
         found = self.excitation
         report: dict[str, Any] = plain(

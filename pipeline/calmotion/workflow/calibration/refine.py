@@ -55,7 +55,7 @@ class RefinedShot:
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints."""
-        from calmotion.workflow.plain import plain
+        from calmotion.workflow.json_values import plain
 
         found, played = self.optimized.report(), self.played.report()
         errors = {row["path"]: row["max_error_m"] for row in played["targets"]}

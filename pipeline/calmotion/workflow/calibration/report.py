@@ -14,7 +14,7 @@ def calibration_report(
     calibration: Calibration, layer: WrittenLayer | None, figures: tuple[str, ...], total_wall_s: float
 ) -> dict[str, Any]:
     """The object that `calibrate --json` prints: plain values, keys as in the USD contract."""
-    from calmotion.workflow.plain import plain
+    from calmotion.workflow.json_values import plain
 
     report: dict[str, Any] = plain(
         {

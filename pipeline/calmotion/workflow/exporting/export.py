@@ -94,7 +94,7 @@ class Export:
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints."""
-        from calmotion.workflow.plain import plain
+        from calmotion.workflow.json_values import plain
 
         rows = [
             {

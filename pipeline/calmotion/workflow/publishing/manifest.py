@@ -38,7 +38,7 @@ def manifest_of(result: SimulationResult, folder: str | os.PathLike[str]) -> dic
     """
     from calmotion.model import Provenance
     from calmotion.model.run import Source
-    from calmotion.workflow.plain import plain
+    from calmotion.workflow.json_values import plain
 
     outcome = result.outcome
     source, provenance = outcome.require(Source), outcome.require(Provenance)

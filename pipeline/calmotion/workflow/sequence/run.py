@@ -18,7 +18,7 @@ from calmotion.workflow.batch.jobs import Job, jobs_for
 from calmotion.workflow.batch.report import BatchResult, JobResult
 from calmotion.workflow.batch.run import run_jobs
 from calmotion.workflow.batch.workers import LOCAL
-from calmotion.workflow.plain import plain
+from calmotion.workflow.json_values import plain
 from calmotion.workflow.run import Progress
 from calmotion.workflow.sequence.clips import Clip, Plan, pace_of, read_clips, read_plan, transition
 
