@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-pytest_plugins = ["arm_fixtures", "finite_element_fixtures", "flexible_tree_fixture", "recorded"]
+pytest_plugins = ["arm_fixtures", "finite_element_fixtures", "flexible_tree_fixture"]
 REPOSITORY = Path(__file__).resolve().parents[1]
 
 MANIFEST = {

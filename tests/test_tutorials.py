@@ -107,6 +107,7 @@ def test_a_skinned_character(tmp_path):
 
 @pytest.mark.long
 def test_a_calibration(tmp_path):
+    pytest.importorskip("calmotion_plugins.calibration")
     printed = follow("calibration", tmp_path)
     assert errors_of(printed)
     from pxr import Usd

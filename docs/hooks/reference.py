@@ -134,7 +134,7 @@ def plugin_interface(plugin: str) -> list[str]:
     for name in getattr(module, "__all__", ()):
         thing = getattr(module, name)
         operator = inspect.isclass(thing) and issubclass(thing, Operator)
-        if name not in ("register", "unregister") and not operator:
+        if callable(thing) and name not in ("register", "unregister") and not operator:
             lines += entry(name, thing, 3)
     return [f"## calmotion_plugins.{plugin}", "", *lines] if lines else []
 

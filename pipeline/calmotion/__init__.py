@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from calmotion.model.run import OutputPaths
     from calmotion.workflow.batch.report import BatchResult, JobResult
     from calmotion.workflow.batch.run import batch
-    from calmotion.workflow.calibration.calibrate import CalibratedShot, calibrate
-    from calmotion.workflow.calibration.excite import ExcitedShot, excite
-    from calmotion.workflow.calibration.refine import RefinedShot, refine
     from calmotion.workflow.commands import inspect, optimize, rig, simulate, verify
     from calmotion.workflow.exporting.export import Export, export
     from calmotion.workflow.inspection import Inspection
@@ -35,10 +32,8 @@ if TYPE_CHECKING:
     from calmotion.workflow.shot import Shot, open_shot
 
 __all__ = [
-    "CalibratedShot",
     "BatchResult",
     "Cancelled",
-    "ExcitedShot",
     "Export",
     "Inspection",
     "JobResult",
@@ -47,7 +42,6 @@ __all__ = [
     "OutputPaths",
     "Progress",
     "Repertoire",
-    "RefinedShot",
     "RobotMotion",
     "RunError",
     "SettingError",
@@ -57,15 +51,12 @@ __all__ = [
     "TargetMotion",
     "Warmup",
     "__version__",
-    "calibrate",
-    "excite",
     "batch",
     "export",
     "inspect",
     "open_shot",
     "optimize",
     "publishing_problems",
-    "refine",
     "rig",
     "sequence",
     "simulate",
@@ -77,9 +68,6 @@ __all__ = [
 _HOMES = {
     "host.errors": ("SettingError",),
     "model.run": ("OutputPaths",),
-    "workflow.calibration.calibrate": ("CalibratedShot", "calibrate"),
-    "workflow.calibration.excite": ("ExcitedShot", "excite"),
-    "workflow.calibration.refine": ("RefinedShot", "refine"),
     "workflow.batch.report": ("BatchResult", "JobResult"),
     "workflow.batch.run": ("batch",),
     "workflow.commands": ("inspect", "optimize", "rig", "simulate", "verify"),

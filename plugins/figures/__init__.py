@@ -7,8 +7,7 @@ from typing import Any
 
 from calmotion.host import Operator, Property, RunContext, registration
 from calmotion.model import Animation, Character, Result
-from calmotion.model.calibration.estimates import Calibration
-from calmotion.model.outputs import CalibrationFigures, Figures, SystemModes
+from calmotion.model.outputs import Figures, SystemModes
 from calmotion.model.run import OutputPaths
 
 
@@ -46,22 +45,4 @@ class PlotFigures(Operator):
         return (Figures(tuple(written)),)
 
 
-class PlotCalibration(Operator):
-    """Measured against simulated signals, spectra of the residuals, and intervals of the parameters."""
-
-    idname = "figures.calibration"
-    label = "Draw the figures of the calibration"
-    requires = (Calibration, OutputPaths)
-    provides = (CalibrationFigures,)
-    properties = (
-        Property("dpi", int, 150, minimum=30, maximum=600, description="Resolution of the figures, dots per inch."),
-    )
-
-    def execute(self, context: RunContext) -> Sequence[object]:
-        from .calibration import draw_calibration
-
-        folder = context.get(OutputPaths).figures or ""
-        return (CalibrationFigures(tuple(draw_calibration(folder, context.get(Calibration), context.properties.dpi))),)
-
-
-register, unregister = registration(PlotFigures, PlotCalibration)
+register, unregister = registration(PlotFigures)

@@ -8,11 +8,10 @@ import numpy as np
 from calmotion.model import Character, Result, Simulation
 from calmotion.model.motor import measure_of
 from calmotion.views.playback import sample_motion
+from calmotion.views.style import AFTER, BEFORE, INTENDED, LIMIT, SMALL, TEXT, new_figure, tidy, titles
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
-
-from .style import AFTER, BEFORE, INTENDED, LIMIT, SMALL, TEXT, new_figure, tidy, titles
 
 MOST_TARGETS = 8
 WIDTH = 9.0

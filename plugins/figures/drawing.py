@@ -8,12 +8,12 @@ from pathlib import Path
 from calmotion.errors import ShotError
 from calmotion.model import Animation, Character, Result
 from calmotion.model.outputs import SystemModes
+from calmotion.views.style import save
 
 from .curves import plot_convergence, plot_errors, plot_motors
 from .filmstrip import draw_filmstrip
 from .robustness import plot_robustness
 from .spectra import plot_spectra
-from .style import save
 
 MOTORS_ON_A_PAGE = 8
 Progress = Callable[[float, str], None]

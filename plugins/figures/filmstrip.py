@@ -10,12 +10,12 @@ from calmotion.model import Animation, Character, Motion, Result, Simulation
 from calmotion.support.naming import distinct_names
 from calmotion.views.playback import sample_motion
 from calmotion.views.rendering import Camera, View, draw_over_ghost, fit_camera, floor_below, pose, prepare
+from calmotion.views.style import AFTER, BEFORE, INTENDED, NORMAL, SMALL, TEXT, new_figure
 from calmotion.views.viewpoint import choose_viewpoint, near_scenery
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .magnifier import choose_magnifier, draw_magnifier
-from .style import AFTER, BEFORE, INTENDED, NORMAL, SMALL, TEXT, new_figure
 
 PANEL = 340  # pixels across a panel, before it is drawn into the figure
 SMOOTH = 2  # factor of the rendering, which is then averaged

@@ -10,10 +10,9 @@ from calmotion.arrays import Array, Indices
 from calmotion.model import Motion
 from calmotion.views.raster import rasterize
 from calmotion.views.rendering import Camera, Mask, View, draw_over_ghost, pose
+from calmotion.views.style import INTENDED
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
-
-from .style import INTENDED
 
 LARGEST = 4.0  # largest factor
 SMALLEST = 1.5  # smallest useful factor

@@ -6,10 +6,10 @@ import numpy as np
 from calmotion.model import Character, Result
 from calmotion.model.outputs import SystemModes
 from calmotion.views.spectrum import error_spectrum, highest_frequency
+from calmotion.views.style import LIMIT, SMALL, new_figure, tidy, titles
 from matplotlib.figure import Figure
 
 from .curves import WIDTH, runs_of, worst_targets
-from .style import LIMIT, SMALL, new_figure, tidy, titles
 
 DECADES = 5.0  # of the vertical axis
 NEAR = 0.05  # of the width: distance below which labels are joined

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from calmotion.host import Property, PropertyValues, registration
-from calmotion.model.calibration.recording import RecordingRequest, SensorRecording
-from calmotion.workflow.calibration.recording_reader import RecordingReader, first_line
+from calmotion.recordings import RecordingReader, RecordingRequest, SensorRecording, first_line
 
 PRINTER_HEAD = "#time,accel_x,accel_y,accel_z"
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.model.calibration.recording import (
+from calmotion.recordings import (
     ACCELEROMETER,
     ANGLE,
     EFFORT,
@@ -18,10 +18,10 @@ from calmotion.model.calibration.recording import (
     Channel,
     RecordingRequest,
     SensorRecording,
+    hash_of,
 )
 from calmotion.support.naming import nearest
 from calmotion.support.reading import read_toml
-from calmotion.workflow.calibration.recording_reader import hash_of
 
 JOINTS, IMU, POSE = "sensor_msgs/JointState", "sensor_msgs/Imu", "geometry_msgs/PoseStamped"
 EXAMPLE = (

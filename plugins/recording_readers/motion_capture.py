@@ -6,10 +6,9 @@ import os
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.model.calibration.recording import MARKER, Channel, RecordingRequest, SensorRecording
+from calmotion.recordings import MARKER, Channel, RecordingRequest, SensorRecording, hash_of
 from calmotion.support.naming import nearest
 from calmotion.support.reading import read_toml
-from calmotion.workflow.calibration.recording_reader import hash_of
 
 from .columns import UNITS
 

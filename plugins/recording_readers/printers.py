@@ -6,9 +6,8 @@ import os
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.model.calibration.recording import ACCELEROMETER, Channel, RecordingRequest, SensorRecording
+from calmotion.recordings import ACCELEROMETER, Channel, RecordingRequest, SensorRecording, hash_of
 from calmotion.support.reading import read_toml
-from calmotion.workflow.calibration.recording_reader import hash_of
 
 from .columns import UNITS, column_of, increasing, read_columns
 

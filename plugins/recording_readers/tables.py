@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError, raise_all
-from calmotion.model.calibration.recording import (
+from calmotion.recordings import (
     ACCELEROMETER,
     ANGLE,
     COMPONENTS,
@@ -18,10 +18,10 @@ from calmotion.model.calibration.recording import (
     Channel,
     RecordingRequest,
     SensorRecording,
+    hash_of,
 )
 from calmotion.support.naming import nearest
 from calmotion.support.reading import read_toml
-from calmotion.workflow.calibration.recording_reader import hash_of
 
 from .columns import UNITS, column_of, increasing, read_columns, unit_of
 

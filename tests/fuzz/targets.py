@@ -173,7 +173,7 @@ def recordings(data: bytes) -> None:
     import warnings
 
     from calmotion.errors import ShotError
-    from calmotion.model.calibration.recording import RecordingRequest
+    from calmotion.recordings import RecordingRequest
 
     kind, (content, _, table) = data[0] % 3 if data else 0, data[1:].partition(b"\n====\n")
     path = _file(f"take{('.csv', '.csv', '.mcap')[kind]}", content)

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from calmotion.cli.commands.table import Absent, all_commands
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
@@ -16,6 +17,11 @@ import hostile  # noqa: E402
 # Cases of which each takes a fraction of a second: most are refused while the shot is read or the options are.
 CHEAP = [name for name, case in every.CASES.items() if 0 not in case.statuses and case.seconds <= 60.0]
 SAMPLE = random.Random(32).sample(sorted(set(CHEAP) - set(every.GROUPS["broken"])), 30)
+
+
+def can_run(name: str) -> bool:
+    """Whether the command is there: those of a plugin are not where its folder was deleted."""
+    return not isinstance(all_commands().get(every.CASES[name].command[0]), Absent)
 
 
 def fault_of(case: hostile.Case, **changed: object) -> list[str]:
@@ -48,6 +54,8 @@ def test_the_judge_sees_what_must_not_be():
 
 @pytest.mark.parametrize("name", SAMPLE)
 def test_a_hostile_command_ends_as_it_should(tmp_path, name):
+    if not can_run(name):
+        pytest.skip("the plugin of the command is not here")
     ending, faults = hostile.run(every.CASES[name], tmp_path)
     assert not faults, f"{faults}\n{ending.out}\n{ending.err}"
 
@@ -56,5 +64,5 @@ def test_a_hostile_command_ends_as_it_should(tmp_path, name):
 def test_all_hostile_commands_end_as_they_should():
     import campaign
 
-    _, faults = campaign.campaign(list(every.CASES))
+    _, faults = campaign.campaign(list(filter(can_run, every.CASES)))
     assert not faults, faults

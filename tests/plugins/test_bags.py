@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from calmotion.recordings import read_recordings
 from calmotion.testing import host_with
-from calmotion.workflow.calibration.recordings import read_recordings
 from calmotion.workflow.problems import RunError
 
 START = 1_700_000_000

@@ -15,6 +15,7 @@ from calmotion.testing import check_plugin
         "animation_formats",
         "body_reduction",
         "bvh_reader",
+        "calibration",
         "controller_formats",
         "fe_mesher",
         "figures",

@@ -12,7 +12,6 @@ import pytest
 import synthetic
 from calmotion.errors import ShotError
 from calmotion.host import PluginError
-from calmotion.model.calibration.estimates import Calibration, ChannelCurves, Estimate
 from calmotion.model.outputs import SystemModes
 from calmotion.model.result import OptimizerStep
 from calmotion.model.robust.robots import Compromise, Robustness
@@ -20,6 +19,7 @@ from calmotion.model.run import OutputPaths
 from calmotion.testing import check_plugin, host_with, run_operator
 from calmotion.views.rendering import fit_camera
 from calmotion.views.spectrum import error_spectrum
+from calmotion.views.style import titles as titles_of
 from calmotion.views.viewpoint import choose_viewpoint
 
 PLUGIN = Path(__file__).resolve().parents[2] / "plugins" / "figures"
@@ -238,33 +238,6 @@ def test_spectra_name_the_pose_of_the_modes(figures):
     assert "modes in the pose at 0.25 s (largest error)" in lines_of(axes)
 
 
-def test_a_calibration_is_drawn_with_what_was_measured_and_the_intervals(tmp_path):
-    times = np.linspace(0.0, 1.0, 50)
-    curve = ChannelCurves(
-        "a.csv", "marker /Arm/Hand", "m", times, np.ones((50, 3)), np.zeros((50, 3)), np.ones((50, 3)), times > 0.8
-    )
-    items = tuple(
-        Estimate("modulus", f"/Arm/{name}", -1, "Pa", 2e9, 6e8, 2.3e9, 1e7, True, told)
-        for name, told in (("A", True), ("B", False))
-    )
-    made = Calibration(items, np.eye(2), {"a.csv": "0"}, (), (curve,) * 5, True, 1, 1, 1e-3, 0.1, 1.0)
-    values = [made, OutputPaths(figures=str(tmp_path))]
-    host = host_with(PLUGIN)
-    drawn = run_operator(host, "figures.calibration", values)[0].paths
-    names = ["measured_1.png", "measured_2.png", "residual_spectra.png", "intervals.png"]
-    assert [Path(path).name for path in drawn] == names and all(Path(path).stat().st_size > 5000 for path in drawn)
-    package = sys.modules[host.operators["figures.calibration"].__module__]
-    __import__(f"{package.__name__}.calibration")
-    module = package.calibration
-    axes = module.plot_signals((curve,)).axes
-    assert len(axes) == 3 and axes[0].get_title(loc="left") == "marker Hand x"
-    assert module._ranges(curve) == [(pytest.approx(times[times > 0.8][0]), 1.0)]
-    ticks = [text.get_text() for text in module.plot_intervals(made).axes[0].get_yticklabels()]
-    assert ticks == ["modulus A", "modulus B"]
-    frequencies, amplitudes = module._spectrum(times, 0.3 * np.sin(20.0 * np.pi * times)[:, None])
-    assert frequencies[np.argmax(amplitudes)] == pytest.approx(10.0, abs=1.1)
-
-
 def long_paths(character):
     """The character with a second target; both have long paths, and the same name."""
     target = character.targets[0]
@@ -274,10 +247,10 @@ def long_paths(character):
 
 
 def test_titles_are_whole_paths_where_they_fit_and_ends_that_differ_where_not(figures):
-    assert figures.style.titles(["/Arm/Hand", "/Arm/Elbow"]) == {"/Arm/Hand": "/Arm/Hand", "/Arm/Elbow": "/Arm/Elbow"}
+    assert titles_of(["/Arm/Hand", "/Arm/Elbow"]) == {"/Arm/Hand": "/Arm/Hand", "/Arm/Elbow": "/Arm/Elbow"}
     paths = [target.path for target in long_paths(synthetic.character()).targets]
-    assert list(figures.style.titles(paths).values()) == ["left_wrist/Hand", "right_wrist/Hand"]
-    assert figures.style.titles([]) == {}
+    assert list(titles_of(paths).values()) == ["left_wrist/Hand", "right_wrist/Hand"]
+    assert titles_of([]) == {}
 
 
 def test_titles_of_the_filmstrip_that_would_meet_take_two_lines(figures):

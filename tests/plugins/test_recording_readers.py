@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
-from calmotion.model.calibration.recording import RecordingRequest, SensorRecording
+from calmotion.recordings import RecordingRequest, SensorRecording, measured_prims, read_recordings, requested
 from calmotion.testing import host_with
-from calmotion.workflow.calibration.recordings import measured_prims, read_recordings, requested
 
 HEAD = "time_s,/Arm/Hand.x,/Arm/Hand.y,/Arm/Hand.z,/Arm/Hand.ax,/Arm/Hand.ay,/Arm/Hand.az,/Arm/Elbow.angle"
 LOG = "#time,accel_x,accel_y,accel_z\n10.00,100,200,9810\n10.01,110,,9800\n10.02,120,220,9790\n"

@@ -77,13 +77,6 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class CalibrationFigures:
-    """Paths of the figures of a calibration."""
-
-    paths: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class Video:
     """Path of a video."""
 

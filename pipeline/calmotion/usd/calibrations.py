@@ -6,17 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calmotion.model.calibration.known_factors import KnownFactors
+from calmotion.model.robust.known_factors import KnownFactors
 from calmotion.usd import stages
 
 if TYPE_CHECKING:
     from pxr import Usd
-
-
-def count(shot: str) -> int:
-    """Number of calibrations that a shot carries."""
-    stage = stages.open_stage(shot)  # its layers live as long as it does
-    return sum(stages.role_of(layer) == stages.CALIBRATION for layer in stage.GetLayerStack())
 
 
 def known_factors(stage: Usd.Stage) -> KnownFactors:

@@ -11,9 +11,9 @@ FLOORS = (
     ("simulation",),
     ("tolerance",),
     ("retargeting",),
-    ("identification",),
     ("host",),
     ("workflow", "testing"),
+    ("recordings",),
     ("cli", "pytest_plugin"),
     ("benchmarks", "__main__"),
 )

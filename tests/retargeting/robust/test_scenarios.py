@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.model.calibration.known_factors import KnownFactors
 from calmotion.model.motor import DRIVE
+from calmotion.model.robust.known_factors import KnownFactors
 from calmotion.model.robust.robots import Scenario
 from calmotion.model.robust.settings import Uncertainty
 from calmotion.reduction.damping import damped

@@ -19,13 +19,12 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
+from calmotion_plugins.calibration import HIGHER_MODES, CalibrationSettings, calibrate_shot
 
 from calmotion import ShotError
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import finish, resumed_rows, say, write_rows
 from calmotion.benchmarks.scenes.recorded_arm import recorded_arm
-from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
-from calmotion.model.calibration.estimates import HIGHER_MODES
 from calmotion.model.run import RunSettings
 
 WITHIN = 1.96  # standard deviations of a 95% interval

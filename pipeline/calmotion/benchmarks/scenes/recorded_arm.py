@@ -6,19 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from calmotion_plugins.calibration import HIGHER_MODES, Robot, Signals, robot_parameters, robot_with, signals_of
 
 from calmotion.arrays import Array
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
-from calmotion.identification.parameters import robot_parameters
-from calmotion.identification.robots import Robot, robot_with
-from calmotion.identification.signals import Signals, signals_of
 from calmotion.model import Body, Character, FEMeshes
-from calmotion.model.calibration.estimates import HIGHER_MODES
-from calmotion.model.calibration.recording import ACCELEROMETER, ANGLE, MARKER, Channel, SensorRecording
 from calmotion.model.motor import DRIVE
 from calmotion.model.run import RunSettings
 from calmotion.multibody import SimulationFailure
 from calmotion.multibody.model.topology import span_tree
+from calmotion.recordings import ACCELEROMETER, ANGLE, MARKER, Channel, SensorRecording
 from calmotion.reduction.discretization_error import frequency_errors
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.simulation.bodies import reduce_bodies

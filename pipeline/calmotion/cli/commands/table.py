@@ -40,9 +40,6 @@ BUILT_IN = {
     "simulate": BuiltIn("shots.simulate", "simulate the shot as animated"),
     "watch": BuiltIn("shots.watch", "simulate or optimise a shot again whenever it is saved"),
     "optimize": BuiltIn("shots.optimize", "change the motor curves so that the robot does not shake"),
-    "calibrate": BuiltIn("shots.calibrate", "estimate parameters of the robot from recordings"),
-    "excite": BuiltIn("shots.excite", "design a test motion whose recording suits calibrate"),
-    "refine": BuiltIn("shots.refine", "improve model and curves from a recording of the current curves"),
     "batch": BuiltIn("shows.batch", "optimise or simulate many shots, also on a cluster"),
     "sequence": BuiltIn("shows.sequence", "retarget clips and all transitions between them"),
     "submit": BuiltIn("shows.submit", "write a job template for a render farm (OpenJD)"),
@@ -57,7 +54,12 @@ BUILT_IN = {
     "doctor": BuiltIn("setup.doctor", "check the installation and the machine, and say what to do"),
 }
 # The bundled plugins that bring commands: whoever deletes one is told where its command went.
-BROUGHT_BY: dict[str, str] = {"import": "robot_import"}
+BROUGHT_BY: dict[str, str] = {
+    "import": "robot_import",
+    "calibrate": "calibration",
+    "excite": "calibration",
+    "refine": "calibration",
+}
 
 
 @dataclass(frozen=True)

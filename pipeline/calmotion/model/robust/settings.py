@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from calmotion.model.calibration.known_factors import KnownFactors
+from calmotion.model.robust.known_factors import KnownFactors
 
 MEAN, WORST = "mean", "worst"
 

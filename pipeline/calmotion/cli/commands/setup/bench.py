@@ -38,5 +38,17 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace, output: Output) -> int:
     from importlib import import_module
 
-    status: int = import_module(f"calmotion.benchmarks.{BENCHMARKS[args.name]}").main(args.arguments)
+    try:
+        module = import_module(f"calmotion.benchmarks.{BENCHMARKS[args.name]}")
+    except ModuleNotFoundError as error:
+        from calmotion.host.errors import SettingError
+
+        package, _, plugin = (error.name or "").partition(".")
+        if package != "calmotion_plugins":
+            raise
+        raise SettingError(
+            f"the benchmark {args.name} needs the plugin {plugin}, which is not there",
+            remedy="Put its folder back, or install Calmotion again.",
+        ) from error
+    status: int = module.main(args.arguments)
     return status

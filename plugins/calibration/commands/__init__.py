@@ -1,0 +1,1 @@
+"""The commands `calibrate`, `excite` and `refine`."""

@@ -1,0 +1,175 @@
+"""`calmotion calibrate`: the parameters of the robot from recordings of its performance."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from calmotion.cli import (
+    Output,
+    assignments,
+    conclude,
+    counted,
+    measured,
+    opened_shot,
+    print_table,
+    progress_display,
+    quantity,
+    quantity_in,
+    say,
+    shot_arguments,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rich.console import Console
+
+EXAMPLES = (
+    ("calmotion calibrate shot.usda --recording take.csv -o robot.usda", "markers, encoders"),
+    ("calmotion calibrate shot.usda --recording accel.csv@/Arm/Hand/sensor -o robot.usda", "a printer's log"),
+    ("calmotion calibrate shot.usda --recording a.csv --parameters modulus damping", "these alone"),
+)
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    shot_arguments(command)
+    command.add_argument(
+        "--recording", metavar="FILE", action="append", required=True,
+        help="what was recorded: a table with columns named after prims or with a TOML map beside it, or an "
+        "accelerometer log of a 3D printer as FILE@/PRIM; may be repeated",
+    )  # fmt: skip
+    command.add_argument("-o", "--output", metavar="LAYER", help="USD layer to write")
+    command.add_argument(
+        "--parameters", metavar="KIND", nargs="+",
+        help="what to estimate: modulus, damping, density, mass, centre, position_gain, velocity_gain, gear_stiffness, "
+        "armature, friction, viscous_friction, delay, encoder_offset, each also as KIND:PATTERN for some prim paths "
+        "(default: all but density, centre and encoder_offset)",
+    )  # fmt: skip
+    prior_option(command)
+    command.add_argument(
+        "--no-validation", action="store_true", help="fit all samples; by default every fifth part is held out"
+    )
+    command.add_argument(
+        "--step", metavar="TIME", type=quantity("s", positive=True),
+        help="first time step, in s or with a unit (2ms); it is halved until the estimates do not depend on it",
+    )  # fmt: skip
+    command.add_argument(
+        "--tolerance", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
+        help="acceptable error of the model at the targets, with a unit (1mm; default: the tolerance of the shot)",
+    )  # fmt: skip
+    command.add_argument(
+        "--integrator", metavar="NAME", help="bdf2, newmark or generalized-alpha (default: the last one)"
+    )
+    command.add_argument("--figures", metavar="DIR", help="draw measured and simulated signals into this folder")
+    command.add_argument(
+        "--motion", metavar="FILE",
+        help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
+    )  # fmt: skip
+
+
+def prior_option(command: argparse.ArgumentParser) -> None:
+    """Add `--prior` and `--by-motor-type`."""
+    command.add_argument(
+        "--prior", metavar="KIND=VALUE", action="append", default=[], type=_prior,
+        help="standard deviation of what is known before, relative (modulus=0.3) or in SI (delay=0.005, bias=0.3, "
+        "place=0.002, clock_drift=1e-4); may be repeated",
+    )  # fmt: skip
+    command.add_argument(
+        "--by-motor-type", action="store_true",
+        help="motors of one type (calm:motor:type) share their gains, friction, armature, gear and delay",
+    )  # fmt: skip
+
+
+def _prior(text: str) -> tuple[str, float]:
+    kind, _, value = text.partition("=")
+    try:
+        return kind, float(value)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is not KIND=VALUE, such as modulus=0.3") from None
+
+
+def parameter_arguments(args: argparse.Namespace) -> dict[str, Any]:
+    """What is estimated, as `calibrate`, `excite` and `refine` take it."""
+    from ..identification.parameters import DEFAULT
+
+    return {
+        "parameters": args.parameters or DEFAULT, "priors": dict(args.prior), "by_motor_type": args.by_motor_type,
+    }  # fmt: skip
+
+
+def run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.workflow.shot import with_shot
+
+    from ..workflow.calibrate import calibrate
+
+    args.shot = with_shot(args.shot)
+    shot = opened_shot(args)
+    with progress_display(args) as display:
+        made = calibrate(
+            shot, args.recording, layer=args.output, **parameter_arguments(args), validate=not args.no_validation,
+            tolerance=args.tolerance, step=args.step, integrator=args.integrator,
+            figures=args.figures, operators=args.run, settings=assignments(args), progress=display,
+            on_operator=display.done,
+        )  # fmt: skip
+    conclude(made.report(), (), output, None if args.quiet else _print)
+    return 0
+
+
+def _went(row: dict[str, Any]) -> str:
+    return "falls" if row["rms"] < row["rms_before"] else "goes"
+
+
+def _print(report: dict[str, Any], console: Console) -> None:
+
+    of_robot = [row for row in report["parameters"] if row["of_robot"]]
+    told = sum(row["identifiable"] for row in of_robot)
+    say(console, f"The recordings tell {told} of {counted(len(of_robot), 'parameter')} of the robot.")
+    for row in report["channels"]:
+        held_out = row["validation_rms"]
+        before, after, noise = (quantity_in(row[name], row["unit"], 3) for name in ("rms_before", "rms", "noise"))
+        checked = "" if held_out is None else f", {quantity_in(held_out, row['unit'], 3)} in samples not fitted"
+        say(
+            console,
+            f"{row['name']}: the difference of recording and robot {_went(row)} from {before} to {after}{checked} "
+            f"(root mean square; noise {noise}).",
+        )
+    _print_parameters(console, "Parameters of the robot", of_robot)
+    for row in report["parameters"]:
+        if row["advice"]:
+            say(console, f"{row['name']} is not identifiable from these recordings: {row['advice']}")
+    for file in (report["layer"], report["root"], *report["figures"]):
+        if file:
+            say(console, f"wrote {file}")
+    if report["root"]:
+        say(console, f"next: calmotion optimize {report['root']} -o LAYER makes curves for this robot")
+    for note in report["notes"]:
+        say(console, f"note: {note}")
+    measurement = [row for row in report["parameters"] if not row["of_robot"]]
+    _print_parameters(console, "Parameters of the model and the measurement", measurement)
+    say(
+        console,
+        f"{report['simulations']} simulations in {report['wall_s']:.3g} s; steps of {1e3 * report['step_s']:.3g} ms, "
+        f"whose error is {report['step_shift']:.2g} standard deviations of the estimates",
+    )
+
+
+def _print_parameters(console: Console, title: str, parameters: Sequence[dict[str, Any]]) -> None:
+    """A table of parameters; nothing without any."""
+
+    rows = []
+    for row in parameters:
+        value, deviation = measured(row["value"], row["standard_deviation"], row["unit"])
+        rows.append([
+            row["kind"], row["name"].partition(" ")[2], quantity_in(row["prior"]["value"], row["unit"]), value,
+            deviation + _share(row), "yes" if row["identifiable"] else "no",
+        ])  # fmt: skip
+    heads = ["parameter", "of", "in the shot", "estimated", "standard deviation", "identifiable"]
+    print_table(console, title, heads, rows, texts=2)
+
+
+def _share(row: dict[str, Any]) -> str:
+    """The standard deviation as a share of the value; not of offsets, whose zero is free."""
+    share = abs(row["standard_deviation"] / row["value"]) if row["value"] else float("inf")
+    return f" ({100.0 * share:.2g}%)" if row["of_robot"] and row["prior"]["value"] and share < 1.0 else ""

@@ -1,0 +1,174 @@
+"""Levenberg-Marquardt with a normal prior, bounds, and a loss that outliers cannot dominate.
+
+    min_z  sum_i rho(r_i(z)) / n_i + 1/2 z^T z
+
+where rho is Huber's loss: quadratic up to `HUBER`, linear beyond. n_i successive residuals count as one: where they are
+correlated in time, as those of a model that misses something, they do not outweigh the prior. Each iteration weighs a
+residual r beyond `HUBER` by HUBER / |r| (iteratively reweighted least squares). Entries of z at a bound that would
+leave it are held there.
+
+Source: Nocedal, Wright, Numerical Optimization, 2006, section 10.3; Huber, Robust Statistics, 1981.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from calmotion.arrays import Array
+
+HUBER = 3.0  # standard deviations: few residuals of a normal distribution are larger
+ENOUGH = 1e-2  # change of z, in standard deviations of its posterior, at which a search ends
+MOST = 30  # iterations
+RISEN = 1.0  # loss that a step by another minimum's derivatives may add: less than a standard deviation or two
+FIRST, LARGEST = 1e-3, 1e8  # damping, relative to the diagonal of the Gauss-Newton matrix
+
+
+class Problem(Protocol):
+    """Residuals over their standard deviations, shape [N], and their derivative by z, shape [N, n]."""
+
+    @property
+    def counts(self) -> Array:
+        """How many successive residuals count as one, shape [N]."""
+
+    def residuals(self, z: Array) -> Array | None:
+        """At z; None where there is no value."""
+
+    def linearized(self, z: Array) -> tuple[Array, Array]:
+        """With their derivative."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A minimum.
+
+    Attributes:
+        z: Where, shape [n].
+        residuals: There, shape [N].
+        jacobian: Derivative of the residuals, shape [N, n].
+        cost: Loss and prior.
+        iterations: Number of linearisations.
+        converged: Whether the last step was small, rather than that the iterations ended.
+    """
+
+    z: Array
+    residuals: Array
+    jacobian: Array
+    cost: float
+    iterations: int
+    converged: bool
+
+
+def weights_of(residuals: Array) -> Array:
+    """Weights of the residuals, 1 or less, shape [N]."""
+    size = np.abs(residuals)
+    return np.where(size > HUBER, HUBER / np.maximum(size, HUBER), 1.0)
+
+
+def loss_of(residuals: Array, counts: Array | float = 1.0) -> float:
+    """Sum of Huber's loss, of residuals of which so many count as one."""
+    size = np.abs(residuals)
+    return float((np.where(size > HUBER, HUBER * (size - 0.5 * HUBER), 0.5 * size**2) / counts).sum())
+
+
+def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST, enough: float = ENOUGH) -> Solution:
+    """The minimum that is reached from a start.
+
+    Args:
+        problem: Its residuals.
+        start: Shape [n]; the residuals have a value there.
+        lower: Least value of each entry, shape [n].
+        most: Largest number of iterations.
+        enough: Change of z, in standard deviations of its posterior, at which the search ends.
+
+    Raises:
+        ValueError: The residuals have no value at the start.
+    """
+    z, counts = np.maximum(start, lower), problem.counts
+    damping = FIRST
+    for iteration in range(1, most + 1):
+        r, J = problem.linearized(z)
+        cost = loss_of(r, counts) + 0.5 * float(z @ z)
+        w = weights_of(r) / counts
+        H = J.T @ (w[:, None] * J) + np.eye(len(z))
+        gradient = J.T @ (w * r) + z
+        free = ~((z <= lower) & (gradient > 0.0))
+        small = not np.any(free)
+        while not small:
+            step = np.zeros_like(z)
+            own = H[np.ix_(free, free)]
+            step[free] = -np.linalg.solve(own + damping * np.diag(np.diag(own)), gradient[free])
+            then = np.maximum(z + step, lower)
+            taken = then - z
+            small = float(np.sqrt(taken @ H @ taken)) < enough
+            if small:
+                break
+            tried = problem.residuals(then)
+            after = np.inf if tried is None else loss_of(tried, counts) + 0.5 * float(then @ then)
+            if after <= cost:
+                expected = -(gradient @ taken + 0.5 * taken @ H @ taken)
+                gain = (cost - after) / expected if expected > 0.0 else 1.0
+                damping = max(damping * (0.1 if gain > 0.75 else 1.0 if gain > 0.25 else 4.0), 1e-12)
+                z = then
+                break
+            damping *= 10.0  # not back to the first: along a narrow bent valley steps need little of it
+            if damping > LARGEST:
+                return Solution(z, r, J, cost, iteration, False)
+        if small:
+            return Solution(z, r, J, cost, iteration, True)
+    r, J = problem.linearized(z)
+    return Solution(z, r, J, loss_of(r, counts) + 0.5 * float(z @ z), most, False)
+
+
+def chord(problem: Problem, known: Solution, most: int = 8) -> Solution | None:
+    """The minimum of a problem near that of another one, with the derivatives of the other one; None where these lead
+    to more loss, or to no end.
+
+    Args:
+        problem: Its residuals.
+        known: The other minimum, which is returned where the problem has no value there.
+        most: Largest number of steps.
+    """
+    z, J, r = known.z, known.jacobian, problem.residuals(known.z)
+    if r is None:
+        return known
+    cost = _cost(problem, z, r)
+    for _ in range(most):
+        w = weights_of(r) / problem.counts
+        H = J.T @ (w[:, None] * J) + np.eye(len(z))
+        step = -np.linalg.solve(H, J.T @ (w * r) + z)
+        if float(np.sqrt(step @ H @ step)) < ENOUGH:
+            return Solution(z, r, J, cost, known.iterations, known.converged)
+        then = problem.residuals(z + step)
+        if then is None or not (after := _cost(problem, z + step, then)) <= cost + RISEN:
+            return None
+        z, r, cost = z + step, then, after
+    return None
+
+
+def _cost(problem: Problem, z: Array, residuals: Array) -> float:
+    """Loss and prior."""
+    return loss_of(residuals, problem.counts) + 0.5 * float(z @ z)
+
+
+def posterior(jacobian: Array, residuals: Array, counts: Array) -> Array:
+    """Covariance of z about a minimum, shape [n, n].
+
+    It is A^-1 with A = J^T D J + E, D the curvature of the loss. Where a model misses something that its parameters
+    move, residuals are large where J is: a standard deviation is at least that of A^-1 B A^-1 with B = J^T P J + E, P
+    the square of the slope of the loss.
+
+    Args:
+        jacobian, residuals: There.
+        counts: How many successive residuals count as one, shape [N].
+
+    Source: Huber, Robust Statistics, 1981, section 7.6.
+    """
+    size = np.abs(residuals)
+    prior = np.eye(jacobian.shape[1])
+    A = jacobian.T @ (((size <= HUBER) / counts)[:, None] * jacobian) + prior
+    B = jacobian.T @ ((np.minimum(size, HUBER) ** 2 / counts)[:, None] * jacobian) + prior
+    inverse = np.linalg.inv(A)
+    wider = np.sqrt(np.maximum(np.diag(inverse @ B @ inverse) / np.diag(inverse), 1.0))
+    return np.asarray(wider[:, None] * inverse * wider)

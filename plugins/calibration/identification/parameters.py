@@ -1,0 +1,234 @@
+"""Which parameters of a robot are estimated, their priors, and the values that they have in the shot.
+
+A parameter is searched as x, in standard deviations of its prior: value = nominal exp(spread x) where only factors make
+sense, nominal + spread x otherwise. The prior of x is the standard normal distribution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+
+import numpy as np
+from calmotion.errors import ShotError
+from calmotion.model.motor import DRIVE, PRESCRIBED, SERVO, Motor
+from calmotion.retargeting.robust.scenarios import payload_bodies
+from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.support.naming import nearest
+
+from ..model.estimates import (
+    ARMATURE,
+    AXES,
+    BIAS,
+    CENTRE,
+    CLOCK_DRIFT,
+    CLOCK_OFFSET,
+    DAMPING,
+    DELAY,
+    DENSITY,
+    ENCODER_OFFSET,
+    FRICTION,
+    GEAR_STIFFNESS,
+    HIGHER_MODES,
+    MASS,
+    MODULUS,
+    PLACE,
+    POSITION_GAIN,
+    ROBOT_KINDS,
+    VELOCITY_GAIN,
+    VISCOUS_FRICTION,
+)
+
+# Standard deviations of the priors: of logarithms as ln(1 + s), of the others in SI.
+PRIORS: Mapping[str, float] = {
+    MODULUS: 0.3, DAMPING: 1.0, DENSITY: 0.05, MASS: 0.1, CENTRE: 0.01, POSITION_GAIN: 0.3, VELOCITY_GAIN: 0.5,
+    GEAR_STIFFNESS: 0.5, ARMATURE: 0.5, FRICTION: 1.0, VISCOUS_FRICTION: 1.0, DELAY: 0.005,
+    ENCODER_OFFSET: float(np.radians(1.0)), HIGHER_MODES: 0.01, CLOCK_OFFSET: 0.05, CLOCK_DRIFT: 1e-4,
+    BIAS: 0.3, PLACE: 0.002,
+}  # fmt: skip
+DEFAULT = (
+    MODULUS, DAMPING, MASS, POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION, DELAY,
+)  # fmt: skip
+LOGARITHMIC = (
+    MODULUS, DAMPING, DENSITY, MASS, POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter that is estimated.
+
+    Attributes:
+        kind, path, axis, unit: As of `Estimate`.
+        nominal: Value in the shot.
+        spread: Standard deviation of the prior, of the logarithm where it is logarithmic.
+        logarithmic: Whether it is searched as a factor.
+        lower: Least value.
+        alike: Paths and nominal values of other motors that differ from theirs as this one does.
+    """
+
+    kind: str
+    path: str
+    nominal: float
+    spread: float
+    unit: str = ""
+    axis: int = -1
+    logarithmic: bool = True
+    lower: float = -np.inf
+    alike: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Kind, path and component."""
+        return f"{self.kind} {self.path}" + (f".{AXES[self.axis]}" if self.axis >= 0 else "")
+
+    @property
+    def least(self) -> float:
+        """Least x."""
+        return -np.inf if self.logarithmic else (self.lower - self.nominal) / self.spread
+
+    def value(self, x: float) -> float:
+        """The value at x standard deviations of the prior."""
+        return float(self.nominal * np.exp(self.spread * x) if self.logarithmic else self.nominal + self.spread * x)
+
+    def values(self, x: float) -> dict[tuple[str, str, int], float]:
+        """The values of all that it stands for, by kind, path and axis."""
+        found = {(self.kind, self.path, self.axis): self.value(x)}
+        for path, nominal in self.alike:
+            found[self.kind, path, self.axis] = replace(self, nominal=nominal).value(x)
+        return found
+
+    def slope(self, x: float) -> float:
+        """Derivative of the value by x."""
+        return self.spread * (self.value(x) if self.logarithmic else 1.0)
+
+
+def robot_parameters(
+    shot: CompiledShot, wanted: Sequence[str] = DEFAULT, priors: Mapping[str, float] | None = None
+) -> tuple[Parameter, ...]:
+    """The parameters of a robot, and, with each modulus, the grading of the stiffness of its modes.
+
+    Args:
+        shot: The shot.
+        wanted: Kinds, each by itself or as `KIND:PATTERN` for paths that fit a pattern; a kind that the robot does not
+            have gives nothing, a pattern that fits nothing is refused.
+        priors: Standard deviations by kind, over `PRIORS`.
+
+    Raises:
+        ShotError: There is no such kind, a pattern fits nothing, or there is no parameter at all.
+    """
+    given = {**PRIORS, **(priors or {})}
+    refuse_unknown(wanted, priors or {})
+    found: dict[str, Parameter] = {}
+    for text in wanted:
+        kind, _, pattern = text.partition(":")
+        own = [p for p in _of_kind(shot, kind, pattern, given[kind]) if fnmatchcase(p.path, pattern or "*")]
+        if pattern and not own:
+            paths = sorted({p.path for p in _of_kind(shot, kind, "*", given[kind])})
+            raise ShotError(
+                f"no parameter of the robot fits the pattern of {kind}",
+                path=shot.character.path,
+                attribute="--parameters",
+                found=text,
+                remedy=f"{nearest(pattern, paths)}Its {kind} parameters are those of {', '.join(paths) or 'nothing'}",
+            )
+        found |= {p.name: p for p in own}
+    if not found:
+        raise ShotError(
+            "the robot has no parameter of these kinds",
+            path=shot.character.path,
+            attribute="--parameters",
+            found=", ".join(wanted),
+            remedy="Make a link flexible (CalmFlexibleBodyAPI) or a motor give (calm:motor:model), or ask for mass or "
+            "encoder_offset",
+        )
+    # without it, the error of the mesh would be taken for another modulus and mass
+    moduli = [p for p in found.values() if p.kind == MODULUS]
+    graded = [Parameter(HIGHER_MODES, p.path, 0.0, given[HIGHER_MODES], logarithmic=False) for p in moduli]
+    return (*found.values(), *graded)
+
+
+def refuse_unknown(wanted: Sequence[str], priors: Mapping[str, float]) -> None:
+    """Refuse kinds that do not exist, and priors out of range.
+
+    Raises:
+        ShotError: There is one.
+    """
+    for attribute, known, names in (
+        ("--parameters", ROBOT_KINDS, [text.partition(":")[0] for text in wanted]),
+        ("--prior", tuple(PRIORS), list(priors)),
+    ):
+        for name in names:
+            if name not in known:
+                raise ShotError(
+                    "there is no such kind of parameter", attribute=attribute, found=name,
+                    remedy=f"{nearest(name, known)}Use {', '.join(known)}",
+                )  # fmt: skip
+    for name, value in priors.items():
+        if not 0.0 < value < np.inf:
+            raise ShotError(
+                "the standard deviation of a prior must be positive", attribute="--prior", found=f"{name}={value:g}",
+                remedy=f"Use a relative one, such as {name}={PRIORS[name]:g}, or leave the parameter out",
+            )  # fmt: skip
+
+
+def _of_kind(shot: CompiledShot, kind: str, pattern: str, prior: float) -> list[Parameter]:
+    """All parameters of a kind; masses of bodies within a chain only where a pattern asks for them."""
+    character = shot.character
+    spread = float(np.log1p(prior)) if kind in LOGARITHMIC else prior
+    if kind in (MODULUS, DAMPING, DENSITY):
+        found = {}
+        for body in character.bodies:
+            if body.flexible is not None and body.simulated_flexible:
+                material = body.flexible.material
+                value = {
+                    MODULUS: (material.youngs_modulus, "Pa"),
+                    # of both coefficients, where they are Rayleigh's
+                    DAMPING: (material.damping_ratio if material.rayleigh is None else 1.0, ""),
+                    DENSITY: (material.density, "kg/m^3"),
+                }[kind]
+                # the density of a body whose mass is authored follows from that mass
+                if value[0] > 0.0 and not (kind == DENSITY and body.mass is not None):
+                    found[material.path] = Parameter(kind, material.path, value[0], spread, value[1])
+        return list(found.values())
+    if kind in (MASS, CENTRE):
+        ends, rows = set(payload_bodies(shot)), []
+        for index, body in enumerate(character.bodies):
+            if body.simulated_flexible or body.mass is None or body.between or not (pattern or index in ends):
+                continue
+            if kind == MASS:
+                rows.append(Parameter(kind, body.path, body.mass.mass, spread, "kg"))
+            else:
+                rows += [
+                    Parameter(kind, body.path, float(body.mass.center[axis]), spread, "m", axis, False)
+                    for axis in range(3)
+                ]
+        return rows
+    # calm:motor:... of a joint is that of all its axes, so that a value of one axis has no place
+    alone = [motor for motor in character.motors if motor.path == motor.prim_path]
+    return [row for motor in alone for row in _of_motor(motor, kind, spread)]
+
+
+def _of_motor(motor: Motor, kind: str, spread: float) -> list[Parameter]:
+    """The parameter of a kind of one motor, where it has it: a guess of it must be in the shot, but for a delay."""
+    angle, effort = ("m", "N") if motor.linear else ("rad", "N m")
+    if kind == ENCODER_OFFSET:
+        own = 1e-3 if motor.linear and spread == PRIORS[ENCODER_OFFSET] else spread
+        return [Parameter(kind, motor.path, 0.0, own, angle, logarithmic=False)]
+    if motor.model == PRESCRIBED or motor.follows is not None:
+        return []
+    if kind == DELAY:
+        return [Parameter(kind, motor.path, motor.delay, spread, "s", logarithmic=False, lower=0.0)]
+    own_value, unit = {
+        POSITION_GAIN: (motor.position_gain, f"{effort}/{angle}"),
+        VELOCITY_GAIN: (motor.velocity_gain, f"{effort} s/{angle}"),
+        GEAR_STIFFNESS: (motor.rotor.gear_stiffness, f"{effort}/{angle}"),
+        ARMATURE: (motor.rotor.armature, "kg" if motor.linear else "kg m^2"),
+        FRICTION: (motor.rotor.friction, effort),
+        VISCOUS_FRICTION: (motor.rotor.viscous_friction, f"{effort} s/{angle}"),
+    }[kind]
+    of_rotor = kind not in (POSITION_GAIN, VELOCITY_GAIN)
+    if (of_rotor and motor.model != SERVO) or motor.model not in (DRIVE, SERVO):
+        return []
+    return [Parameter(kind, motor.path, own_value, spread, unit)] if 0.0 < own_value < np.inf else []

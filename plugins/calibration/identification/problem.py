@@ -1,0 +1,171 @@
+"""The residuals of recordings as functions of a robot's parameters, by simulations in parallel.
+
+The derivative by a parameter of the robot is the difference to a simulation that is 0.01% of the prior's standard
+deviation away, so that the phase of fast modes hardly changes between them at the end of a long recording; that by a
+parameter of the measurement is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.errors import ShotError
+from calmotion.model.run import RunSettings
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.parallel import in_parallel
+from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.support import interrupts
+
+from .measurement import Measurement
+from .parameters import Parameter
+from .robots import robot_at
+from .signals import Signals, signals_of
+
+DIFFERENCE = 1e-4  # of the prior's standard deviation
+
+
+@dataclass(frozen=True, eq=False)
+class Differences:
+    """Signals at x, and at x + `DIFFERENCE` of each parameter.
+
+    Attributes:
+        at: x, shape [n].
+        here: Signals there.
+        ahead: One for each parameter of the robot.
+    """
+
+    at: Array
+    here: Signals
+    ahead: tuple[Signals, ...]
+
+    def of(self, values: Callable[[Signals], Array]) -> list[Array]:
+        """Derivatives by the parameters of values of the signals."""
+        here = values(self.here)
+        return [np.asarray((values(ahead) - here) / DIFFERENCE) for ahead in self.ahead]
+
+
+class Calibrated:
+    """A robot and its recordings, as a `least_squares.Problem`: z has the robot's parameters, then the measurement's.
+
+    Args:
+        shot: The compiled shot.
+        parameters: Of the robot.
+        measurement: Its sensors.
+        options: With step and integrator.
+        after: How long the robot is simulated after the end of the shot [s].
+        tell: Called with each simulation.
+    """
+
+    def __init__(
+        self, shot: CompiledShot, parameters: Sequence[Parameter], measurement: Measurement, options: RunSettings,
+        after: float, tell: Callable[[], None] = lambda: None,
+    ):  # fmt: skip
+        self.shot, self.parameters, self.measurement = shot, tuple(parameters), measurement
+        self.options, self.after, self.tell = options, after, tell
+        self._last: tuple[Array, Signals] | None = None
+        self.differences: Differences | None = None
+        self._own = False  # whether they were made with these options
+        self.simulations = 0
+
+    @property
+    def lower(self) -> Array:
+        """Least values of z."""
+        return np.array([p.least for p in (*self.parameters, *self.measurement.parameters)])
+
+    @property
+    def counts(self) -> Array:
+        """How many successive residuals count as one, shape [N]."""
+        return self.measurement.counts
+
+    def with_measurement(self, measurement: Measurement) -> Calibrated:
+        """The same with other noise of the sensors; what was simulated is kept."""
+        other = Calibrated(self.shot, self.parameters, measurement, self.options, self.after, self.tell)
+        other._last, other.differences, other._own = self._last, self.differences, self._own
+        other.simulations = self.simulations
+        return other
+
+    def with_options(self, options: RunSettings) -> Calibrated:
+        """The same with another step; the differences are kept."""
+        other = Calibrated(self.shot, self.parameters, self.measurement, options, self.after, self.tell)
+        other.differences, other.simulations = self.differences, self.simulations
+        return other
+
+    def signals(self, z: Array) -> Signals:
+        """Of the robot at z, in the thread of the caller.
+
+        Raises:
+            ShotError: It cannot be simulated.
+            SimulationFailure: A step fails.
+        """
+        interrupts.check()
+        x = z[: len(self.parameters)]
+        if self._last is None or not np.array_equal(self._last[0], x):
+            self._last = x.copy(), self._simulated(x)
+        return self._last[1]
+
+    def residuals(self, z: Array) -> Array | None:
+        """(measured - predicted) / sigma, shape [N]; None where the robot cannot be simulated."""
+        try:
+            signals = self.signals(z)
+        except (ShotError, SimulationFailure):
+            return None
+        return self.measurement.residuals(signals, z[len(self.parameters) :])
+
+    def linearized(self, z: Array) -> tuple[Array, Array]:
+        """The residuals and their derivative, shape [N, n].
+
+        Raises:
+            ShotError: The robot cannot be simulated there.
+            SimulationFailure: A step fails.
+        """
+        n, measurement = len(self.parameters), self.measurement
+        x, y = z[:n], z[n:]
+        here = self.signals(z)
+        known = self.differences
+        found = known if known is not None and self._own and np.array_equal(known.at, x) else self._differences(x, here)
+        self.differences, self._own = found, True
+        columns = [
+            -measurement.weighted(change)
+            for change in zip(*[
+                found.of(lambda signals, sensor=sensor: measurement.predicted(signals, sensor, y))  # type: ignore[misc]
+                for sensor in measurement.sensors
+            ], strict=True)
+        ]  # fmt: skip
+        by_measurement = -measurement.weighted(
+            [measurement.derivatives(here, sensor, y) for sensor in measurement.sensors]
+        )
+        by_robot = np.stack(columns, axis=1) if columns else np.zeros((len(by_measurement), 0))
+        return measurement.residuals(here, y), np.concatenate([by_robot, by_measurement], axis=1)
+
+    def _differences(self, x: Array, here: Signals) -> Differences:
+        points = [x + unit for unit in DIFFERENCE * np.eye(len(self.parameters))]
+        return Differences(x.copy(), here, tuple(in_parallel(self._simulated, points)))
+
+    def _simulated(self, x: Array) -> Signals:
+        self.simulations += 1
+        self.tell()
+        return signals_of(robot_at(self.shot, self.parameters, x), self.options, self.after)
+
+
+class Measured:
+    """The parameters of the measurement alone, for one motion: nothing is simulated."""
+
+    def __init__(self, measurement: Measurement, signals: Signals):
+        self._measurement, self._signals = measurement, signals
+
+    @property
+    def counts(self) -> Array:
+        """How many successive residuals count as one, shape [N]."""
+        return self._measurement.counts
+
+    def residuals(self, z: Array) -> Array | None:
+        """(measured - predicted) / sigma, shape [N]."""
+        return self._measurement.residuals(self._signals, z)
+
+    def linearized(self, z: Array) -> tuple[Array, Array]:
+        """With their derivative, shape [N, m]."""
+        change = [self._measurement.derivatives(self._signals, sensor, z) for sensor in self._measurement.sensors]
+        return self._measurement.residuals(self._signals, z), -self._measurement.weighted(change)

@@ -1,0 +1,80 @@
+"""What the clock of a recording reads at the first frame of the shot, to begin with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.model import Character
+from calmotion.recordings import ANGLE, EFFORT, SensorRecording
+
+from ..signals import Signals
+from .noise import noise_of
+
+STEP = 0.01  # between clocks that are tried first [s]
+SAMPLES = 600  # of a channel that are compared, at most
+COVERED = 0.5  # share of the motion that a recording must hold
+
+
+def clock_of(recording: SensorRecording, character: Character, robots: Sequence[Signals]) -> float:
+    """The clock [s] at which what was recorded is most like what one of some simulated robots shows.
+
+    All shifts at which half of the motion is recorded are tried, then finer ones about the best. Constants are taken
+    off each component, so that biases do not matter.
+
+    Args:
+        recording: The recording; channels that the robot does not have are not looked at.
+        character: Its targets and motors.
+        robots: Signals of each: a robot that shakes more than the real one may be most like its recording at a wrong
+            clock, where one that hardly shakes tells the right one.
+    """
+    found = [_clock_by(recording, character, signals) for signals in robots]
+    return min(found, key=lambda item: item[1])[0]
+
+
+def _clock_by(recording: SensorRecording, character: Character, signals: Signals) -> tuple[float, float]:
+    """The clock by one robot, and how unlike it the recording is."""
+    length = float(signals.times[-1])
+    first, last = recording.start - (1.0 - COVERED) * length, recording.end - COVERED * length
+    compared = _compared(recording, character)
+    if not compared or last <= first:
+        return recording.start, np.inf
+    candidates = np.arange(first, last + STEP, STEP, dtype=np.float64)
+    best = _best(candidates, compared, signals)
+    for step in (STEP / 10.0, STEP / 100.0):
+        best = _best(best[0] + step * np.arange(-12.0, 13.0), compared, signals)
+    return best
+
+
+_Compared = tuple[str, int, Array, Array, float]
+
+
+def _compared(recording: SensorRecording, character: Character) -> list[_Compared]:
+    """Kind, index, times, values and scale of each channel, with few samples."""
+    targets = {target.path: k for k, target in enumerate(character.targets)}
+    motors = {motor.path: k for k, motor in enumerate(character.motors)}
+    found = []
+    for channel in recording.channels:
+        known = motors if channel.kind in (ANGLE, EFFORT) else targets
+        if channel.path not in known:
+            continue
+        every = max(1, len(channel.times) // SAMPLES)
+        values = channel.values[::every]
+        spread = np.nanstd(values) + noise_of(channel.values)
+        found.append((channel.kind, known[channel.path], channel.times[::every], values, float(spread)))
+    return found
+
+
+def _best(candidates: Array, compared: list[_Compared], signals: Signals) -> tuple[float, float]:
+    costs = []
+    for clock in candidates:
+        cost = 0.0
+        for kind, index, times, values, scale in compared:
+            off = (values - signals.at(kind, index, times - clock)) / scale
+            # a few outliers must not decide
+            off = np.clip(off - np.nanmedian(off, axis=0), -2.0, 2.0)
+            cost += float(np.nanmean(off**2))
+        costs.append(cost)
+    least = int(np.argmin(costs))
+    return float(candidates[least]), float(costs[least])

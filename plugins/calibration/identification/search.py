@@ -1,0 +1,254 @@
+"""The search for a robot's parameters: a start, the noise of the sensors, and a time step that does not matter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.errors import ShotError
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.parallel import in_parallel
+
+from ..model.estimates import DAMPING, GEAR_STIFFNESS, MODULUS, POSITION_GAIN
+from .least_squares import Solution, chord, loss_of, minimize, posterior, weights_of
+from .measurement import Measurement, Sensor
+from .model_error import covariance_of_model
+from .problem import Calibrated, Measured
+from .recordings.free_decay import decay_factors
+from .recordings.noise import correlation_time, least_sigma, spread_of
+
+STIFF = (MODULUS, POSITION_GAIN, GEAR_STIFFNESS)  # what decides about frequencies
+TRIED = np.linspace(-2.4, 2.4, 17)  # of all of them at once, in standard deviations of their priors
+FARTHEST = 5.0  # that the free decay may be away from the shot, in standard deviations
+BEST = 3  # of these, from which searches begin until one explains the recordings
+FIRST_ITERATIONS, EXPLAINED = 6, 2.0  # of such a search, and its loss over that of noise alone
+NEAR = 0.3  # change at which it ends, in standard deviations: another one follows
+ROUNDS, STEADY = 5, 0.05  # of the noise, and its relative change at which they end
+COARSE = 0.3  # error of a step, over the noise, with which no search begins but for a first guess
+HALVINGS, SHIFT = 5, 0.2  # of the step, and the change of an estimate at which they end, over its standard deviation
+ORDER = 2  # of the integrators
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Where a search ended.
+
+    Attributes:
+        z: Parameters of the robot and of the measurement, in standard deviations of their priors.
+        problem: With the last step and the noise of the sensors.
+        solution: The last minimum, before what is left of the error of the step is taken off.
+        covariance: Of z.
+        iterations: In all.
+        shift: Largest change by the last halving of the step, over its standard deviation.
+    """
+
+    z: Array
+    problem: Calibrated
+    solution: Solution
+    covariance: Array
+    iterations: int
+    shift: float
+
+
+def search(problem: Calibrated, tell: Callable[[float, str], None], halvings: int = HALVINGS) -> Found:
+    """The parameters at which the robot moves as recorded.
+
+    Raises:
+        ShotError: No robot near the shot can be simulated.
+    """
+    starts = _starts(problem, tell)
+    tell(0.3, "fitting the parameters")
+    rough: list[tuple[float, Calibrated, Array, int]] = []
+    for start in starts:
+        rough.append(_from(problem, start, FIRST_ITERATIONS))
+        count = sum(int(sensor.fitted.sum()) for sensor in problem.measurement.sensors)
+        if rough[-1][0] < EXPLAINED * 0.5 * count:
+            break
+    best, z, iterations = min(rough, key=lambda item: item[0])[1:]
+    best, halvings = _resolved(best, z, halvings)
+    for _ in range(ROUNDS):
+        solution = minimize(best, z, best.lower)
+        z, iterations = solution.z, iterations + solution.iterations
+        used = np.array([s.sigma for s in best.measurement.sensors])
+        best = best.with_measurement(renoised(best, z))
+        best = best.with_measurement(correlated(best, z))
+        if np.all(np.abs(np.array([s.sigma for s in best.measurement.sensors]) / used - 1.0) < STEADY):
+            break
+    tell(0.8, "halving the time step")
+    return _converged(best, solution, iterations, halvings)
+
+
+def _resolved(problem: Calibrated, z: Array, halvings: int) -> tuple[Calibrated, int]:
+    """The problem with a step whose error is small beside what is left at z, and how many halvings are left: a search
+    with a coarse step goes astray where combinations of parameters are hardly known, as modulus and mass together."""
+    left = problem.residuals(z)
+    while halvings and left is not None:
+        finer = problem.with_options(replace(problem.options, step=0.5 * step_of(problem)))
+        then = finer.residuals(z)
+        if then is None or float(np.sqrt(np.mean((then - left) ** 2))) < COARSE:
+            break
+        problem, left, halvings = finer, then, halvings - 1
+    return problem, halvings
+
+
+def _converged(problem: Calibrated, solution: Solution, iterations: int, halvings: int) -> Found:
+    """The minimum for ever smaller steps, extrapolated to a step of zero.
+
+    Derivatives are those of the first step: a minimum with another step is near, and its residuals alone decide where.
+    """
+    deviations, of_model = _deviations(problem, solution)
+    earlier, limit, shift, extrapolated = solution.z, solution.z, 0.0, False
+    for _ in range(halvings):
+        problem = problem.with_options(replace(problem.options, step=0.5 * step_of(problem)))
+        near = chord(problem, solution)
+        solution, iterations = near or solution, iterations + 1
+        change = solution.z - earlier
+        then = np.maximum(solution.z + change / (2**ORDER - 1), problem.lower)
+        # the first extrapolation is compared with what it extrapolates, the next ones with the one before
+        off = then - limit if extrapolated else change / (2**ORDER - 1)
+        shift = float(np.max(np.abs(off) / deviations, initial=0.0))
+        if near is None:  # derivatives there are others
+            solution = minimize(problem, solution.z, problem.lower, FIRST_ITERATIONS)
+            deviations, of_model = _deviations(problem, solution)
+            earlier, limit, extrapolated, iterations = solution.z, solution.z, False, iterations + solution.iterations
+            continue
+        earlier, limit, extrapolated = solution.z, then, True
+        if shift <= SHIFT:
+            break
+    problem = problem.with_measurement(correlated(problem, solution.z))
+    covariance = posterior(solution.jacobian, solution.residuals, problem.counts) + of_model
+    return Found(limit, problem, solution, covariance, iterations, shift)
+
+
+def step_of(problem: Calibrated) -> float:
+    """The step of its simulations [s]."""
+    assert problem.options.step is not None
+    return problem.options.step
+
+
+def _deviations(problem: Calibrated, solution: Solution) -> tuple[Array, Array]:
+    """Standard deviations of z about a solution, and the covariance by what the model has wrong.
+
+    Residuals that are correlated in time count as fewer.
+    """
+    counts = correlated(problem, solution.z).counts
+    weights = weights_of(solution.residuals) / counts
+    of_model = covariance_of_model(problem, solution.z, solution.jacobian, weights)
+    covariance = posterior(solution.jacobian, solution.residuals, counts) + of_model
+    return np.sqrt(np.diag(covariance)), of_model
+
+
+def correlated(problem: Calibrated, z: Array) -> Measurement:
+    """The measurement with the number of successive samples that count as one, as the residuals have it."""
+    measurement, y = problem.measurement, z[len(problem.parameters) :]
+    signals = problem.signals(z)
+
+    def of(sensor: Sensor) -> Sensor:
+        off = sensor.channel.values - measurement.predicted(signals, sensor, y)
+        return replace(sensor, count=correlation_time(np.where(sensor.fitted, off, np.nan)[sensor.used]))
+
+    return measurement.with_sensors([of(sensor) for sensor in measurement.sensors])
+
+
+def renoised(problem: Calibrated, z: Array) -> Measurement:
+    """The measurement with the noise of its sensors as the residuals have it, where it is not given."""
+    measurement, y = problem.measurement, z[len(problem.parameters) :]
+    signals = problem.signals(z)
+
+    def of(sensor: Sensor) -> Sensor:
+        if sensor.channel.sigma is not None:
+            return replace(sensor, sigma=sensor.channel.sigma)
+        off = sensor.channel.values - measurement.predicted(signals, sensor, y)
+        return replace(sensor, sigma=max(spread_of(off[sensor.fitted]), least_sigma(sensor.channel.values)))
+
+    return measurement.with_sensors([of(sensor) for sensor in measurement.sensors])
+
+
+def profiled(problem: Calibrated, z: Array) -> tuple[Array, float]:
+    """z with the best parameters of the measurement for its robot, and the loss with the prior."""
+    n = len(problem.parameters)
+    solution = minimize(Measured(problem.measurement, problem.signals(z)), z[n:], problem.lower[n:])
+    return np.concatenate([z[:n], solution.z]), solution.cost + 0.5 * float(z[:n] @ z[:n])
+
+
+def _from(problem: Calibrated, start: Array, most: int) -> tuple[float, Calibrated, Array, int]:
+    """A search from a start, with noise as large as what the start leaves: far residuals then keep their weight."""
+    free, z, iterations = _without_given_noise(problem), start, 0
+    for _ in range(2):
+        wide = free.with_measurement(renoised(free, z))
+        found = minimize(wide, z, wide.lower, most, NEAR)
+        free, z, iterations = wide, found.z, iterations + found.iterations
+    # compared with the noise that the sensors have
+    free = free.with_measurement(renoised(free, z))
+    r = problem.with_measurement(problem.measurement).residuals(z)
+    sensors = [
+        replace(own, sigma=own.sigma if own.channel.sigma is not None else sensor.sigma)
+        for own, sensor in zip(problem.measurement.sensors, free.measurement.sensors, strict=True)
+    ]
+    cost = np.inf if r is None else loss_of(r)
+    return cost, free.with_measurement(free.measurement.with_sensors(sensors)), z, iterations
+
+
+def _without_given_noise(problem: Calibrated) -> Calibrated:
+    """The problem with sensors whose noise is not known."""
+    sensors = [replace(s, channel=replace(s.channel, sigma=None)) for s in problem.measurement.sensors]
+    return problem.with_measurement(problem.measurement.with_sensors(sensors))
+
+
+def _starts(problem: Calibrated, tell: Callable[[float, str], None]) -> list[Array]:
+    """The best of robots that are stiffer and softer than the shot's: a search finds only frequencies that it can tell
+    apart from their neighbours by less than half an oscillation over the recording."""
+    m = len(problem.measurement.parameters)
+    stiff = np.array([p.kind in STIFF for p in problem.parameters], float)
+    tell(0.1, "looking for the stiffness")
+    points = [np.concatenate([v * stiff, np.zeros(m)]) for v in (TRIED if stiff.any() else (0.0,))]
+    points += _of_decay(problem)
+
+    def tried(z: Array) -> tuple[float, Array, Calibrated] | None:
+        own = problem.with_measurement(problem.measurement)
+        try:
+            own.signals(z)
+        except (ShotError, SimulationFailure):
+            return None
+        own = own.with_measurement(_common_noise(own))
+        z, cost = profiled(own, z)
+        return cost, z, own
+
+    found = [item for item in in_parallel(tried, points) if item is not None]
+    problem.simulations += len(points)
+    if not found:
+        raise ShotError(
+            "neither the robot nor a stiffer or softer one can be simulated", path=problem.shot.character.path,
+            remedy="Run `calmotion simulate` on the shot, which says why",
+        )  # fmt: skip
+    found.sort(key=lambda item: item[0])
+    return [z for _, z, _ in found[:BEST]]
+
+
+def _of_decay(problem: Calibrated) -> list[Array]:
+    """The robot whose free decay has the frequency and the damping of the recordings', where these tell it."""
+    z = np.zeros(len(problem.parameters) + len(problem.measurement.parameters))
+    try:
+        found = decay_factors(problem.measurement, problem.signals(z), float(problem.shot.animation.frame_times[-1]))
+    except (ShotError, SimulationFailure):
+        return []
+    if found is None:
+        return []
+    for k, p in enumerate(problem.parameters):
+        if p.kind in STIFF or p.kind == DAMPING:
+            factor = found[0] ** 2 if p.kind in STIFF else found[1]
+            z[k] = np.clip(np.log(factor) / p.spread, -FARTHEST, FARTHEST)
+    return [z]
+
+
+def _common_noise(problem: Calibrated) -> Measurement:
+    """The sensors with noise as large as a tenth of what they measured: the same for all robots, so that their losses
+    compare."""
+
+    def of(sensor: Sensor) -> Sensor:
+        values = np.where(sensor.fitted, sensor.channel.values, np.nan)
+        return replace(sensor, sigma=max(0.1 * float(np.nanmean(np.nanstd(values, axis=0))), sensor.sigma))
+
+    return problem.measurement.with_sensors([of(sensor) for sensor in problem.measurement.sensors])

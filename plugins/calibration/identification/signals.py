@@ -1,0 +1,173 @@
+"""What the sensors of a simulated robot would measure: its motion and efforts as functions of the robot's time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.errors import ShotError
+from calmotion.model import Animation
+from calmotion.model.curves import curve_of
+from calmotion.model.run import RunSettings
+from calmotion.multibody.analysis.reactions import reactions
+from calmotion.multibody.failure import NOWHERE, Reason, SimulationFailure
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.motors.drives import joint_values
+from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER
+from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.simulation.forward import ForwardRun, run_forward
+from calmotion.simulation.inputs.curves import AT_REST
+from calmotion.simulation.inputs.time_grid import over_grid
+from calmotion.simulation.prepare import Prepared, prepare
+from scipy.interpolate import CubicSpline, make_interp_spline
+from scipy.spatial.transform import Rotation
+
+from .robots import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """The motion of a simulated robot; before it begins and after it ends it stands still.
+
+    Attributes:
+        times: Of the robot's clock [s], the first frame at 0, shape [T].
+        positions: Of the targets [m], world, shape [T, K, 3].
+        rotations: Rotation matrices of the targets, shape [T, K, 3, 3].
+        angles: Of the motors' joints [rad or m], shape [T, M].
+        efforts: Of the motors [N m or N], shape [T, M].
+        gravity: [m/s^2], world, shape [3].
+        offsets: Of the motors' encoders [rad or m], shape [M].
+    """
+
+    times: Array
+    positions: Array
+    rotations: Array
+    angles: Array
+    efforts: Array
+    gravity: Array
+    offsets: Array
+    _splines: dict[tuple[str, int], CubicSpline] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def specific_forces(self) -> Array:
+        """R^T (a - g) of each target in its axes [m/s^2], shape [T, K, 3]."""
+        accelerations = make_interp_spline(self.times, self.positions, k=5).derivative(2)(self.times)
+        return np.asarray(np.einsum("tkij,tki->tkj", self.rotations, accelerations - self.gravity))
+
+    def at(self, kind: str, index: int, times: Array, order: int = 0) -> Array:
+        """A quantity at times of the robot's clock, shape [n, c], or its derivative by time.
+
+        Args:
+            kind: Of a channel.
+            index: Of the target, or of the motor.
+            times: [s], shape [n].
+            order: 0, or 1 for the derivative, which is zero where the robot stands still.
+        """
+        return self._sampled((kind, index), times, order)
+
+    def axes_at(self, index: int, times: Array, order: int = 0) -> Array:
+        """Rotation matrices of a target, shape [n, 3, 3]."""
+        return self._sampled(("axes", index), times, order).reshape(-1, 3, 3)
+
+    def _sampled(self, key: tuple[str, int], times: Array, order: int) -> Array:
+        if key not in self._splines:
+            self._splines[key] = CubicSpline(self.times, self._values(*key))
+        inside = np.clip(times, self.times[0], self.times[-1])
+        values = np.asarray(self._splines[key](inside, order), np.float64)
+        moving = (inside == times)[:, None] | (order == 0)
+        return np.asarray(np.where(moving, values, 0.0), np.float64)
+
+    def _values(self, kind: str, index: int) -> Array:
+        if kind == MARKER:
+            return self.positions[:, index]
+        if kind == ACCELEROMETER:
+            return self.specific_forces[:, index]
+        if kind == ANGLE:  # what the encoder reads
+            return np.asarray(self.angles[:, index, None] + self.offsets[index], np.float64)
+        if kind == EFFORT:
+            return self.efforts[:, index, None]
+        return self.rotations[:, index].reshape(-1, 9)
+
+
+def signals_of(robot: Robot, options: RunSettings, after: float = 0.0) -> Signals:
+    """Simulate a robot in its shot, and for some time after its end [s], in which the motors hold.
+
+    Args:
+        robot: The robot.
+        options: With step and integrator.
+        after: [s].
+
+    Raises:
+        ShotError: The shot cannot be simulated.
+        SimulationFailure: A step fails.
+    """
+    prepared = prepare(_lengthened(robot, after), options)
+    model, grid = prepared.model, prepared.grid
+    angles, rates = _commands(robot, prepared)
+    workspace = Workspace.for_system(model.system)
+    run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, integrator=options.scheme)
+    return _measured(robot, prepared, run)
+
+
+def _measured(robot: Robot, prepared: Prepared, run: ForwardRun) -> Signals:
+    model, character = prepared.model, prepared.character
+    found = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates)
+    values = joint_values(model.system, model.motor, character.motors, run.trajectory.states.u, run.joint_angles)
+    rotations = run.target_rotations
+    lost = np.flatnonzero(~np.isfinite(rotations).all(axis=(1, 2)))
+    if len(lost):  # a body that is bent so far that its frame at the target has no direction
+        raise SimulationFailure(float(prepared.grid.times[lost[0]]), NOWHERE, Reason.DIVERGED)
+    matrices = Rotation.from_quat(rotations.reshape(-1, 4)[:, [1, 2, 3, 0]]).as_matrix()
+    return Signals(
+        prepared.grid.times, run.target_positions, matrices.reshape(*rotations.shape[:2], 3, 3),
+        model.motor_values(values), model.motor_values(found.efforts), np.asarray(character.gravity, float),
+        robot.offsets,
+    )  # fmt: skip
+
+
+def ends_at_rest(animation: Animation) -> bool:
+    """Whether the current curves end at rest, so that what a robot does afterwards is known."""
+    end = float(animation.frame_times[-1])
+    fine = np.linspace(0.0, end, 4 * len(animation.frame_times))
+    rates = [np.abs(curve_of(track, end, False)(fine, 1)) for track in animation.current]
+    fastest = max((float(rate.max()) for rate in rates), default=0.0)
+    return all(float(rate[-1]) <= AT_REST * fastest for rate in rates)
+
+
+def refuse_cyclic(cyclic: bool, path: str) -> None:
+    """Refuse a shot that loops: a recording of it begins from rest somewhere.
+
+    Raises:
+        ShotError: It loops.
+    """
+    if cyclic:
+        raise ShotError(
+            "a recording of a shot that loops cannot be used yet",
+            path=path,
+            attribute="calm:retarget:cyclic",
+            found=True,
+            remedy="Set it to false, and record the motion once, from rest",
+        )
+
+
+def _lengthened(robot: Robot, after: float) -> CompiledShot:
+    """The shot with more frames behind its end."""
+    shot = robot.shot
+    frames = shot.animation.frame_times
+    more = int(np.ceil(after / (frames[1] - frames[0]) - 1e-9))
+    longer = np.concatenate([frames, frames[-1] + (frames[1] - frames[0]) * np.arange(1, more + 1)])
+    return replace(shot, animation=replace(shot.animation, frame_times=longer))
+
+
+def _commands(robot: Robot, prepared: Prepared) -> tuple[Array, Array]:
+    """What the motors' curves ask for, shape [T, M] each: those of the shot up to its end, as they are played."""
+    animation, grid = robot.shot.animation, prepared.grid
+    end = float(animation.frame_times[-1])
+    columns = [over_grid(grid, curve_of(track, end, False)) for track in animation.current]
+    if not columns:
+        none = np.zeros((len(grid.times), 0))
+        return none, none
+    angles, rates = (np.stack([column[k] for column in columns], axis=1) for k in range(2))
+    return angles - robot.offsets, rates

@@ -1,0 +1,199 @@
+"""Calibrate the robot of a shot: the command as a function."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from calmotion.host import SettingError, Settings, merge, nearest, quantity_of
+from calmotion.model import Animation, Character, Provenance
+from calmotion.model.outputs import WrittenLayer
+from calmotion.model.run import OutputPaths, RunSettings, Source
+from calmotion.multibody.integrators.coefficients import IMPLICIT
+from calmotion.recordings import SensorRecording, measured_prims, read_recordings
+from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.tolerance.reduced_bodies import ConvergedReduction, compiled_in
+from calmotion.workflow.run import Hooks, Outcome, Progress, again, carry_out
+from calmotion.workflow.shot import Given, Path, Shot, read_settings
+
+from ..identification.calibrate import CalibrationSettings, calibrate_shot
+from ..identification.measurement import refuse_unknown_channels
+from ..identification.parameters import DEFAULT, refuse_unknown
+from ..identification.recordings.plausible import refuse_long
+from ..identification.signals import refuse_cyclic
+from ..model.estimates import Calibration, CalibrationFigures, Estimate
+
+_READ = (Character, Animation, Provenance)
+
+
+@dataclass(frozen=True, eq=False)
+class CalibratedShot:
+    """A calibrated robot.
+
+    Attributes:
+        calibration: The estimates, and how well the model predicts each channel.
+        layer: The written layers, or None.
+        figures: Paths of the figures.
+        total_wall_s: Time of all of it [s].
+    """
+
+    calibration: Calibration
+    layer: WrittenLayer | None
+    figures: tuple[str, ...]
+    total_wall_s: float
+    _outcome: Outcome = field(repr=False)
+
+    @property
+    def parameters(self) -> Mapping[str, Estimate]:
+        """The estimates by name, such as `modulus /Arm/Nylon`."""
+        return {item.name: item for item in self.calibration.estimates}
+
+    def write(self, layer: Path) -> WrittenLayer:
+        """Write the estimates as a layer of overs, and beside it a root layer that opens it with the shot.
+
+        Raises:
+            ShotError: It cannot be written.
+        """
+        return _written(self._outcome, self.calibration, os.fspath(layer))
+
+    def draw(self, folder: Path) -> tuple[str, ...]:
+        """Draw measured and simulated signals before and after, residuals and intervals; returns the paths.
+
+        Raises:
+            RunError: They cannot be written.
+        """
+        return _drawn(self._outcome, self.calibration, os.fspath(folder), {})
+
+    def report(self) -> dict[str, Any]:
+        """The object that `--json` prints."""
+        from .report import calibration_report
+
+        return calibration_report(self.calibration, self.layer, self.figures, self.total_wall_s)
+
+
+# parameters: one for each option of the command, all but the shot and the recordings by keyword
+def calibrate(
+    shot: Shot | Path,
+    recordings: Sequence[Path] | Path,
+    *,
+    layer: Path | None = None,
+    parameters: Sequence[str] = DEFAULT,
+    priors: Mapping[str, float] | None = None,
+    validate: bool = True,
+    by_motor_type: bool = False,
+    tolerance: float | str | None = None,
+    step: float | str | None = None,
+    integrator: str | None = None,
+    figures: Path | None = None,
+    operators: Sequence[str] = (),
+    settings: Given = None,
+    progress: Callable[[Progress], None] | None = None,
+    on_operator: Callable[[Any], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+) -> CalibratedShot:
+    """Estimate the parameters of a robot from recordings of its performance, with their standard deviations.
+
+    Args:
+        shot: The shot that was performed, or its USD file; with a layer of results, the curves of that layer.
+        recordings: Files, each as FILE or FILE@/PRIM, the prim where the sensor of a file sits that does not name it.
+        layer: USD layer to write.
+        parameters: What to estimate: kinds, each by itself or as `KIND:PATTERN` for some prim paths.
+        priors: Standard deviations of what is known before, by kind; relative ones, or SI of those about zero.
+        by_motor_type: Motors of one type (`calm:motor:type`) share their parameters.
+        validate: Hold out a fifth of the recordings, and compare it with the result.
+        tolerance: Acceptable error of the model at the targets, [m] or text with a unit; None: the shot's own.
+        step: First time step, [s] or text with a unit; it is halved until the estimates no longer depend on it.
+        integrator: Of the simulations; None: automatic.
+        figures: Folder for figures.
+        operators, settings, progress, on_operator, cancel: As of `simulate`.
+
+    Raises:
+        ShotError: The shot cannot be processed, or a recording does not fit it.
+        SettingError: An argument does not fit.
+    """
+    begin = time.perf_counter()
+    chosen, hooks = read_settings(settings), Hooks(progress, on_operator, cancel)
+    refuse_unknown(parameters, priors or {})
+    if integrator is not None and integrator not in IMPLICIT:
+        raise SettingError(
+            f"calibrate supports only {', '.join(IMPLICIT)}", path="--integrator", found=integrator,
+            remedy=f"{nearest(integrator, IMPLICIT)}Remove the option, or use one of these.",
+        )  # fmt: skip
+    files = [recordings] if isinstance(recordings, (str, os.PathLike)) else recordings
+    names = [os.fspath(file) for file in files]
+    opened = with_sensors(shot)
+    read = read_recordings(opened.host, names, merge([opened.settings, chosen]))
+    options = RunSettings(
+        tolerance=quantity_of(tolerance, "m", "tolerance"), step=quantity_of(step, "s", "step"), integrator=integrator
+    )
+    target = None if layer is None else os.fspath(layer)
+    outcome = compiled_with_sensors(opened, read, options, target, operators, chosen, hooks)
+
+    def tell(fraction: float, message: str) -> None:
+        if cancel is not None and cancel():
+            from calmotion.workflow.problems import Cancelled
+
+            raise Cancelled(f"{opened.path}: cancelled")
+        if progress is not None:
+            progress(Progress("Estimate the parameters", fraction, message))
+
+    calibration = calibrate_shot(
+        compiled_in(outcome.run.get), read, CalibrationSettings(
+            tuple(parameters), dict(priors or {}), validate, by_motor_type=by_motor_type
+        ),
+        options, tell,
+    )  # fmt: skip
+    written = None if target is None else _written(outcome, calibration, target)
+    drawn = () if figures is None else _drawn(outcome, calibration, os.fspath(figures), chosen)
+    return CalibratedShot(calibration, written, drawn, time.perf_counter() - begin, outcome)
+
+
+def compiled_with_sensors(
+    opened: Shot, recordings: Sequence[SensorRecording], options: RunSettings, layer: str | None,
+    operators: Sequence[str], settings: Settings, hooks: Hooks,
+) -> Outcome:  # fmt: skip
+    """A run that compiles the shot, after everything was refused that does not fit."""
+    source = Source("", "", options, measured=measured_prims(recordings))
+    if layer is not None:
+        from calmotion.workflow.outputs import refuse_unwritable
+
+        refuse_unwritable(layer)
+    first = carry_out(
+        opened, "simulate", wanted=_READ, operators=operators, source=source, settings=settings, hooks=hooks
+    )
+    character = first.require(Character)
+    refuse_cyclic(character.retarget.cyclic, character.path)
+    refuse_unknown_channels(character, recordings)
+    refuse_long(recordings, float(first.require(Animation).frame_times[-1]))
+    if layer is not None:
+        from calmotion.usd.writing.result import refuse_inputs
+
+        refuse_inputs(first.require(Provenance), layer)
+    outcome = carry_out(
+        opened, "simulate", wanted=(*_READ, CompiledShot), optional=(ConvergedReduction,), source=source,
+        settings=settings, hooks=hooks,
+    )  # fmt: skip
+    outcome.require(CompiledShot)
+    return outcome
+
+
+def with_sensors(shot: Shot | Path) -> Shot:
+    """The shot, to be read again: the prims of sensors are targets of this reading alone."""
+    if not isinstance(shot, Shot):
+        from calmotion.workflow.shot import with_shot
+
+        return Shot(with_shot(os.fspath(shot)))
+    return shot.unread()
+
+
+def _written(outcome: Outcome, calibration: Calibration, layer: str) -> WrittenLayer:
+    from ..writing import write_calibration
+
+    return WrittenLayer(*write_calibration(outcome.require(Character), outcome.require(Provenance), calibration, layer))
+
+
+def _drawn(outcome: Outcome, calibration: Calibration, folder: str, settings: Settings) -> tuple[str, ...]:
+    return again(outcome, CalibrationFigures, calibration, OutputPaths(figures=folder), settings=settings).paths

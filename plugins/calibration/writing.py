@@ -1,0 +1,286 @@
+"""Writing a Calibration: a layer over materials, masses and motors, and a root layer.
+
+Each attribute has its standard deviation in `customData["calmotion"]`, in its own unit; `customLayerData["calmotion"]`
+has all parameters with the hashes of the recordings, and the covariance that `optimize --robust` draws from.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from calmotion.errors import ShotError
+from calmotion.model import Character, Provenance
+from calmotion.usd import gf, stages
+from calmotion.usd.layers import write_layer
+from calmotion.usd.reading.actuators.motor_models import DAMPING_ON
+from calmotion.usd.reading.context import Reading
+from calmotion.usd.units import StageUnits, units_of
+from calmotion.usd.writing.metadata import author_origin, author_stage_metadata
+from calmotion.usd.writing.result import refuse_inputs
+from calmotion.usd.writing.root import write_root
+
+from .model.estimates import (
+    ARMATURE,
+    CENTRE,
+    DAMPING,
+    DELAY,
+    DENSITY,
+    ENCODER_OFFSET,
+    FRICTION,
+    GEAR_STIFFNESS,
+    MASS,
+    MODULUS,
+    POSITION_GAIN,
+    VELOCITY_GAIN,
+    VISCOUS_FRICTION,
+    Calibration,
+    Estimate,
+)
+
+if TYPE_CHECKING:
+    from pxr import Sdf
+
+ENTRY = "calibration"  # in the metadata of the layer
+_MOTOR = {
+    POSITION_GAIN: "positionGain", VELOCITY_GAIN: "velocityGain", GEAR_STIFFNESS: "gearStiffness", ARMATURE: "armature",
+    FRICTION: "friction", VISCOUS_FRICTION: "viscousFriction", DELAY: "delay",
+}  # fmt: skip
+
+
+def write_calibration(
+    character: Character, provenance: Provenance, calibration: Calibration, output: str
+) -> tuple[str, str]:
+    """Write the estimated parameters over a shot.
+
+    Args:
+        character: As it was read.
+        provenance: Of the shot.
+        calibration: The estimates.
+        output: The layer to write; the root layer goes beside it as `<stem>_root.usda`.
+
+    Returns:
+        Paths of the layer and of the root layer.
+
+    Raises:
+        ShotError: The output is a layer of the shot, or cannot be written.
+    """
+    from pxr import Sdf
+
+    refuse_inputs(provenance, output)
+    stage = stages.open_stage(provenance.shot)
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    author_stage_metadata(layer, provenance)
+    author_origin(layer, stages.CALIBRATION, provenance)
+    writer = _Writer(layer, Reading(stage, units_of(stage), provenance.start_time_code), character, calibration)
+    writer.write()
+    entry = {**layer.customLayerData[stages.METADATA_KEY], ENTRY: _entry(calibration)}
+    layer.customLayerData = {**layer.customLayerData, stages.METADATA_KEY: entry}
+    layer.documentation = (
+        f"Parameters of the robot from {len(calibration.recordings)} recordings; {os.path.basename(output)} lies over "
+        "its shot."
+    )
+    write_layer(layer, output, lambda temporary: _validate(temporary, writer.written))
+    return output, write_root(output, provenance, stages.CALIBRATION)
+
+
+class _Writer:
+    """Authors the attributes of one layer."""
+
+    def __init__(self, layer: Sdf.Layer, reading: Reading, character: Character, calibration: Calibration):
+        self._layer, self._reading, self._character = layer, reading, character
+        self._values = {(item.kind, item.path, item.axis): item for item in calibration.estimates if item.of_robot}
+        self.written: dict[str, Any] = {}
+
+    def write(self) -> None:
+        """All of them."""
+        for item in self._values.values():
+            if item.kind == MODULUS:
+                self._attribute(item.path, "physics:youngsModulus", item, self._units.pressure(1.0))
+            elif item.kind == DENSITY:
+                self._attribute(item.path, "physics:density", item, self._units.density(1.0))
+            elif item.kind == DAMPING:
+                self._damping(item)
+            elif item.kind == MASS:
+                self._mass(item)
+            elif item.kind == ENCODER_OFFSET:
+                self._note(item)
+        for path in dict.fromkeys(item.path for item in self._values.values() if item.kind == CENTRE):
+            self._center(path)
+        for motor in self._character.motors:
+            self._motor(motor.path, motor.linear)
+
+    @property
+    def _units(self) -> StageUnits:
+        return self._reading.units
+
+    def _damping(self, item: Estimate) -> None:
+        bodies = (body.flexible.material for body in self._character.bodies if body.flexible is not None)
+        material = next(own for own in bodies if own.path == item.path)
+        if material.rayleigh is None:
+            self._attribute(item.path, "calm:damping:ratio", item, 1.0)
+        else:
+            names = ("calm:damping:rayleighMass", "calm:damping:rayleighStiffness")
+            for name, value in zip(names, material.rayleigh, strict=True):
+                if value > 0.0:
+                    self._attribute(item.path, name, item, 1.0 / value)
+        self._apply(item.path, "CalmDampingAPI")
+
+    def _mass(self, item: Estimate) -> None:
+        self._attribute(item.path, "physics:mass", item, self._units.mass(1.0))
+        self._apply(item.path, "PhysicsMassAPI")
+        prim = self._reading.stage.GetPrimAtPath(item.path)
+        authored = prim.GetAttribute("physics:diagonalInertia")
+        value = authored.Get() if authored and authored.HasAuthoredValue() else None
+        body = next(own for own in self._character.bodies if own.path == item.path)
+        diagonal = None if value is None or not any(value) else gf.vector(value)
+        if diagonal is None and not body.surfaces and body.tets is None and body.mass is not None:
+            moments, axes = np.linalg.eigh(body.mass.inertia)
+            diagonal = moments / self._units.inertia(1.0)
+            self._vector(item.path, "physics:principalAxes", axes * np.sign(np.linalg.det(axes)))
+        if diagonal is not None:  # an inertia from geometry follows the mass by itself
+            self._vector(item.path, "physics:diagonalInertia", diagonal * (item.value / item.nominal))
+
+    def _center(self, path: str) -> None:
+        from pxr import Gf, Sdf
+
+        prim = self._reading.stage.GetPrimAtPath(path)
+        body = next(own for own in self._character.bodies if own.path == path)
+        assert body.mass is not None
+        scale = self._reading.pose(prim).scale * self._units.length(1.0)
+        items = [self._values.get((CENTRE, path, axis)) for axis in range(3)]
+        center = [body.mass.center[k] if item is None else item.value for k, item in enumerate(items)]
+        spec = self._spec(path, "physics:centerOfMass", Sdf.ValueTypeNames.Point3f)
+        spec.default = Gf.Vec3f(*[float(value) for value in np.array(center) / scale])
+        deviations = [0.0 if item is None else item.standard_deviation for item in items]
+        spec.customData = {"calmotion": {"standard_deviation": gf.to_doubles(np.array(deviations) / np.abs(scale))}}
+        self.written[f"{path}.physics:centerOfMass"] = spec.default
+        self._apply(path, "PhysicsMassAPI")
+
+    def _motor(self, path: str, linear: bool) -> None:
+        from pxr import Sdf
+
+        units = self._units
+        length = units.length(1.0) if linear else float(np.deg2rad(1.0))
+        effort = units.force(1.0) if linear else units.torque(1.0)
+        unit = {
+            ARMATURE: units.mass(1.0) if linear else units.inertia(1.0), FRICTION: effort, DELAY: 1.0,
+        }  # fmt: skip
+        found = [self._values[kind, path, -1] for kind in _MOTOR if (kind, path, -1) in self._values]
+        for item in found:
+            self._attribute(path, f"calm:motor:{_MOTOR[item.kind]}", item, unit.get(item.kind, effort / length))
+        kinds = {item.kind for item in found}
+        motor = next(own for own in self._character.motors if own.path == path)
+        # gains are read from one dialect: both are there, or none, and what the second multiplies
+        if kinds & {POSITION_GAIN, VELOCITY_GAIN}:
+            self._spec(path, DAMPING_ON, Sdf.ValueTypeNames.Token).default = motor.damping_on
+        for kind, value in ((POSITION_GAIN, motor.position_gain), (VELOCITY_GAIN, motor.velocity_gain)):
+            if kinds & {POSITION_GAIN, VELOCITY_GAIN} and kind not in kinds:
+                self._number(path, f"calm:motor:{_MOTOR[kind]}", value / (effort / length))
+        if found:
+            self._apply(path, "CalmMotorAPI")
+
+    def _note(self, item: Estimate) -> None:
+        """An offset of an encoder, which no attribute of the joint has."""
+        from pxr import Sdf
+
+        prim = Sdf.CreatePrimInLayer(self._layer, item.path)
+        entry = {"encoder_offset": item.value, "standard_deviation": item.standard_deviation, "unit": item.unit}
+        prim.customData = {**dict(prim.customData), "calmotion": entry}
+
+    def _attribute(self, path: str, name: str, item: Estimate, unit: float) -> None:
+        """A value in SI over its unit, with its standard deviation."""
+        spec = self._number(path, name, item.value / unit)
+        spec.customData = {
+            "calmotion": {
+                "standard_deviation": item.standard_deviation / abs(unit),
+                "prior_value": item.nominal / unit,
+                "prior_standard_deviation": item.prior / abs(unit),
+                "identifiable": item.identifiable,
+            }
+        }
+
+    def _number(self, path: str, name: str, value: float) -> Sdf.AttributeSpec:
+        from pxr import Sdf
+
+        spec = self._spec(path, name, Sdf.ValueTypeNames.Float)
+        spec.default = float(value)
+        self.written[f"{path}.{name}"] = spec.default
+        return spec
+
+    def _vector(self, path: str, name: str, value: np.ndarray) -> None:
+        from pxr import Gf, Sdf
+        from scipy.spatial.transform import Rotation
+
+        if value.ndim == 2:
+            x, y, z, w = (float(part) for part in Rotation.from_matrix(value).as_quat())
+            spec = self._spec(path, name, Sdf.ValueTypeNames.Quatf)
+            spec.default = Gf.Quatf(w, x, y, z)
+        else:
+            spec = self._spec(path, name, Sdf.ValueTypeNames.Float3)
+            spec.default = Gf.Vec3f(*[float(part) for part in value])
+        self.written[f"{path}.{name}"] = spec.default
+
+    def _spec(self, path: str, name: str, kind: Any) -> Sdf.AttributeSpec:
+        """The spec of an attribute, of the type that the shot gave it."""
+        from pxr import Sdf
+
+        attribute = self._reading.stage.GetPrimAtPath(path).GetAttribute(name)
+        prim = Sdf.CreatePrimInLayer(self._layer, path)
+        made = Sdf.Path(path).AppendProperty(name)
+        known = attribute.GetTypeName() if attribute else kind
+        return self._layer.GetAttributeAtPath(made) or Sdf.AttributeSpec(prim, name, known or kind)
+
+    def _apply(self, path: str, schema: str) -> None:
+        from calmotion.usd.schemas import is_applied
+        from pxr import Sdf
+
+        if is_applied(self._reading.stage.GetPrimAtPath(path), schema):
+            return
+        prim = Sdf.CreatePrimInLayer(self._layer, path)
+        given = prim.GetInfo("apiSchemas") if prim.HasInfo("apiSchemas") else Sdf.TokenListOp()
+        names = [*given.prependedItems, *([] if schema in given.prependedItems else [schema])]
+        prim.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=names))
+
+
+def _entry(calibration: Calibration) -> dict[str, Any]:
+    """What the layer's metadata tell of a calibration."""
+    items = calibration.estimates
+    known = [k for k, item in enumerate(items) if item.of_robot and item.identifiable and _has_factor(item)]
+    relative = np.array([1.0 if items[k].logarithmic else 1.0 / items[k].value for k in known])
+    covariance = calibration.covariance[np.ix_(known, known)] * np.outer(relative, relative)
+    return {
+        "parameters": gf.to_strings(item.name for item in items),
+        "values": gf.to_doubles([item.value for item in items]),
+        "standard_deviations": gf.to_doubles([item.standard_deviation for item in items]),
+        "prior_values": gf.to_doubles([item.nominal for item in items]),
+        "prior_standard_deviations": gf.to_doubles([item.prior for item in items]),
+        "units": gf.to_strings(item.unit for item in items),
+        "identifiable": gf.to_strings(item.name for item in items if item.identifiable),
+        "factors": gf.to_strings(items[k].name for k in known),
+        "covariance_of_log_factors": gf.to_doubles(covariance.ravel()),
+        "recordings": gf.to_strings(calibration.recordings),
+        "recordings_sha256": gf.to_strings(calibration.recordings.values()),
+        "channels": gf.to_strings(fit.name for fit in calibration.channels),
+        "residual_rms": gf.to_doubles([fit.rms for fit in calibration.channels]),
+        "validation_rms": gf.to_doubles([fit.validation_rms for fit in calibration.channels]),
+    }
+
+
+def _has_factor(item: Estimate) -> bool:
+    """Whether a parameter can be drawn as a factor of its value: one about zero cannot."""
+    return item.axis < 0 and item.kind != ENCODER_OFFSET and item.value > 3.0 * item.standard_deviation
+
+
+def _validate(temporary: str, written: dict[str, Any]) -> None:
+    """Reopen what was written: every attribute must be there, with its value."""
+    from pxr import Sdf
+
+    layer = Sdf.Layer.OpenAsAnonymous(temporary)
+    if stages.role_of(layer) != stages.CALIBRATION:
+        raise ShotError("the written layer lacks its origin (customLayerData.calmotion)", path=temporary)
+    for path, value in written.items():
+        spec = layer.GetAttributeAtPath(Sdf.Path(path))
+        if not spec or spec.default != value:
+            raise ShotError("a value is missing from the written layer", path=path, found=spec and spec.default)

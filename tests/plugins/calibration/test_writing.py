@@ -1,0 +1,125 @@
+"""Layers of calibrations: values in stage units, read back as the robot that was estimated."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from calmotion import ShotError
+from calmotion.usd import stages
+from calmotion.usd.reading import read_shot
+from calmotion_plugins.calibration.model.estimates import Calibration, Estimate
+from calmotion_plugins.calibration.writing import write_calibration
+from pxr import Sdf, Usd
+from small_shots import BASE, ELBOW, FORE, PLASTIC, SHOULDER, Scale, make_flexible, make_target, set_float, write_arm
+
+
+def estimate(kind, path, nominal, value, sd=0.01, axis=-1, logarithmic=True, identifiable=True):
+    return Estimate(kind, path, axis, "", nominal, 0.3 * abs(nominal) or 0.3, value, sd, logarithmic, identifiable)
+
+
+def calibration_of(*estimates):
+    count = len(estimates)
+    covariance = 1e-4 * (0.5 * np.eye(count) + 0.5 * np.ones((count, count)))
+    return Calibration(estimates, covariance, {"take.csv": "ab12"}, (), (), True, 5, 40, 1e-3, 0.1, 1.0)
+
+
+@pytest.fixture(params=[Scale(), Scale(0.01, 0.001)], ids=["m, kg", "cm, g"])
+def shot(tmp_path, request):
+    scale = request.param
+
+    def edit(stage):
+        make_flexible(stage, FORE, scale)
+        make_target(stage)
+        joint = stage.GetPrimAtPath(SHOULDER)
+        joint.AddAppliedSchema("CalmMotorAPI")
+        joint.CreateAttribute("calm:motor:model", Sdf.ValueTypeNames.Token).Set("servo")
+        unit = scale.kilograms * scale.meters**2
+        set_float(stage, SHOULDER, "drive:angular:physics:stiffness", 100.0 * np.deg2rad(1.0) / unit)
+        set_float(stage, SHOULDER, "drive:angular:physics:damping", 2.0 * np.deg2rad(1.0) / unit)
+        set_float(stage, SHOULDER, "calm:motor:armature", 0.01 / unit)
+        set_float(stage, SHOULDER, "calm:motor:friction", 0.1 / unit)
+
+    return str(write_arm(tmp_path / "arm.usda", edit, scale))
+
+
+ALL = (
+    estimate("modulus", PLASTIC, 2e9, 2.3e9, 2e7), estimate("damping", PLASTIC, 0.01, 0.02, 1e-3),
+    estimate("density", PLASTIC, 1100.0, 1000.0), estimate("mass", BASE, 2.0, 2.5),
+    estimate("centre", BASE, 0.0, 0.02, axis=0, logarithmic=False), estimate("position_gain", SHOULDER, 100.0, 80.0),
+    estimate("armature", SHOULDER, 0.01, 0.012), estimate("friction", SHOULDER, 0.1, 0.3),
+    estimate("delay", SHOULDER, 0.0, 0.008, 2e-4, logarithmic=False),
+    estimate("encoder_offset", ELBOW, 0.0, 0.02, 1e-3, logarithmic=False),
+    estimate("clock_offset", "take.csv", 0.0, 3.2, logarithmic=False),
+)  # fmt: skip
+
+
+def test_the_shot_with_the_layer_is_the_calibrated_robot(shot, tmp_path):
+    character, _, provenance = read_shot(shot)
+    layer, root = write_calibration(character, provenance, calibration_of(*ALL), str(tmp_path / "robot.usda"))
+    found, _, _ = read_shot(root)
+    fore = next(body for body in found.bodies if body.path == FORE)
+    material = fore.flexible.material
+    assert material.youngs_modulus == pytest.approx(2.3e9, rel=1e-6) and material.damping_ratio == pytest.approx(0.02)
+    assert material.density == pytest.approx(1000.0, rel=1e-6)
+    base = next(body for body in found.bodies if body.path == BASE)
+    assert base.mass.mass == pytest.approx(2.5, rel=1e-6) and base.mass.center == pytest.approx([0.02, 0.0, 0.0])
+    assert np.diag(base.mass.inertia) == pytest.approx(1.25 * 0.01 * np.ones(3), rel=1e-5)
+    motor = next(motor for motor in found.motors if motor.path == SHOULDER)
+    assert motor.position_gain == pytest.approx(80.0, rel=1e-6) and motor.delay == pytest.approx(0.008)
+    assert motor.velocity_gain == pytest.approx(2.0, rel=1e-6)  # read from the same dialect as the new gain
+    assert motor.damping_on == next(own.damping_on for own in character.motors if own.path == SHOULDER) == "joint"
+    assert (motor.rotor.armature, motor.rotor.friction) == (pytest.approx(0.012), pytest.approx(0.3))
+    assert layer.endswith("robot.usda") and stages.role_of(Sdf.Layer.FindOrOpen(layer)) == stages.CALIBRATION
+
+
+def test_each_value_has_its_standard_deviation_and_the_layer_the_recordings(shot, tmp_path):
+    character, _, provenance = read_shot(shot)
+    layer, root = write_calibration(character, provenance, calibration_of(*ALL), str(tmp_path / "robot.usda"))
+    stage = Usd.Stage.Open(root)
+    modulus = stage.GetPrimAtPath(PLASTIC).GetAttribute("physics:youngsModulus")
+    entry = modulus.GetCustomDataByKey("calmotion")
+    assert entry["standard_deviation"] / modulus.Get() == pytest.approx(2e7 / 2.3e9, rel=1e-6) and entry["identifiable"]
+    assert stage.GetPrimAtPath(ELBOW).GetCustomDataByKey("calmotion")["encoder_offset"] == pytest.approx(0.02)
+    entry = Sdf.Layer.FindOrOpen(layer).customLayerData["calmotion"]["calibration"]
+    assert list(entry["recordings_sha256"]) == ["ab12"] and list(entry["parameters"])[-1] == "clock_offset take.csv"
+
+
+def test_robust_curves_get_the_covariance_of_what_is_identifiable(shot, tmp_path):
+    character, _, provenance = read_shot(shot)
+    lost = dataclasses.replace(ALL[1], identifiable=False)
+    made = calibration_of(ALL[0], lost, ALL[3], ALL[8], ALL[10])
+    _, root = write_calibration(character, provenance, made, str(tmp_path / "robot.usda"))
+    known = read_shot(root)[0].retarget.uncertainty.calibrated
+    assert known.names == (f"modulus {PLASTIC}", f"mass {BASE}", f"delay {SHOULDER}")
+    # the delay is known in seconds, and drawn as a factor
+    assert np.array(known.covariance)[0] == pytest.approx([1e-4, 5e-5, 5e-5 / 0.008])
+    assert read_shot(shot)[0].retarget.uncertainty.calibrated.names == ()
+
+
+def test_a_second_calibration_lies_on_the_first(shot, tmp_path):
+    character, _, provenance = read_shot(shot)
+    _, first = write_calibration(character, provenance, calibration_of(ALL[0]), str(tmp_path / "first.usda"))
+    character, _, provenance = read_shot(first)
+    _, second = write_calibration(character, provenance, calibration_of(ALL[3]), str(tmp_path / "second.usda"))
+    found = read_shot(second)[0]
+    fore = next(body for body in found.bodies if body.path == FORE)
+    assert fore.flexible.material.youngs_modulus == pytest.approx(2.3e9, rel=1e-6)
+    assert found.retarget.uncertainty.calibrated.names == (f"mass {BASE}", f"modulus {PLASTIC}")
+
+
+def test_the_shot_is_never_overwritten_and_the_layer_alone_is_no_shot(shot, tmp_path):
+    character, _, provenance = read_shot(shot)
+    with pytest.raises(ShotError, match="input layers are never written"):
+        write_calibration(character, provenance, calibration_of(ALL[0]), shot)
+    layer, _ = write_calibration(character, provenance, calibration_of(ALL[0]), str(tmp_path / "robot.usda"))
+    with pytest.raises(ShotError, match="_root"):
+        read_shot(layer)
+
+
+def test_metadata_that_were_damaged_tell_nothing(shot, tmp_path):
+    character, _, provenance = read_shot(shot)
+    layer, root = write_calibration(character, provenance, calibration_of(ALL[0]), str(tmp_path / "robot.usda"))
+    file, name = tmp_path / "robot.usda", "covariance_of_log_factors = ["
+    file.write_text(file.read_text().replace(name, f"{name}-1, "))
+    Sdf.Layer.FindOrOpen(layer).Reload(True)
+    assert read_shot(root)[0].retarget.uncertainty.calibrated.names == ()
