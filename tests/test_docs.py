@@ -96,7 +96,7 @@ def test_every_message_of_the_troubleshooting_page_is_one_of_the_program():
     page = (REPOSITORY / "docs" / "troubleshooting.md").read_text()
     messages = [row.split("|")[1].strip() for row in re.findall(r"^\| [^-].*$", page, re.MULTILINE)]
     messages = [message for message in messages if message != "message"]
-    sources = [*PACKAGE.rglob("*.py"), *REPOSITORY.glob("plugins/*/*.py")]
+    sources = [*PACKAGE.rglob("*.py"), *REPOSITORY.glob("plugins/**/*.py")]
     text = re.sub(r'"\s*\n\s*f?"', "", "".join(path.read_text() for path in sources))
     assert len(messages) > 15 and [message for message in messages if message not in text] == []
 
