@@ -8,7 +8,7 @@ import pytest
 from calmotion.errors import ShotError
 from calmotion.support import compilation, interrupts
 from calmotion.support.compilation import kernel, kernel_folder, kernel_key
-from calmotion.support.kernel_compiler import with_entrance_for_python
+from calmotion.support.numba_internals import with_entrance_for_python
 
 
 @pytest.fixture

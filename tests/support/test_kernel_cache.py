@@ -1,12 +1,12 @@
 """Damaged files of compiled kernels are thrown away, and the kernels compiled again."""
 
 import os
+import pickle
 import subprocess
 import sys
 
 import pytest
-from calmotion.support import kernel_cache
-from calmotion.support.kernel_cache import VerifiedCacheFile
+from calmotion.support.kernel_cache import KernelCacheFile
 
 MODULE = """
 import numpy as np
@@ -49,9 +49,13 @@ def test_a_damaged_cache_is_made_again_with_one_line_for_each_file(run, tmp_path
     assert run() == (0, "") and run() == (1, "")
 
 
+def cache_file(folder, name, stamp=(1.0, 2)):
+    return KernelCacheFile(folder, "module", name, stamp, pickle.dumps, bool)
+
+
 @pytest.fixture
 def make(tmp_path):
-    return lambda stamp=(1.0, 2): VerifiedCacheFile(str(tmp_path), "name", stamp)
+    return lambda stamp=(1.0, 2): cache_file(tmp_path, "name", stamp)
 
 
 def test_data_come_back_for_their_key_and_their_source(make):
@@ -80,7 +84,7 @@ def test_any_damage_to_any_file_is_seen(make, tmp_path, caplog, name):
 
 def test_a_file_in_the_place_of_another_one_is_not_taken(make, tmp_path):
     for name in ("name", "other"):
-        VerifiedCacheFile(str(tmp_path), name, (1.0, 2)).save("key", f"code of {name}")
+        cache_file(tmp_path, name).save("key", f"code of {name}")
     for suffix in ("1.nbc", "nbi"):
         own, other = tmp_path / f"name.{suffix}", tmp_path / f"other.{suffix}"
         whole = own.read_bytes()
@@ -93,16 +97,20 @@ def test_a_file_in_the_place_of_another_one_is_not_taken(make, tmp_path):
 def test_data_that_could_not_be_written_are_in_no_index(make, tmp_path, monkeypatch):
     make().save("key", "former")
     (tmp_path / "name.nbi").unlink()  # so that its name is free again
-    write = kernel_cache._write
-    monkeypatch.setattr(kernel_cache, "_write", lambda path, value: path.suffix != ".nbc" and write(path, value))
+    write = KernelCacheFile._write
+
+    def full(self, name, value):
+        return not name.endswith(".nbc") and write(self, name, value)
+
+    monkeypatch.setattr(KernelCacheFile, "_write", full)
     make().save("other", "code for other types")
     assert make().load("other") is None
 
 
 def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
     (tmp_path / "file").write_text("")
-    cache = VerifiedCacheFile(str(tmp_path / "file" / "folder"), "name", (1.0, 2))
-    cache._save_index({})
+    cache = cache_file(tmp_path / "file" / "folder", "name")
+    cache.flush()
     cache.save("key", 1)
     assert cache.load("key") is None
 
@@ -130,9 +138,10 @@ def test_a_link_to_itself_in_the_place_of_a_file_stops_nobody(run, tmp_path):
 def test_processes_that_save_at_once_lose_nothing(make, tmp_path):
     code = (
         "import sys\n"
-        "from calmotion.support.kernel_cache import VerifiedCacheFile\n"
+        "import pathlib, pickle\n"
+        "from calmotion.support.kernel_cache import KernelCacheFile\n"
         "for number in range(20):\n"
-        f"    file = VerifiedCacheFile({str(tmp_path)!r}, 'name', (1.0, 2))\n"
+        f"    file = KernelCacheFile(pathlib.Path({str(tmp_path)!r}), 'module', 'name', (1.0, 2), pickle.dumps, bool)\n"
         "    file.save((sys.argv[1], number), [sys.argv[1], number])\n"
     )
     started = [subprocess.Popen([sys.executable, "-c", code, name]) for name in ("one", "two", "three")]

@@ -3,6 +3,9 @@
 numba's own cache looks at one file at a time, so a kernel compiled into its caller would go stale when only the
 kernel's file changes, or a constant that it imports. The folder is named by a hash of everything that is compiled in
 instead, and lies in the user's cache, so that an installation that cannot be written to caches as well.
+
+Private interfaces of numba make a first run several times as fast (`numba_internals`). With `CALMOTION_PLAIN_NUMBA=1`,
+and with a version of numba that is not known, kernels are compiled by `numba.njit` alone: they compute the same.
 """
 
 from __future__ import annotations
@@ -10,6 +13,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import stat
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -22,12 +26,9 @@ import numpy as np
 from numba import config, njit
 
 from calmotion.errors import ShotError
-from calmotion.support import references  # noqa: F401
 from calmotion.support.caching.cache_folder import KERNELS, cache_folder
 from calmotion.support.caching.caches import mark_used, prune
-from calmotion.support.kernel_cache import verified
-from calmotion.support.kernel_compiler import KernelCompiler, with_entrance_for_python
-from calmotion.support.shared_code import shared, with_addresses
+from calmotion.support.files import is_own
 from calmotion.support.sources import digest_of, with_imports
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -37,9 +38,22 @@ PACKAGE = Path(__file__).parents[1]
 YES, NO = cast(bool, np.bool_(True)), cast(bool, np.bool_(False))
 FUSED = {"contract"}  # a product and a sum in one rounding; nothing that would reorder or drop terms
 # Modules of this folder that decide what is compiled.
-_COMPILERS = {"by_reference.py", "compilation.py", "kernel_compiler.py", "references.py", "shared_code.py"}
+_COMPILERS = {"by_reference.py", "compilation.py", "numba_internals.py"}
 _KERNEL = re.compile(rb"kernel\ndef ")
-_WITHOUT_ARRAYS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "nogil": True}  # of its own making
+_KNOWN = ((0, 63), (0, 68))  # first and last version of numba whose private interfaces are those that are used
+PLAIN = "CALMOTION_PLAIN_NUMBA"  # in the environment, `1`: none of them
+
+
+def is_plain() -> bool:
+    """Whether kernels are compiled without private interfaces of numba."""
+    version = tuple(int(part) for part in re.findall(r"\d+", numba.__version__)[:2])
+    return os.environ.get(PLAIN) == "1" or not _KNOWN[0] <= version <= _KNOWN[1]
+
+
+def cache_place() -> Path:
+    """Where kernels are kept: `$NUMBA_CACHE_DIR`, whose files are verified, else the cache of these sources."""
+    chosen = None if is_plain() else os.environ.get("NUMBA_CACHE_DIR")
+    return Path(chosen) if chosen else kernel_folder()
 
 
 @cache
@@ -68,8 +82,8 @@ def kernel_key(package: Path) -> str:
         path for path in with_imports(kernels, package.parent) if support not in path.parents
     }  # nothing of it is compiled
     sources = sorted({*used, *(path for path in support.glob("*.py") if path.name in _COMPILERS)})
-    level = f"numba {numba.__version__} llvmlite {llvmlite.__version__} python {sys.version_info[:2]} opt {config.OPT}"
-    return hashlib.sha256(f"{level} {digest_of(sources)}".encode()).hexdigest()
+    versions = f"numba {numba.__version__} llvmlite {llvmlite.__version__} python {sys.version_info[:2]}"
+    return hashlib.sha256(f"plain {is_plain()} {versions} opt {config.OPT} {digest_of(sources)}".encode()).hexdigest()
 
 
 def kernel(function: Function) -> Function:
@@ -79,7 +93,7 @@ def kernel(function: Function) -> Function:
     interpreter's lock. Arrays that it returns are views without a reference, so that only another `kernel` may call
     one that returns any, neither Python nor an `allocating_kernel`.
     """
-    return _compile(function, **_WITHOUT_ARRAYS)
+    return _compile(function)
 
 
 def inlined_kernel(function: Function) -> Function:
@@ -88,20 +102,20 @@ def inlined_kernel(function: Function) -> Function:
     Of a kernel that another calls numba makes machine code twice, by itself and in the other, and three times where
     that is called in turn.
     """
-    return _compile(function, **_WITHOUT_ARRAYS, inline="always")
+    return _compile(function, inline="always")
 
 
 def shared_kernel(function: Function) -> Function:
     """A large `kernel` of a module that several others call: compiled once, and called at its address."""
-    return cast(Function, shared(_compile(function, **_WITHOUT_ARRAYS)))
+    return _compile(function, one_copy=True)
 
 
 def allocating_kernel(function: Function) -> Function:
     """`kernel` for a function that makes arrays."""
-    return _compile(function)
+    return _compile(function, arrays=True)
 
 
-def _compile(function: Function, **options: Any) -> Function:
+def _compile(function: Function, *, inline: str = "never", one_copy: bool = False, arrays: bool = False) -> Function:
     if config.DISABLE_JIT:
         raise ShotError(
             "simulations are compiled by numba, which is told not to compile",
@@ -111,10 +125,23 @@ def _compile(function: Function, **options: Any) -> Function:
         )
     # numba picks the folder when a function is decorated; other users of numba keep theirs
     before = config.CACHE_DIR
-    if not os.environ.get("NUMBA_CACHE_DIR"):
-        config.CACHE_DIR = str(kernel_folder())
+    config.CACHE_DIR = str(cache_place())
     try:
-        dispatcher = njit(cache=True, fastmath=FUSED, pipeline_class=KernelCompiler, **options)(function)
+        if is_plain():
+            return cast(Function, njit(cache=_is_private(cache_place()), fastmath=FUSED, nogil=not arrays)(function))
+        from calmotion.support.numba_internals import compiled
+
+        return cast(Function, compiled(function, {"fastmath": FUSED, "inline": inline}, one_copy, arrays))
     finally:
         config.CACHE_DIR = before
-    return cast(Function, with_addresses(with_entrance_for_python(verified(dispatcher))))
+
+
+def _is_private(folder: Path) -> bool:
+    """Whether no other user can write into a folder, which is made: numba unpickles what lies there unseen."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        status = folder.stat()
+    except OSError:
+        return False
+    # what numba makes in it may be open to others, so they must not get there
+    return is_own(status) and not status.st_mode & (stat.S_IXGRP | stat.S_IXOTH)

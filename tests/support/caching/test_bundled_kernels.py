@@ -1,14 +1,12 @@
 """Kernels of a platform wheel are taken where the processor has what they were compiled for, if they are whole."""
 
+import pickle
+
 import numba
 import pytest
-from calmotion.support.caching import bundled_kernels
 from calmotion.support.caching.bundled_kernels import BundledKernels, export, name_of, runs_on
 from calmotion.support.caching.verified_files import read_verified, sealed
-from calmotion.support.kernel_cache import _FOR_KERNELS, VerifiedCacheFile
-from calmotion.support.kernel_compiler import called_by_kernel
-from numba.core.caching import _CacheLocator
-from numba.core.serialize import dumps
+from calmotion.support.kernel_cache import _FOR_KERNELS, KernelCacheFile
 
 TRIPLE = "x86_64-unknown-linux-gnu"
 BASELINE = (TRIPLE, "x86-64-v3", "+avx2,+fma")
@@ -33,7 +31,7 @@ def bundle(tmp_path):
     index = {(key, BASELINE, hashes): "name.1.nbc", (((key, BASELINE, hashes)), _FOR_KERNELS): "name.2.nbc"}
     contents = {"name.nbi": (numba.__version__, "stamp", index), "name.1.nbc": "with", "name.2.nbc": "without"}
     for name, content in contents.items():
-        (tmp_path / name).write_bytes(sealed(dumps(content), name_of(tmp_path / name)))
+        (tmp_path / name).write_bytes(sealed(pickle.dumps(content), name_of(tmp_path / name)))
     return BundledKernels(tmp_path, "name"), lambda processor: (key, processor, hashes)
 
 
@@ -57,26 +55,32 @@ def test_damage_and_other_versions_of_numba_are_no_error(bundle, tmp_path, monke
 
 
 def test_the_cache_of_the_user_comes_first(bundle, tmp_path):
-    kernels, key_on = bundle
-    cache = VerifiedCacheFile(str(tmp_path / "own"), "name", "stamp", bundled=kernels)
+    _, key_on = bundle
+    kernels = tmp_path / "bundled" / "key" / "calmotion.room"
+    kernels.mkdir(parents=True)
+    for path in tmp_path.glob("name.*"):
+        place = kernels / path.name
+        place.write_bytes(sealed(read_verified(path, name_of(path)), name_of(place)))
+    called_by_kernel: list[bool] = []
+    place, module = tmp_path / "key" / "numba's name", "calmotion.room.module"
+    cache = KernelCacheFile(
+        place, module, "name", "stamp", pickle.dumps, lambda: bool(called_by_kernel), tmp_path / "bundled"
+    )
     assert cache.load(key_on(NEWER)) == "with" and cache.load(key_on(OLDER)) is None
-    with called_by_kernel():
-        assert cache.load(key_on(NEWER)) == "with", "what has an entrance does as well"
-        (tmp_path / "name.1.nbc").unlink()
-        assert cache.load(key_on(NEWER)) == "without"
+    called_by_kernel.append(True)
+    assert cache.load(key_on(NEWER)) == "with", "what has an entrance does as well"
+    (kernels / "name.1.nbc").unlink()
+    assert cache.load(key_on(NEWER)) == "without"
+    called_by_kernel.clear()
     cache.save(key_on(NEWER), "own")
-    assert cache.load(key_on(NEWER)) == "own"
+    assert cache.load(key_on(NEWER)) == "own" and (tmp_path / "key" / "calmotion.room" / "name.nbi").exists()
 
 
-def test_exported_kernels_do_not_depend_on_the_folder_of_the_package_or_the_user(tmp_path, monkeypatch):
-    package = tmp_path / "calmotion"
-    (package / "room").mkdir(parents=True)
-    (package / "room" / "module.py").write_text("")
-    monkeypatch.setattr(bundled_kernels, "PACKAGE", package)
-    cached = tmp_path / "key" / _CacheLocator.get_suitable_cache_subpath(str(package / "room" / "module.py"))
-    cached.mkdir(parents=True)
-    path = cached / "name.1.nbc"
-    path.write_bytes(sealed(b"code", name_of(path)))
+def test_exported_kernels_do_not_depend_on_the_user(tmp_path):
+    for package in ("calmotion.room", "others"):
+        path = tmp_path / "key" / package / "name.1.nbc"
+        path.parent.mkdir(parents=True)
+        path.write_bytes(sealed(b"code", name_of(path)))
     assert export(tmp_path / "key", tmp_path / "kernels") == 1
     exported = tmp_path / "kernels" / "key" / "calmotion.room" / "name.1.nbc"
     assert read_verified(exported, "key/calmotion.room/name.1.nbc") == b"code"

@@ -130,14 +130,15 @@ def test_files_are_read_whatever_the_umask_is(folder):
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners there")
 def test_a_kernel_that_another_user_can_write_is_never_unpickled(tmp_path):
-    from calmotion.support.kernel_cache import _content
+    from calmotion.support.kernel_cache import KernelCacheFile
 
     path = tmp_path / "kernel.nbi"
     path.write_bytes(sealed(pickle.dumps("of an attacker"), name_of(path)))
+    cache = KernelCacheFile(tmp_path, "module", "kernel", "stamp", pickle.dumps, bool)
     path.chmod(0o666)
-    assert _content(path) is None and path.exists(), "it is replaced when the kernel is compiled"
+    assert cache._read(path.name) is None and path.exists(), "it is replaced when the kernel is compiled"
     path.chmod(0o644)
-    assert _content(path) is not None
+    assert cache._read(path.name) is not None
 
 
 def test_what_a_killed_process_left_is_removed_by_one_that_only_reads(folder):

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core.caching import _CacheLocator
 
 from calmotion.support.caching.verified_files import DamagedFileError, read_verified, sealed
 
@@ -82,11 +81,10 @@ def export(source: Path, target: Path) -> int:
         target: Becomes `FOLDER` in the wheel.
     """
     count = 0
-    for package in sorted({path.parent for path in PACKAGE.rglob("*.py")}):
-        folder = source / _CacheLocator.get_suitable_cache_subpath(str(package / "module.py"))
+    for folder in sorted(source.glob("calmotion*")):
+        place = target / source.name / folder.name
+        place.mkdir(parents=True, exist_ok=True)
         for file in sorted(folder.glob("*.nb?")):
-            place = target / source.name / ".".join(("calmotion", *package.relative_to(PACKAGE).parts))
-            place.mkdir(parents=True, exist_ok=True)
             content = read_verified(file, name_of(file), own=True)
             (place / file.name).write_bytes(sealed(content, name=name_of(place / file.name)))
             count += file.suffix == ".nbc"

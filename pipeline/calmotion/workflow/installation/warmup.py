@@ -62,10 +62,9 @@ def warmup(progress: Callable[[Progress], None] | None = None) -> Warmup:
 
 
 def _folder() -> Path:
-    """Where kernels are kept: `$NUMBA_CACHE_DIR`, else the cache of these sources."""
-    from calmotion.support.compilation import kernel_folder
+    from calmotion.support.compilation import cache_place
 
-    return Path(os.environ.get("NUMBA_CACHE_DIR") or kernel_folder())
+    return cache_place()
 
 
 def _count(folder: Path) -> int:

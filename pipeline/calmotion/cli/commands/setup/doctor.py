@@ -141,12 +141,16 @@ def _disk() -> Iterator[Finding]:
 
 def _compiler() -> Iterator[Finding]:
     """Compile a kernel, which fails where numba or LLVM is broken."""
+    from numba import __version__ as numba_version
     from numba import config, njit
 
     if config.DISABLE_JIT:
         yield Finding("compiler", WRONG, "numba is told not to compile", "Unset NUMBA_DISABLE_JIT")
     elif njit(lambda x: x + 1.0)(1.0) == 2.0:
-        yield Finding("compiler", OK, "numba compiles")
+        from calmotion.support.compilation import is_plain
+
+        slowly = ", plainly: first runs take five times as long" if is_plain() else ""
+        yield Finding("compiler", OK, f"numba {numba_version} compiles{slowly}")
     else:
         yield Finding("compiler", WRONG, "numba computes wrong numbers", "Reinstall numba and llvmlite")
 
