@@ -33,8 +33,17 @@ def name_of(path: Path) -> str:
 MODULES = {name_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
 
 
+def homes(package: str) -> dict[str, str]:
+    """Public names of a package to the modules that define them, as its stub says."""
+    stub = MODULES[package].with_suffix(".pyi")
+    if MODULES[package].name != "__init__.py" or not stub.is_file():
+        return {}
+    imports = [node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom)]
+    return {alias.name: node.module or "" for node in imports for alias in node.names}
+
+
 def imports_of(module: str) -> Iterator[str]:
-    """The modules of the package that a module imports, anywhere in its source."""
+    """The modules of the package that a module imports, anywhere in its source; public names count as their homes."""
     path = MODULES[module]
     package = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
     for node in ast.walk(ast.parse(path.read_text())):
@@ -43,9 +52,12 @@ def imports_of(module: str) -> Iterator[str]:
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) - node.level + 1] if node.level else []
             source = ".".join([*base, *([node.module] if node.module else [])])
+            public = homes(source) if source in MODULES else {}
             for alias in node.names:
                 full = f"{source}.{alias.name}"
-                if full in MODULES or source in MODULES:
+                if alias.name in public:
+                    yield public[alias.name]
+                elif full in MODULES or source in MODULES:
                     yield full if full in MODULES else source
 
 
@@ -91,6 +103,29 @@ def test_the_engine_imports_neither_usd_nor_rerun():
         if isinstance(node, ast.Import | ast.ImportFrom) and name and name.split(".")[0] in ("pxr", "rerun")
     ]
     assert not found
+
+
+def test_plugins_import_public_packages_alone():
+    """`calmotion`, `calmotion.model`, ...: at most one level deep, as a studio's own plugin would."""
+    deep = [
+        f"{path.relative_to(PLUGINS)}:{node.lineno}: {name}"
+        for path in sorted(PLUGINS.rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text()))
+        for name in names_of_import(node)
+        if name.startswith("calmotion.") and (name.count(".") > 1 or name not in MODULES)
+    ]
+    assert not deep
+
+
+def names_of_import(node: ast.AST) -> list[str]:
+    """The modules that a statement imports by their full names; of `from calmotion.a import module`, that module."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if not isinstance(node, ast.ImportFrom) or node.level or node.module is None:
+        return []
+    modules = [f"{node.module}.{alias.name}" for alias in node.names]
+    public = homes(node.module) if node.module in MODULES else {}
+    return [name if name in MODULES and name.rsplit(".", 1)[1] not in public else node.module for name in modules]
 
 
 def test_folders_and_modules_stay_small():

@@ -3,8 +3,11 @@
 import importlib
 import subprocess
 import sys
+from pathlib import Path
 
 import calmotion
+import pytest
+from calmotion.public_names import homes
 
 
 def test_every_name_is_there():
@@ -18,11 +21,19 @@ def test_every_name_is_documented():
         assert getattr(calmotion, name).__doc__
 
 
-def test_the_lazy_names_are_those_for_type_checkers():
-    homes = {name: f"calmotion.{module}" for module, names in calmotion._HOMES.items() for name in names}
-    assert set(homes) == set(calmotion.__all__) - {"ShotError", "__version__"}
-    for name, module in homes.items():
-        assert getattr(importlib.import_module(module), name) is getattr(calmotion, name)
+PACKAGE = Path(calmotion.__file__).parent
+FRONTS = sorted(".".join(stub.relative_to(PACKAGE.parent).parent.parts) for stub in PACKAGE.rglob("__init__.pyi"))
+
+
+@pytest.mark.parametrize("package", FRONTS)
+def test_every_public_name_of_a_package_is_that_of_its_stub(package):
+    front = importlib.import_module(package)
+    for name, module in homes(package).items():
+        defined = getattr(importlib.import_module(module), name)
+        assert getattr(front, name) is defined
+    assert set(dir(front)) == set(front.__all__) == set(homes(package))
+    with pytest.raises(AttributeError, match="no attribute 'nobody'"):
+        front.nobody  # noqa: B018
 
 
 def test_importing_loads_nothing_heavy():

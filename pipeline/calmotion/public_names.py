@@ -1,22 +1,48 @@
-"""Public names of a package that are imported when they are first used, so that importing the package costs nothing."""
+"""Public names of a package that are imported when they are first used, so that importing the package costs nothing.
+
+The stub of the package (`__init__.pyi`) says where each name is defined, for type checkers and at run time.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable
+from functools import cache
 from importlib import import_module
 from typing import Any
 
 
-def imported(package: str, homes: Mapping[str, tuple[str, ...]], name: str) -> Any:
-    """The object of a public name, for the `__getattr__` of a package.
+@cache
+def homes(package: str) -> dict[str, str]:
+    """Public name to the module that defines it, as the stub of the package says."""
+    import ast
+    from pathlib import Path
 
-    Args:
-        homes: Module, without `calmotion.`, to the names that it defines; `.module` is one of the package itself.
+    file = sys.modules[package].__file__
+    assert file is not None
+    statements = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8")).body
+    return {
+        alias.name: f"{package}.{statement.module}" if statement.level else statement.module
+        for statement in statements
+        if isinstance(statement, ast.ImportFrom) and statement.module is not None
+        for alias in statement.names
+    }
 
-    Raises:
-        AttributeError: The package has no such name.
+
+def public_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """The functions `__getattr__` and `__dir__` of a package that has a stub; `__all__` is found by the first.
+
+    The function for attributes raises AttributeError for a name that the stub does not have.
     """
-    for module, names in homes.items():
-        if name in names:
-            return getattr(import_module(module if module.startswith(".") else f"calmotion.{module}", package), name)
-    raise AttributeError(f"module {package!r} has no attribute {name!r}")
+
+    def attribute(name: str) -> Any:
+        if name == "__all__":
+            return sorted(homes(package))
+        if name.startswith("__") or name not in homes(package):
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return getattr(import_module(homes(package)[name]), name)
+
+    def names() -> list[str]:
+        return sorted(homes(package))
+
+    return attribute, names

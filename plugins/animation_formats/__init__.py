@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from calmotion.control.commands import Commands, MotorCurves
+from calmotion.control import Commands, MotorCurves
 from calmotion.host import Property, PropertyValues, registration
-from calmotion.workflow.exporting.command_format import CommandFormat
+from calmotion.workflow import CommandFormat
 
 
 class Keyframes(CommandFormat):
@@ -23,7 +23,7 @@ class Keyframes(CommandFormat):
 
     def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
         """Keyframes with the slopes of the curves."""
-        from calmotion.control.sampling import bezier_commands
+        from calmotion.control import bezier_commands
 
         return bezier_commands(curves, rate)
 

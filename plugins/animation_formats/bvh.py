@@ -8,17 +8,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.control.commands import LINEAR, Commands, MotorCurves, instants
+from calmotion.control import LINEAR, Commands, MotorCurves, instants
 from calmotion.errors import ShotError
-from calmotion.simulation.playing.body_poses import body_tree, local_poses, near_turn
-from calmotion.simulation.playing.parallel_frames import (
+from calmotion.simulation import (
     ParallelSkeleton,
+    body_tree,
     euler_angles,
     interpolated_values,
+    local_poses,
+    near_turn,
     parallel_skeleton,
 )
-from calmotion.support.files import write_text
-from calmotion.support.naming import distinct_names
+from calmotion.support import distinct_names, write_text
 
 _PIECES = 4  # lines of a motor for one of its Euler angles
 _MOVES = 1e-9  # what a joint that has no position channels may move [m]

@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 from calmotion.arrays import Array, IntArray
-from calmotion.control.commands import LINEAR, Commands, MotorCurves
+from calmotion.control import LINEAR, Commands, MotorCurves
 from calmotion.errors import ShotError
-from calmotion.model.character import SurfaceMesh
-from calmotion.simulation.playing.body_poses import LocalPoses, body_tree, local_poses, motor_values, near_turn
-from calmotion.simulation.playing.parallel_frames import parallel_skeleton
-from calmotion.support.files import replaced
-from calmotion.support.naming import distinct_names
+from calmotion.model import SurfaceMesh
+from calmotion.simulation import LocalPoses, body_tree, local_poses, motor_values, near_turn, parallel_skeleton
+from calmotion.support import distinct_names, replaced
 from calmotion.version import __version__
 
 _FLOAT, _UINT = 5126, 5125

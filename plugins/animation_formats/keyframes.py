@@ -6,9 +6,9 @@ import json
 from typing import Any
 
 import numpy as np
-from calmotion.control.commands import BEZIER, Commands, MotorCurves
+from calmotion.control import BEZIER, Commands, MotorCurves
 from calmotion.errors import ShotError
-from calmotion.support.files import write_text
+from calmotion.support import write_text
 
 FORMAT = "calmotion keyframes 1"
 

@@ -8,13 +8,22 @@ from typing import Any
 
 from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.model import Animation, Character, FEMeshes, ModelChoices, Result
-from calmotion.model.character import motors_give
-from calmotion.model.model_choice import no_flexible_bodies, run_settings, simplified_character
-from calmotion.model.outputs import SystemModes
-from calmotion.model.run import OutputPaths, Source
-from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.tolerance.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
+from calmotion.model import (
+    Animation,
+    Character,
+    FEMeshes,
+    ModelChoices,
+    OutputPaths,
+    Result,
+    Source,
+    SystemModes,
+    motors_give,
+    no_flexible_bodies,
+    run_settings,
+    simplified_character,
+)
+from calmotion.simulation import CompiledShot
+from calmotion.tolerance import ConvergedReduction, ReducedBodies, compiled_in
 
 
 class ReduceFlexibleBodies(Operator):
@@ -41,17 +50,16 @@ class ReduceFlexibleBodies(Operator):
         return no_flexible_bodies(data)
 
     def check(self, context: RunContext) -> None:
-        from calmotion.mesh.patches.named_surfaces import refuse_named_surfaces
-        from calmotion.reduction.soft_bodies import refuse_soft_bodies
+        from calmotion.mesh import refuse_named_surfaces
+        from calmotion.reduction import refuse_soft_bodies
 
         character = simplified_character(context.get(Character), context.get(ModelChoices))
         refuse_named_surfaces(character)
         refuse_soft_bodies(character)
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.mesh.patches.contact_notes import contact_notes
-        from calmotion.simulation.bodies import mode_tables, weak_seat_notes, with_elasticity
-        from calmotion.simulation.body_reduction import BodyReduction, reduction_for
+        from calmotion.mesh import contact_notes
+        from calmotion.simulation import BodyReduction, mode_tables, reduction_for, weak_seat_notes, with_elasticity
 
         choices, meshes, animation = context.get(ModelChoices), context.get(FEMeshes), context.get(Animation)
         character, source = simplified_character(context.get(Character), choices), context.get(Source)
@@ -81,7 +89,7 @@ class CompileShot(Operator):
     provides = (CompiledShot,)
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.simulation.compiled_shot import compile_shot
+        from calmotion.simulation import compile_shot
 
         reduced = context.get(ReducedBodies)
         character = simplified_character(context.get(Character), context.get(ModelChoices))
@@ -108,13 +116,13 @@ class FindSystemModes(Operator):
         return None if character is not None and motors_give(character) else no_flexible_bodies(data)
 
     def check(self, context: RunContext) -> None:
-        from calmotion.model.run import RunSettings
-        from calmotion.simulation.inputs.supported import refuse_unsupported
+        from calmotion.model import RunSettings
+        from calmotion.simulation import refuse_unsupported
 
         refuse_unsupported(context.get(Character), context.get(Animation), RunSettings(pre_roll=0.0))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.simulation.prepare import pose_modes
+        from calmotion.simulation import pose_modes
 
         context.progress(0.0, "loading kernels (compiled in the first run)")
         shot, result = compiled_in(context.get), context.get(Result)

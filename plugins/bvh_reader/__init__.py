@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.model import MotorTracks
-from calmotion.model.run import Source
+from calmotion.model import MotorTracks, Source
 
 
 class ReadMotion(Operator):

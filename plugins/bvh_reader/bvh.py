@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.support.files import refuse_special
-from calmotion.support.memory import too_large
+from calmotion.support import refuse_special, too_large
 
 _EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
 _AXES = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")

@@ -3,55 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
 
 from calmotion.host import Operator, Property, RunContext, registration
-from calmotion.model.run import OutputPaths
+from calmotion.model import OutputPaths
+from calmotion.public_names import public_names
 
 from .model.estimates import Calibration, CalibrationFigures
-
-if TYPE_CHECKING:
-    from .identification.calibrate import CalibrationSettings, calibrate_shot
-    from .identification.parameters import robot_parameters
-    from .identification.robots import Robot, robot_with
-    from .identification.signals import Signals, signals_of
-    from .model.estimates import HIGHER_MODES
-    from .workflow.calibrate import CalibratedShot, calibrate
-    from .workflow.excite import ExcitedShot, excite
-    from .workflow.refine import RefinedShot, refine
-
-__all__ = [
-    "HIGHER_MODES",
-    "CalibratedShot",
-    "Calibration",
-    "CalibrationFigures",
-    "CalibrationSettings",
-    "ExcitedShot",
-    "PlotCalibration",
-    "RefinedShot",
-    "Robot",
-    "Signals",
-    "calibrate",
-    "calibrate_shot",
-    "excite",
-    "refine",
-    "register",
-    "robot_parameters",
-    "robot_with",
-    "signals_of",
-    "unregister",
-]
-
-_HOMES = {
-    ".identification.calibrate": ("CalibrationSettings", "calibrate_shot"),
-    ".identification.parameters": ("robot_parameters",),
-    ".identification.robots": ("Robot", "robot_with"),
-    ".identification.signals": ("Signals", "signals_of"),
-    ".model.estimates": ("HIGHER_MODES",),
-    ".workflow.calibrate": ("CalibratedShot", "calibrate"),
-    ".workflow.excite": ("ExcitedShot", "excite"),
-    ".workflow.refine": ("RefinedShot", "refine"),
-}
 
 
 class PlotCalibration(Operator):
@@ -75,7 +32,4 @@ class PlotCalibration(Operator):
 register, unregister = registration(PlotCalibration)
 
 
-def __getattr__(name: str) -> Any:
-    from calmotion.public_names import imported
-
-    return imported(__name__, _HOMES, name)
+__getattr__, __dir__ = public_names(__name__)

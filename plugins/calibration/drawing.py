@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.views.style import AFTER, BEFORE, INTENDED, LIMIT, SMALL, new_figure, save, short, tidy
+from calmotion.views import AFTER, BEFORE, INTENDED, LIMIT, SMALL, new_figure, save, short, tidy
 from matplotlib.figure import Figure
 
 from .model.estimates import Calibration, ChannelCurves

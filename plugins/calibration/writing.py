@@ -12,14 +12,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.model import Character, Provenance
-from calmotion.usd import gf, stages
-from calmotion.usd.layers import write_layer
-from calmotion.usd.reading.actuators.motor_models import DAMPING_ON
-from calmotion.usd.reading.context import Reading
-from calmotion.usd.units import StageUnits, units_of
-from calmotion.usd.writing.metadata import author_origin, author_stage_metadata
-from calmotion.usd.writing.result import refuse_inputs
-from calmotion.usd.writing.root import write_root
+from calmotion.usd import (
+    CALIBRATION,
+    DAMPING_ON,
+    METADATA_KEY,
+    Reading,
+    StageUnits,
+    author_origin,
+    author_stage_metadata,
+    open_stage,
+    refuse_inputs,
+    role_of,
+    to_doubles,
+    to_strings,
+    units_of,
+    vector,
+    write_layer,
+    write_root,
+)
 
 from .model.estimates import (
     ARMATURE,
@@ -69,20 +79,20 @@ def write_calibration(
     from pxr import Sdf
 
     refuse_inputs(provenance, output)
-    stage = stages.open_stage(provenance.shot)
+    stage = open_stage(provenance.shot)
     layer = Sdf.Layer.CreateAnonymous(".usda")
     author_stage_metadata(layer, provenance)
-    author_origin(layer, stages.CALIBRATION, provenance)
+    author_origin(layer, CALIBRATION, provenance)
     writer = _Writer(layer, Reading(stage, units_of(stage), provenance.start_time_code), character, calibration)
     writer.write()
-    entry = {**layer.customLayerData[stages.METADATA_KEY], ENTRY: _entry(calibration)}
-    layer.customLayerData = {**layer.customLayerData, stages.METADATA_KEY: entry}
+    entry = {**layer.customLayerData[METADATA_KEY], ENTRY: _entry(calibration)}
+    layer.customLayerData = {**layer.customLayerData, METADATA_KEY: entry}
     layer.documentation = (
         f"Parameters of the robot from {len(calibration.recordings)} recordings; {os.path.basename(output)} lies over "
         "its shot."
     )
     write_layer(layer, output, lambda temporary: _validate(temporary, writer.written))
-    return output, write_root(output, provenance, stages.CALIBRATION)
+    return output, write_root(output, provenance, CALIBRATION)
 
 
 class _Writer:
@@ -134,7 +144,7 @@ class _Writer:
         authored = prim.GetAttribute("physics:diagonalInertia")
         value = authored.Get() if authored and authored.HasAuthoredValue() else None
         body = next(own for own in self._character.bodies if own.path == item.path)
-        diagonal = None if value is None or not any(value) else gf.vector(value)
+        diagonal = None if value is None or not any(value) else vector(value)
         if diagonal is None and not body.surfaces and body.tets is None and body.mass is not None:
             moments, axes = np.linalg.eigh(body.mass.inertia)
             diagonal = moments / self._units.inertia(1.0)
@@ -154,7 +164,7 @@ class _Writer:
         spec = self._spec(path, "physics:centerOfMass", Sdf.ValueTypeNames.Point3f)
         spec.default = Gf.Vec3f(*[float(value) for value in np.array(center) / scale])
         deviations = [0.0 if item is None else item.standard_deviation for item in items]
-        spec.customData = {"calmotion": {"standard_deviation": gf.to_doubles(np.array(deviations) / np.abs(scale))}}
+        spec.customData = {"calmotion": {"standard_deviation": to_doubles(np.array(deviations) / np.abs(scale))}}
         self.written[f"{path}.physics:centerOfMass"] = spec.default
         self._apply(path, "PhysicsMassAPI")
 
@@ -233,7 +243,7 @@ class _Writer:
         return self._layer.GetAttributeAtPath(made) or Sdf.AttributeSpec(prim, name, known or kind)
 
     def _apply(self, path: str, schema: str) -> None:
-        from calmotion.usd.schemas import is_applied
+        from calmotion.usd import is_applied
         from pxr import Sdf
 
         if is_applied(self._reading.stage.GetPrimAtPath(path), schema):
@@ -251,20 +261,20 @@ def _entry(calibration: Calibration) -> dict[str, Any]:
     relative = np.array([1.0 if items[k].logarithmic else 1.0 / items[k].value for k in known])
     covariance = calibration.covariance[np.ix_(known, known)] * np.outer(relative, relative)
     return {
-        "parameters": gf.to_strings(item.name for item in items),
-        "values": gf.to_doubles([item.value for item in items]),
-        "standard_deviations": gf.to_doubles([item.standard_deviation for item in items]),
-        "prior_values": gf.to_doubles([item.nominal for item in items]),
-        "prior_standard_deviations": gf.to_doubles([item.prior for item in items]),
-        "units": gf.to_strings(item.unit for item in items),
-        "identifiable": gf.to_strings(item.name for item in items if item.identifiable),
-        "factors": gf.to_strings(items[k].name for k in known),
-        "covariance_of_log_factors": gf.to_doubles(covariance.ravel()),
-        "recordings": gf.to_strings(calibration.recordings),
-        "recordings_sha256": gf.to_strings(calibration.recordings.values()),
-        "channels": gf.to_strings(fit.name for fit in calibration.channels),
-        "residual_rms": gf.to_doubles([fit.rms for fit in calibration.channels]),
-        "validation_rms": gf.to_doubles([fit.validation_rms for fit in calibration.channels]),
+        "parameters": to_strings(item.name for item in items),
+        "values": to_doubles([item.value for item in items]),
+        "standard_deviations": to_doubles([item.standard_deviation for item in items]),
+        "prior_values": to_doubles([item.nominal for item in items]),
+        "prior_standard_deviations": to_doubles([item.prior for item in items]),
+        "units": to_strings(item.unit for item in items),
+        "identifiable": to_strings(item.name for item in items if item.identifiable),
+        "factors": to_strings(items[k].name for k in known),
+        "covariance_of_log_factors": to_doubles(covariance.ravel()),
+        "recordings": to_strings(calibration.recordings),
+        "recordings_sha256": to_strings(calibration.recordings.values()),
+        "channels": to_strings(fit.name for fit in calibration.channels),
+        "residual_rms": to_doubles([fit.rms for fit in calibration.channels]),
+        "validation_rms": to_doubles([fit.validation_rms for fit in calibration.channels]),
     }
 
 
@@ -278,7 +288,7 @@ def _validate(temporary: str, written: dict[str, Any]) -> None:
     from pxr import Sdf
 
     layer = Sdf.Layer.OpenAsAnonymous(temporary)
-    if stages.role_of(layer) != stages.CALIBRATION:
+    if role_of(layer) != CALIBRATION:
         raise ShotError("the written layer lacks its origin (customLayerData.calmotion)", path=temporary)
     for path, value in written.items():
         spec = layer.GetAttributeAtPath(Sdf.Path(path))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from calmotion.control.commands import CUBIC, HOLD, LINEAR, QUINTIC, Commands, Follower, MotorCurves
+from calmotion.control import CUBIC, HOLD, LINEAR, QUINTIC, Commands, Follower, MotorCurves
 from calmotion.host import Property, PropertyValues, registration
-from calmotion.workflow.exporting.command_format import CommandFormat
+from calmotion.workflow import CommandFormat
 
 
 class Ros2Trajectory(CommandFormat):
@@ -30,7 +30,7 @@ class Ros2Trajectory(CommandFormat):
 
     def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
         """Positions at the rate, with the derivatives of the same cubics."""
-        from calmotion.control.sampling import smooth_commands
+        from calmotion.control import smooth_commands
 
         kinds = {"positions": LINEAR, "velocities": CUBIC, "accelerations": QUINTIC}
         return smooth_commands(curves, rate, kinds[properties.fields])
@@ -104,7 +104,7 @@ class CsvTable(CommandFormat):
 
     def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
         """Positions at the rate, with the derivatives that the player needs."""
-        from calmotion.control.sampling import held_commands, smooth_commands
+        from calmotion.control import held_commands, smooth_commands
 
         if properties.player == HOLD:
             return held_commands(curves, rate)
@@ -143,7 +143,7 @@ class ServoTicks(CommandFormat):
 
     def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
         """Positions at the rate."""
-        from calmotion.control.sampling import held_commands
+        from calmotion.control import held_commands
 
         return held_commands(curves, rate)
 
@@ -194,7 +194,7 @@ class UrScript(CommandFormat):
 
     def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
         """Commands ahead of the curves by the lag of the controller."""
-        from calmotion.control.sampling import followed_commands
+        from calmotion.control import followed_commands
 
         return followed_commands(curves, rate, properties.cycle, Follower(properties.gain, properties.lookahead))
 
@@ -242,7 +242,7 @@ class BottangoCurves(CommandFormat):
 
     def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
         """Keyframes at the rate."""
-        from calmotion.control.sampling import bezier_commands
+        from calmotion.control import bezier_commands
 
         return bezier_commands(curves, rate)
 

@@ -14,11 +14,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from calmotion.control.commands import BEZIER, Commands, MotorCurves
+from calmotion.control import BEZIER, Commands, MotorCurves
 from calmotion.errors import ShotError, raise_all
-from calmotion.support.files import write_text
-from calmotion.support.naming import nearest
-from calmotion.support.reading import read_toml
+from calmotion.support import nearest, read_toml, write_text
 
 FULL = 8192  # of a motor's range
 _KNOWN = ("id", "minimum", "maximum")

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
-from calmotion.control.commands import CUBIC, HOLD, QUINTIC, Commands, MotorCurves
+from calmotion.control import CUBIC, HOLD, QUINTIC, Commands, MotorCurves
 from calmotion.errors import ShotError
-from calmotion.support.files import write_text
+from calmotion.support import write_text
 
 _DERIVATIVES = (".velocity", ".acceleration")
 

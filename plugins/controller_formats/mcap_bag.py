@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.control.commands import Commands
+from calmotion.control import Commands
 from calmotion.errors import ShotError
-from calmotion.support.files import replaced
+from calmotion.support import replaced
 
 from .ros2 import commands_of, stamp
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.control.commands import CUBIC, LINEAR, QUINTIC, Commands
+from calmotion.control import CUBIC, LINEAR, QUINTIC, Commands
 from calmotion.errors import ShotError
-from calmotion.support.files import write_text
+from calmotion.support import write_text
 
 _REST = 1e-6  # speed that counts as rest [rad/s or m/s]
 _NANO = 1_000_000_000

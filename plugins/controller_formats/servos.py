@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from calmotion.control.commands import MotorCurves
+from calmotion.control import MotorCurves
 from calmotion.errors import ShotError, raise_all
-from calmotion.support.naming import nearest
-from calmotion.support.reading import read_toml
+from calmotion.support import nearest, read_toml
 
 _REMEDY = (
     "Write a table for each motor, such as [shoulder] with resolution = 4096 (ticks a turn), centre = 2048, "

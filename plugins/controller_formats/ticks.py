@@ -10,9 +10,9 @@ from dataclasses import asdict
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.control.commands import HOLD, Commands, MotorCurves
+from calmotion.control import HOLD, Commands, MotorCurves
 from calmotion.errors import ShotError, raise_all
-from calmotion.support.files import write_text
+from calmotion.support import write_text
 from numpy.typing import NDArray
 
 from .servos import Servo

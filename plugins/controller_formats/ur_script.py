@@ -6,10 +6,9 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-from calmotion.control.commands import FOLLOW, Commands, Follower, MotorCurves
+from calmotion.control import FOLLOW, Commands, Follower, MotorCurves
 from calmotion.errors import ShotError
-from calmotion.support.files import write_text
-from calmotion.support.naming import nearest
+from calmotion.support import nearest, write_text
 
 JOINTS = (
     "shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint",

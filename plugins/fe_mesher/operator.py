@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from calmotion.errors import ShotError, raise_all
 from calmotion.host import Operator, Property, RunContext
-from calmotion.mesh.tetrahedralize.tetwild import TIME_LIMIT
-from calmotion.model import Character, FEMeshes, ModelChoices
-from calmotion.model.model_choice import no_flexible_bodies
+from calmotion.mesh import TIME_LIMIT
+from calmotion.model import Character, FEMeshes, ModelChoices, no_flexible_bodies
 
 if TYPE_CHECKING:
-    from calmotion.mesh.patches.interface_patches import AttachmentFrame
-    from calmotion.mesh.sources.twins import Link
+    from calmotion.mesh import AttachmentFrame, Link
     from calmotion.model import Body, FEMesh
-    from calmotion.tolerance.meshes.options import MeshOptions, Volume
+    from calmotion.tolerance import MeshOptions, Volume
 
 
 class TetrahedralizeFlexibleBodies(Operator):
@@ -55,11 +53,9 @@ class TetrahedralizeFlexibleBodies(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         """The meshes, in the order of the bodies."""
         # manifold3d takes half a second to load: only for flexible bodies
-        from calmotion.mesh.sources.twins import twin_of
-        from calmotion.simulation.bodies import bodies_in_parallel
-        from calmotion.tolerance.meshes.accurate_mesh import frames_of
-        from calmotion.tolerance.meshes.body_mesh import mesh_of, twin_mesh
-        from calmotion.tolerance.meshes.options import MeshOptions
+        from calmotion.mesh import twin_of
+        from calmotion.simulation import bodies_in_parallel
+        from calmotion.tolerance import MeshOptions, frames_of, mesh_of, twin_mesh
 
         choices = context.get(ModelChoices)
         character = context.get(Character) if choices is None else choices.character
@@ -102,9 +98,8 @@ class TetrahedralizeFlexibleBodies(Operator):
 
 def _link(character: Character, index: int, geometry: FEMesh | Volume) -> Link | None:
     """What decides the mesh of a body; None where its tetrahedra are given."""
-    from calmotion.mesh.sources.twins import Link
-    from calmotion.tolerance.meshes.accurate_mesh import frames_of
-    from calmotion.tolerance.meshes.options import Volume
+    from calmotion.mesh import Link
+    from calmotion.tolerance import Volume, frames_of
 
     if not isinstance(geometry, Volume):
         return None
@@ -138,9 +133,8 @@ def _refuse_large_elements(body: Body, given: float) -> None:
 
 def _attachments(character: Character) -> dict[int, Sequence[AttachmentFrame]]:
     """Frames of the joints and targets of each flexible body; none where its joints are wrong, which others report."""
-    from calmotion.multibody.model.model import body_anchors
-    from calmotion.multibody.model.topology import span_tree
-    from calmotion.simulation.bodies import fem_anchors
+    from calmotion.multibody import body_anchors, span_tree
+    from calmotion.simulation import fem_anchors
 
     try:
         anchors = body_anchors(character, span_tree(character))
@@ -159,8 +153,7 @@ def _geometries(character: Character, flexible: Sequence[int], options: MeshOpti
     Raises:
         ShotError: What is wrong with any of them.
     """
-    from calmotion.tolerance.meshes.accurate_mesh import frames_of
-    from calmotion.tolerance.meshes.body_mesh import geometry_of
+    from calmotion.tolerance import frames_of, geometry_of
 
     geometries: dict[int, FEMesh | Volume] = {}
     problems = []

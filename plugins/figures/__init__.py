@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import Operator, Property, RunContext, registration
-from calmotion.model import Animation, Character, Result
-from calmotion.model.outputs import Figures, SystemModes
-from calmotion.model.run import OutputPaths
+from calmotion.model import Animation, Character, Figures, OutputPaths, Result, SystemModes
 
 
 class PlotFigures(Operator):

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from calmotion.model import Character, Result, Simulation
-from calmotion.model.motor import measure_of
-from calmotion.views.playback import sample_motion
-from calmotion.views.style import AFTER, BEFORE, INTENDED, LIMIT, SMALL, TEXT, new_figure, tidy, titles
+from calmotion.model import Character, Result, Simulation, measure_of
+from calmotion.views import AFTER, BEFORE, INTENDED, LIMIT, SMALL, TEXT, new_figure, sample_motion, tidy, titles
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from calmotion.errors import ShotError
-from calmotion.model import Animation, Character, Result
-from calmotion.model.outputs import SystemModes
-from calmotion.views.style import save
+from calmotion.model import Animation, Character, Result, SystemModes
+from calmotion.views import save
 
 from .curves import plot_convergence, plot_errors, plot_motors
 from .filmstrip import draw_filmstrip

@@ -7,11 +7,26 @@ from collections.abc import Sequence
 import numpy as np
 from calmotion.arrays import Array, Indices
 from calmotion.model import Animation, Character, Motion, Result, Simulation
-from calmotion.support.naming import distinct_names
-from calmotion.views.playback import sample_motion
-from calmotion.views.rendering import Camera, View, draw_over_ghost, fit_camera, floor_below, pose, prepare
-from calmotion.views.style import AFTER, BEFORE, INTENDED, NORMAL, SMALL, TEXT, new_figure
-from calmotion.views.viewpoint import choose_viewpoint, near_scenery
+from calmotion.support import distinct_names
+from calmotion.views import (
+    AFTER,
+    BEFORE,
+    INTENDED,
+    NORMAL,
+    SMALL,
+    TEXT,
+    Camera,
+    View,
+    choose_viewpoint,
+    draw_over_ghost,
+    fit_camera,
+    floor_below,
+    near_scenery,
+    new_figure,
+    pose,
+    prepare,
+    sample_motion,
+)
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 

@@ -8,9 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from calmotion.arrays import Array, Indices
 from calmotion.model import Motion
-from calmotion.views.raster import rasterize
-from calmotion.views.rendering import Camera, Mask, View, draw_over_ghost, pose
-from calmotion.views.style import INTENDED
+from calmotion.views import INTENDED, Camera, Mask, View, draw_over_ghost, pose, rasterize
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 

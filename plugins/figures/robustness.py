@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.model import Character
-from calmotion.model.robust.robots import Robustness
-from calmotion.views.style import AFTER, BEFORE, INTENDED, SMALL, new_figure, tidy, titles
+from calmotion.model import Character, Robustness
+from calmotion.views import AFTER, BEFORE, INTENDED, SMALL, new_figure, tidy, titles
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.model import Character, Result
-from calmotion.model.outputs import SystemModes
-from calmotion.views.spectrum import error_spectrum, highest_frequency
-from calmotion.views.style import LIMIT, SMALL, new_figure, tidy, titles
+from calmotion.model import Character, Result, SystemModes
+from calmotion.views import LIMIT, SMALL, error_spectrum, highest_frequency, new_figure, tidy, titles
 from matplotlib.figure import Figure
 
 from .curves import WIDTH, runs_of, worst_targets

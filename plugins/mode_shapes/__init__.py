@@ -6,11 +6,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import Operator, Property, RunContext, registration
-from calmotion.model import Character, FEMeshes, ModelChoices
-from calmotion.model.model_choice import no_flexible_bodies, run_settings, simplified_character
-from calmotion.model.outputs import ModeShapes
-from calmotion.model.run import OutputPaths, Source
-from calmotion.tolerance.reduced_bodies import ReducedBodies
+from calmotion.model import (
+    Character,
+    FEMeshes,
+    ModelChoices,
+    ModeShapes,
+    OutputPaths,
+    Source,
+    no_flexible_bodies,
+    run_settings,
+    simplified_character,
+)
+from calmotion.tolerance import ReducedBodies
 
 
 class WriteModeShapes(Operator):
@@ -33,7 +40,7 @@ class WriteModeShapes(Operator):
         return no_flexible_bodies(data) or missing
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.simulation.bodies import flexible_modes
+        from calmotion.simulation import flexible_modes
 
         from .writing import write_modes
 

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from calmotion.support.files import replaced
+from calmotion.support import replaced
 
 if TYPE_CHECKING:
-    from calmotion.mesh.quadratic import QuadraticMesh
+    from calmotion.mesh import QuadraticMesh
 
 COLUMNS = 4
 _WIDTH = 3.2  # of a panel [inch]

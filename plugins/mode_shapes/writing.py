@@ -11,15 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.model import Body
-from calmotion.reduction.damping import modal_damping
-from calmotion.reduction.inertia import inertia_integrals
-from calmotion.support.files import replaced, write_text
-from calmotion.support.naming import distinct_names
+from calmotion.reduction import inertia_integrals, modal_damping
+from calmotion.support import distinct_names, replaced, write_text
 
 from .picture import draw_modes
 
 if TYPE_CHECKING:
-    from calmotion.reduction.reduce import LinearModes
+    from calmotion.reduction import LinearModes
 
 SHOWN = 0.1  # largest displacement of a mode in the files, of the size of the body
 COLUMNS = ("body", "mode", "frequency_hz", "damping_ratio", "mass_x_kg", "mass_y_kg", "mass_z_kg", "mass_kg")

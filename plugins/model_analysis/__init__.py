@@ -8,13 +8,28 @@ from functools import partial
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.model import Animation, Character, ModelChoices, Result
-from calmotion.model.model_choice import AUTO, KINDS, OFF, ON, no_flexible_bodies, run_settings
-from calmotion.model.motor import PRESCRIBED
-from calmotion.model.outputs import MotorEffects, PlannedStep, ShapedTracks, Verification
-from calmotion.model.run import LONG_SHOT, OutputPaths, Source
-from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.tolerance.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
+from calmotion.model import (
+    AUTO,
+    KINDS,
+    LONG_SHOT,
+    OFF,
+    ON,
+    PRESCRIBED,
+    Animation,
+    Character,
+    ModelChoices,
+    MotorEffects,
+    OutputPaths,
+    PlannedStep,
+    Result,
+    ShapedTracks,
+    Source,
+    Verification,
+    no_flexible_bodies,
+    run_settings,
+)
+from calmotion.simulation import CompiledShot
+from calmotion.tolerance import ConvergedReduction, ReducedBodies, compiled_in
 
 _FORCED = {
     "bodies": "Finite elements of all flexible bodies, or of none",
@@ -52,9 +67,8 @@ class AnalyseShot(Operator):
     )  # fmt: skip
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.support.memory import available_memory
-        from calmotion.tolerance.cost import expected_cost, refuse_unaffordable
-        from calmotion.tolerance.simplification.analysis import analyse
+        from calmotion.support import available_memory
+        from calmotion.tolerance import analyse, expected_cost, refuse_unaffordable
 
         source, paths = context.get(Source), context.get(OutputPaths)
         forced = {kind: getattr(context.properties, kind) for kind in KINDS}
@@ -85,7 +99,7 @@ class RefineReduction(Operator):
         return "its plugin cannot repeat the reduction" if reduced is not None and reduced.reduction is None else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.tolerance.reduction import converged_reduction
+        from calmotion.tolerance import converged_reduction
 
         source, reduction = context.get(Source), context.get(ReducedBodies).reduction
         assert reduction is not None
@@ -120,12 +134,12 @@ class PlanStep(Operator):
         return None if free else f"{reason}, and motors alone determine the motion"
 
     def check(self, context: RunContext) -> None:
-        from calmotion.tolerance.run_checks import check_simulation
+        from calmotion.tolerance import check_simulation
 
         check_simulation(context.get(Character), context.get(Animation), run_settings(context.get(Source)))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.tolerance.simulation import planned_step
+        from calmotion.tolerance import planned_step
 
         context.progress(0.0, "simulating the shot as animated")
         options = run_settings(context.get(Source), context.get(ModelChoices))
@@ -134,7 +148,7 @@ class PlanStep(Operator):
 
 def _representative(context: RunContext) -> CompiledShot:
     """The shot, or of a long one its busiest part: `inspect` tells beforehand, and is not to take as long as a run."""
-    from calmotion.simulation.inputs.excerpts import busiest
+    from calmotion.simulation import busiest
 
     shot: CompiledShot = context.get(CompiledShot)
     part = busiest(shot.animation, LONG_SHOT)
@@ -169,12 +183,12 @@ class EstimateMotorEffects(Operator):
         return None
 
     def check(self, context: RunContext) -> None:
-        from calmotion.tolerance.run_checks import check_simulation
+        from calmotion.tolerance import check_simulation
 
         check_simulation(context.get(Character), context.get(Animation), run_settings(context.get(Source)))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.tolerance.motors.motor_effects import effects_of_gains
+        from calmotion.tolerance import effects_of_gains
 
         context.progress(0.0, "simulating the robot on motors that give")
         options = run_settings(context.get(Source), context.get(ModelChoices))
@@ -209,8 +223,7 @@ class VerifyResult(Operator):
         return NotAsked("no --verify is requested") if source is None or not source.verify else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.tolerance.verification.parts_in_time import Elsewhere
-        from calmotion.tolerance.verification.verify import verify
+        from calmotion.tolerance import Elsewhere, verify
 
         shot, shaped, reduced = compiled_in(context.get), context.get(ShapedTracks), context.get(ReducedBodies)
         if shaped is not None:
@@ -230,7 +243,7 @@ class VerifyResult(Operator):
         context: RunContext, function: Callable[..., Any], work: Sequence[tuple[Any, ...]]
     ) -> Iterator[tuple[int, Any]]:
         """The parts on the backend that the properties name, with the progress of their number."""
-        from calmotion.workflow.batch.workers import results_on
+        from calmotion.workflow import results_on
 
         chosen = context.properties
         for done, found in enumerate(results_on(chosen.on, chosen.workers or None, function, work), 1):

@@ -10,8 +10,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import MotorTracks
-from calmotion.support.files import refuse_special
-from calmotion.support.memory import available_memory, too_large
+from calmotion.support import available_memory, refuse_special, too_large
 
 TIME = "time_s"
 _OUTPUTS = (".x", ".y", ".z", ".error", ".rotation_error", ".input", ".output", ".effort")

@@ -20,8 +20,7 @@ from calmotion.recordings import (
     SensorRecording,
     hash_of,
 )
-from calmotion.support.naming import nearest
-from calmotion.support.reading import read_toml
+from calmotion.support import nearest, read_toml
 
 JOINTS, IMU, POSE = "sensor_msgs/JointState", "sensor_msgs/Imu", "geometry_msgs/PoseStamped"
 EXAMPLE = (

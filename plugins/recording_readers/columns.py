@@ -8,8 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.support.naming import nearest
-from calmotion.support.reading import read_text
+from calmotion.support import nearest, read_text
 
 MISSING = ("", "nan", "na", "null", "none", "-")
 UNITS: Mapping[str, float] = {

@@ -7,8 +7,7 @@ import os
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.recordings import MARKER, Channel, RecordingRequest, SensorRecording, hash_of
-from calmotion.support.naming import nearest
-from calmotion.support.reading import read_toml
+from calmotion.support import nearest, read_toml
 
 from .columns import UNITS
 

@@ -7,7 +7,7 @@ import os
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.recordings import ACCELEROMETER, Channel, RecordingRequest, SensorRecording, hash_of
-from calmotion.support.reading import read_toml
+from calmotion.support import read_toml
 
 from .columns import UNITS, column_of, increasing, read_columns
 

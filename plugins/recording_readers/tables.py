@@ -20,8 +20,7 @@ from calmotion.recordings import (
     SensorRecording,
     hash_of,
 )
-from calmotion.support.naming import nearest
-from calmotion.support.reading import read_toml
+from calmotion.support import nearest, read_toml
 
 from .columns import UNITS, column_of, increasing, read_columns, unit_of
 

@@ -9,8 +9,7 @@ import numpy as np
 import rerun as rr
 from calmotion.arrays import Array
 from calmotion.model import Body, Character, Motion, Result, SurfaceMesh
-from calmotion.views.playback import carriers, deformed_points, deviations, modes_of, relative_poses
-from calmotion.views.shading import split_at_creases
+from calmotion.views import carriers, deformed_points, deviations, modes_of, relative_poses, split_at_creases
 from numpy.typing import NDArray
 
 from .deviation import deviation_colors

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import Character, Motion, Result
-from calmotion.views.playback import deviations, modes_of
+from calmotion.views import deviations, modes_of
 from numpy.typing import NDArray
 
 from .layout import INPUT, STYLES

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import rerun.blueprint as rrb
-from calmotion.model import Animation, Character, Motor, Result
-from calmotion.model.motor import measure_of
-from calmotion.views.playback import sample_motion
-from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, moving_cloud, near_scenery
+from calmotion.model import Animation, Character, Motor, Result, measure_of
+from calmotion.views import choose_viewpoint, eye_that_sees, moving_cloud, near_scenery, sample_motion
 
 from .colors import BACKGROUND, Style
 

@@ -15,13 +15,9 @@ import rerun as rr
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.host import OperatorResult
-from calmotion.model import Animation, Character, Motion, Result, Simulation
-from calmotion.model.motor import measure_of
-from calmotion.model.outputs import SystemModes
-from calmotion.support.files import replaced
-from calmotion.support.naming import distinct_names
-from calmotion.views.playback import sample_motion
-from calmotion.views.spectrum import error_spectrum, highest_frequency
+from calmotion.model import Animation, Character, Motion, Result, Simulation, SystemModes, measure_of
+from calmotion.support import distinct_names, replaced
+from calmotion.views import error_spectrum, highest_frequency, sample_motion
 
 from .bodies import log_bodies, log_ghost, log_scenery
 from .colors import Style

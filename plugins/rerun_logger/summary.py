@@ -7,10 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.host import OperatorResult
-from calmotion.model import Character, Result, Simulation
-from calmotion.model.budget import verdict_on
-from calmotion.model.outputs import SystemModes
-from calmotion.support.naming import distinct_names
+from calmotion.model import Character, Result, Simulation, SystemModes, verdict_on
+from calmotion.support import distinct_names
 
 SHOWN_MODES = 6
 

@@ -6,7 +6,7 @@ import numpy as np
 import rerun as rr
 from calmotion.arrays import Array
 from calmotion.model import Character, Motion
-from calmotion.views.playback import sample_motion
+from calmotion.views import sample_motion
 from numpy.typing import NDArray
 
 from .colors import Style, fading

@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from calmotion.errors import ShotError
-from calmotion.support import files
-from calmotion.support.caching.cache_folder import cache_folder
+from calmotion.support import cache_folder, is_own, locked
+from calmotion.support import temporary_folder as folder_beside
 
 from .descriptions import URDF, Description
 
@@ -71,7 +71,7 @@ def converter_python(named: str | None, tell: Callable[[str], None]) -> str:
     if not _is_ready(folder):
         tell(f"making an environment for the converters of URDF and MJCF in {folder} (once, about a minute)")
         folder.parent.mkdir(parents=True, exist_ok=True)
-        with files.locked(folder.parent):  # the environment is not removed while another import makes it
+        with locked(folder.parent):  # the environment is not removed while another import makes it
             if not _is_ready(folder):
                 _make(folder)
     return str(_python_of(folder))
@@ -149,7 +149,7 @@ def _make(folder: Path) -> None:
 
 def _is_ready(folder: Path) -> bool:
     """Whether an environment is whole, and no other user can have changed what it runs."""
-    return (folder / _READY).is_file() and files.is_own(folder.stat())
+    return (folder / _READY).is_file() and is_own(folder.stat())
 
 
 def _supported_python() -> str | None:
@@ -192,5 +192,5 @@ def temporary_folder(beside: str) -> Iterator[str]:
     What killed processes left there is removed first."""
     parent = Path(os.path.abspath(beside)).parent
     parent.mkdir(parents=True, exist_ok=True)
-    with files.temporary_folder(parent) as folder:
+    with folder_beside(parent) as folder:
         yield str(folder)

@@ -9,9 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from calmotion.errors import ShotError, raise_all
-from calmotion.support.files import is_special, refuse_special
-from calmotion.support.foreign_files import remedy_for
-from calmotion.support.naming import nearest
+from calmotion.support import is_special, nearest, refuse_special, remedy_for
 
 from .mjcf import (
     refuse_curved_followers,

@@ -13,17 +13,12 @@ from typing import Any
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.host import Host, SettingError, has_no_unit, open_host, parse_quantity
-from calmotion.model import Animation, Character, MotorTracks
-from calmotion.model.run import Source
-from calmotion.rigging.materials import Material, material_named
-from calmotion.support.files import try_writing
-from calmotion.usd.layers import EXTENSIONS, refuse_input_as_output, write_layer
-from calmotion.usd.reading.shot import read_shot
-from calmotion.usd.writing.root import relative_asset
+from calmotion.model import Animation, Character, MotorTracks, Source
+from calmotion.rigging import Material, material_named
+from calmotion.support import try_writing
+from calmotion.usd import EXTENSIONS, read_shot, refuse_input_as_output, relative_asset, write_layer
 from calmotion.version import __version__
-from calmotion.workflow.materials import known_materials
-from calmotion.workflow.problems import problems_of, value_of
-from calmotion.workflow.shot import Given, Path, read_settings
+from calmotion.workflow import Given, Path, known_materials, problems_of, read_settings, value_of
 
 from .converters import BrokenMeshes, convert, converter_python, temporary_folder
 from .descriptions import USD, Description, read_description, repaired
@@ -55,7 +50,7 @@ class ImportedRobot:
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints."""
-        from calmotion.workflow.json_values import plain
+        from calmotion.workflow import plain
 
         character, frames = self.character, self.animation.frame_times
         report: dict[str, Any] = plain(

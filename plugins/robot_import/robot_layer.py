@@ -11,14 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from calmotion.errors import ShotError, raise_all
 from calmotion.model import MotorTracks
-from calmotion.rigging.materials import Material
-from calmotion.support.naming import nearest
-from calmotion.usd import stages
-from calmotion.usd.diagnostics import quiet
-from calmotion.usd.reading.context import is_rigid_body, prims_of
-from calmotion.usd.rigging.materials import author_material
-from calmotion.usd.schemas import is_applied
-from calmotion.usd.units import StageUnits, units_of
+from calmotion.rigging import Material
+from calmotion.support import nearest
+from calmotion.usd import StageUnits, author_material, is_applied, is_rigid_body, open_stage, prims_of, quiet, units_of
 
 from .robot_motors import author_motors, named, shift_limits
 
@@ -89,7 +84,7 @@ def robot_layer(converted: str, asset: str, options: RobotOptions) -> tuple[Sdf.
     """
     from pxr import Sdf, Usd
 
-    robot = stages.open_stage(converted)
+    robot = open_stage(converted)
     layer = Sdf.Layer.CreateAnonymous(".usda")
     layer.subLayerPaths = [os.path.abspath(converted)]
     with quiet():

@@ -10,15 +10,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from calmotion.errors import ShotError, raise_all
 from calmotion.model import MotorTracks
-from calmotion.support.naming import nearest
-from calmotion.usd import schemas
-from calmotion.usd.dialects import GEARS
-from calmotion.usd.reading.context import body_on, prims_of
-from calmotion.usd.reading.generic_joints import freedoms
-from calmotion.usd.reading.joints import joint_prims
-from calmotion.usd.reading.motors.driven_motors import actuated_joints
-from calmotion.usd.reading.motors.gears.coupling_joints import COUPLED, coupled, coupling_prims
-from calmotion.usd.units import StageUnits
+from calmotion.support import nearest
+from calmotion.usd import (
+    COUPLED,
+    GEARS,
+    GENERIC_JOINT,
+    SEVERAL_FREEDOMS,
+    TRANSLATIONS,
+    StageUnits,
+    actuated_joints,
+    body_on,
+    coupled,
+    coupling_prims,
+    freedoms,
+    is_applied,
+    joint_prims,
+    limits_of,
+    prims_of,
+)
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -65,7 +74,7 @@ class Axis:
     @property
     def linear(self) -> bool:
         """Whether it is a length."""
-        return self.drive == "linear" or self.drive in freedoms.TRANSLATIONS
+        return self.drive == "linear" or self.drive in TRANSLATIONS
 
     @property
     def _behind(self) -> str:
@@ -74,9 +83,9 @@ class Axis:
 
 def axes_of(prim: Usd.Prim) -> list[Axis]:
     """The directions in which a joint moves that motors can drive."""
-    if prim.GetTypeName() == freedoms.TYPE:
-        free = freedoms.freedoms(prim)
-        names = free.free if free.kind in (freedoms.SEVERAL, "spherical", "revolute", "prismatic") else ()
+    if prim.GetTypeName() == GENERIC_JOINT:
+        free = freedoms(prim)
+        names = free.free if free.kind in (SEVERAL_FREEDOMS, "spherical", "revolute", "prismatic") else ()
         return [Axis(prim, name, len(names) > 1) for name in names]
     drive = _DRIVES.get(str(prim.GetTypeName()))
     return [] if drive is None else [Axis(prim, drive)]
@@ -163,8 +172,8 @@ def _author(
 
 def _rest(axis: Axis) -> float:
     """The value nearest to 0 within the limits of a joint."""
-    names = freedoms.limits_of(axis.drive)
-    if axis.prim.GetTypeName() != freedoms.TYPE:
+    names = limits_of(axis.drive)
+    if axis.prim.GetTypeName() != GENERIC_JOINT:
         names = _LIMITS
     low, high = (attribute.Get() if (attribute := axis.prim.GetAttribute(name)) else None for name in names)
     low, high = (-np.inf if low is None else low), (np.inf if high is None else high)
@@ -212,7 +221,7 @@ def _is_driven(axis: Axis) -> bool:
     applied = [name for name in axis.prim.GetAppliedSchemas() if name.startswith("PhysicsDriveAPI:")]
     if applied:
         return f"PhysicsDriveAPI:{axis.drive}" in applied
-    return schemas.is_applied(axis.prim, "CalmMotorAPI")
+    return is_applied(axis.prim, "CalmMotorAPI")
 
 
 def _loop(stage: Usd.Stage) -> str | None:

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.model.outputs import Rig
-from calmotion.model.run import OutputPaths, Source
-from calmotion.rigging.materials import MATERIALS
+from calmotion.model import OutputPaths, Rig, Source
+from calmotion.rigging import MATERIALS
 
 
 class RigSkeleton(Operator):
@@ -47,7 +46,7 @@ class RigSkeleton(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         """The robot."""
         import numpy as np
-        from calmotion.usd.rigging import RigOptions, rig_shot
+        from calmotion.usd import RigOptions, rig_shot
 
         values, output = context.properties, context.get(OutputPaths).layer
         assert output is not None  # the command line requires it

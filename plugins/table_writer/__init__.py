@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, RunContext, registration
-from calmotion.model import Character, Result
-from calmotion.model.outputs import CsvFile
-from calmotion.model.run import OutputPaths
+from calmotion.model import Character, CsvFile, OutputPaths, Result
 
 
 class WriteTable(Operator):
@@ -26,7 +24,7 @@ class WriteTable(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """Write the table; its path."""
-        from calmotion.model.table import columns
+        from calmotion.model import columns
 
         from .table import write_table
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.support.files import replaced
+from calmotion.support import replaced
 
 AT_ONCE = 4096  # rows that are in memory at once
 

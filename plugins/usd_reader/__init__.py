@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from calmotion.host import Operator, RunContext, registration
-from calmotion.model import Animation, Character, Findings, MotorTracks, Provenance
-from calmotion.model.run import OutputPaths, Source
+from calmotion.model import Animation, Character, Findings, MotorTracks, OutputPaths, Provenance, Source
 
 
 class ReadShot(Operator):
@@ -21,9 +20,8 @@ class ReadShot(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         """The character, its animation and its provenance."""
         # pxr loads in a third of a second: only when a shot is read
-        from calmotion.model.character import with_ideal_motors
-        from calmotion.usd.reading import read_shot
-        from calmotion.usd.writing import refuse_inputs
+        from calmotion.model import with_ideal_motors
+        from calmotion.usd import read_shot, refuse_inputs
 
         source = context.get(Source)
         # `inspect` accepts a robot without animation
@@ -50,7 +48,7 @@ class ValidateShot(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """The findings."""
-        from calmotion.usd.validation import validate_shot
+        from calmotion.usd import validate_shot
 
         return (validate_shot(context.get(Source).path),)
 

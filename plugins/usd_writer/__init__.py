@@ -6,12 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from calmotion.host import Operator, Property, RunContext, registration
-from calmotion.model import Animation, Character, Provenance, Result
-from calmotion.model.outputs import WrittenLayer
-from calmotion.model.run import OutputPaths, Source
+from calmotion.model import Animation, Character, OutputPaths, Provenance, Result, Source, WrittenLayer
 
 if TYPE_CHECKING:
-    from calmotion.usd.writing import WriteOptions
+    from calmotion.usd import WriteOptions
 
 _PLACES = {"bodies": "the transforms of its bodies", "skeleton": "its skeleton"}  # of curves that no drive holds
 
@@ -55,7 +53,7 @@ class WriteResult(Operator):
 
     def check(self, context: RunContext) -> None:
         """Options that fit each other and the motors whose curves may change."""
-        from calmotion.usd.writing import motors_that_may_change, refuse_bake, refuse_foreign_root, refuse_options
+        from calmotion.usd import motors_that_may_change, refuse_bake, refuse_foreign_root, refuse_options
 
         paths = context.get(OutputPaths)
         if paths is not None and paths.layer is not None:
@@ -69,7 +67,7 @@ class WriteResult(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """The paths of both layers."""
-        from calmotion.usd.writing import motors_that_may_change, sampled_at_frames, write_result
+        from calmotion.usd import motors_that_may_change, sampled_at_frames, write_result
 
         options, result = self._options(context), context.get(Result)
         for motor in sampled_at_frames(options, motors_that_may_change(context.get(Character)) if result.after else ()):
@@ -86,7 +84,7 @@ class WriteResult(Operator):
 
     @staticmethod
     def _options(context: RunContext) -> WriteOptions:
-        from calmotion.usd.writing import WriteOptions
+        from calmotion.usd import WriteOptions
 
         values = context.properties
         rate = values.samples_per_second

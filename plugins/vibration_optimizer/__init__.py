@@ -8,14 +8,23 @@ from typing import Any
 
 from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.model import Animation, Character, ModelChoices, Result
-from calmotion.model.model_choice import run_settings, simplified_character, with_choices
-from calmotion.model.outputs import ShapedTracks
-from calmotion.model.result import is_exceeded, is_reached
-from calmotion.model.robust.settings import RobustSettings
-from calmotion.model.run import OutputPaths, Source
-from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.tolerance.reduced_bodies import ConvergedReduction, compiled_in
+from calmotion.model import (
+    Animation,
+    Character,
+    ModelChoices,
+    OutputPaths,
+    Result,
+    RobustSettings,
+    ShapedTracks,
+    Source,
+    is_exceeded,
+    is_reached,
+    run_settings,
+    simplified_character,
+    with_choices,
+)
+from calmotion.simulation import CompiledShot
+from calmotion.tolerance import ConvergedReduction, compiled_in
 
 
 def _options(context: RunContext, **more: Any) -> Any:
@@ -25,10 +34,8 @@ def _options(context: RunContext, **more: Any) -> Any:
 
 def _with_budget(context: RunContext, result: Result, **more: float) -> Result:
     """The result with the decisions on the model, its error budget, and the parts of motors and links in its error."""
-    from calmotion.retargeting.found_curves import best_so_far
-    from calmotion.tolerance.error_budget import with_budget
-    from calmotion.tolerance.motors.backlash import with_lost_motion
-    from calmotion.tolerance.motors.motor_effects import with_error_shares
+    from calmotion.retargeting import best_so_far
+    from calmotion.tolerance import with_budget, with_error_shares, with_lost_motion
 
     shot, tolerance = compiled_in(context.get), context.get(Source).settings.tolerance
     try:
@@ -79,7 +86,7 @@ class ShapeTracks(Operator):
         return NotAsked("no --shaper is requested") if source is None or not source.shaper else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.simulation.simulate import shape_tracks
+        from calmotion.simulation import shape_tracks
 
         kind, cutoff = context.get(Source).shaper or "", context.properties.cutoff
         return [ShapedTracks(shape_tracks(compiled_in(context.get), _options(context), kind, cutoff))]
@@ -100,14 +107,14 @@ class SimulateShot(Operator):
         return _wrong_command(data, "simulate")
 
     def check(self, context: RunContext) -> None:
-        from calmotion.tolerance.run_checks import check_simulation
+        from calmotion.tolerance import check_simulation
 
         character, animation = _input(context)
         if character is not None and animation is not None:
             check_simulation(character, animation, _options(context))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.tolerance.simulation import simulate_to_tolerance
+        from calmotion.tolerance import simulate_to_tolerance
 
         shot, shaped, converged = compiled_in(context.get), context.get(ShapedTracks), context.get(ConvergedReduction)
         if shaped is not None:
@@ -222,17 +229,20 @@ class OptimizeShot(Operator):
         return _wrong_command(data, "optimize")
 
     def check(self, context: RunContext) -> None:
-        from calmotion.retargeting.run_checks import check_search
+        from calmotion.retargeting import check_search
 
         character, animation = _input(context)
         if character is not None and animation is not None:
             check_search(character, animation, self._search_options(context))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retargeting.checkpoint import checkpoint_path, remove_checkpoint
-        from calmotion.retargeting.to_tolerance import optimize_to_tolerance
-        from calmotion.retargeting.windows.plan import least_gain
-        from calmotion.retargeting.windows.store import windows_path
+        from calmotion.retargeting import (
+            checkpoint_path,
+            least_gain,
+            optimize_to_tolerance,
+            remove_checkpoint,
+            windows_path,
+        )
 
         options = self._search_options(context)
         paths = context.get(OutputPaths)

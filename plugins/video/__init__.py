@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.model import Animation, Character, Result
-from calmotion.model.outputs import Video
-from calmotion.model.run import OutputPaths
+from calmotion.model import Animation, Character, OutputPaths, Result, Video
 
 
 class WriteVideo(Operator):

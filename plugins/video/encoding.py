@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.support.files import replaced
+from calmotion.support import replaced
 from PIL import Image
 
 WEBP, MP4 = ".webp", ".mp4"

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from calmotion.model import Animation, Character, Result, Simulation
-from calmotion.multibody.parallel import in_parallel
-from calmotion.support.naming import distinct_names
+from calmotion.multibody import in_parallel
+from calmotion.support import distinct_names
 from PIL import Image, ImageDraw
 
 from .chart import FAINT, GRID, INK, Chart, Color, Curve, draw_chart, font

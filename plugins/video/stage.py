@@ -7,9 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import Animation, Character, Motion, Result, Simulation
-from calmotion.views.playback import sample_motion
-from calmotion.views.rendering import Camera, Model, View, draw_over_ghost, fit_camera, floor_below, prepare
-from calmotion.views.viewpoint import choose_viewpoint, moving_cloud, near_scenery
+from calmotion.views import (
+    Camera,
+    Model,
+    View,
+    choose_viewpoint,
+    draw_over_ghost,
+    fit_camera,
+    floor_below,
+    moving_cloud,
+    near_scenery,
+    prepare,
+    sample_motion,
+)
 from PIL import Image, ImageDraw
 
 from .timeline import Moment, Worst

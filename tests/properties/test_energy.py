@@ -16,7 +16,7 @@ from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from energies import energy, work
 from hypothesis import assume, given
 from hypothesis import strategies as st

@@ -15,7 +15,7 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from pxr import Usd, UsdGeom
 from scipy.spatial.transform import Rotation
 from standing_barkour import LEGS, RATE, ease, stand

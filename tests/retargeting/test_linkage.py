@@ -7,7 +7,7 @@ from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.solver.damping_homotopy import FAR, damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
-from calmotion.simulation.prepare import modes_of, prepare
+from calmotion.simulation.preparation import modes_of, prepare
 from made_shots import soft_linkage_shot
 from posed import ignore_progress
 

@@ -10,7 +10,7 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from calmotion.simulation.target_errors import Objective
 
 

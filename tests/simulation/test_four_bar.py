@@ -12,7 +12,7 @@ from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.intended_motion import rigid_motion
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from four_bar import COUPLER, CRANK, GROUND, ROCKER, corners, four_bar
 
 

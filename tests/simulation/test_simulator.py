@@ -12,7 +12,7 @@ from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from calmotion.simulation.simulator import Simulator
 from linkage_arm import linkage_arm, performance
 from posed import looped, make_problem

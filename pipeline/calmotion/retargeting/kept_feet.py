@@ -5,7 +5,7 @@ from __future__ import annotations
 from calmotion.retargeting.problem.ground import ground_bounds, ground_of
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.simulation.prepare import Prepared
+from calmotion.simulation.preparation import Prepared
 from calmotion.simulation.standing.ground_limits import ground_limits
 
 

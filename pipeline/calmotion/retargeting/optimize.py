@@ -36,7 +36,7 @@ from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.inputs.open_chains import refuse_open_joints
 from calmotion.simulation.inputs.supported import refuse_half_turns
 from calmotion.simulation.motor_limits import Excess, excesses, motor_bounds
-from calmotion.simulation.prepare import Prepared, failure_error, lowest_frequency, prepare
+from calmotion.simulation.preparation import Prepared, failure_error, lowest_frequency, prepare
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import compile_kernels

@@ -19,7 +19,7 @@ from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.simulation.bodies import bodies_in_parallel, full_model_of, reduce_bodies
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
-from calmotion.simulation.prepare import grid_of
+from calmotion.simulation.preparation import grid_of
 from calmotion.simulation.rigid_run import shot_load_envelopes
 
 if TYPE_CHECKING:

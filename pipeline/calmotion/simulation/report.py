@@ -19,7 +19,7 @@ from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.intended_motion import rigid_motion, rigid_targets
 from calmotion.simulation.motor_limits import Excess
-from calmotion.simulation.prepare import Prepared
+from calmotion.simulation.preparation import Prepared
 from calmotion.simulation.target_errors import IntendedMotion, rotation_errors
 from calmotion.support.naming import distinct_names
 

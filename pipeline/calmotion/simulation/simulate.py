@@ -24,7 +24,7 @@ from calmotion.simulation.inputs.shapers import shaped
 from calmotion.simulation.inputs.supported import refuse_half_turns
 from calmotion.simulation.intended_motion import rigid_motion, static_motion
 from calmotion.simulation.motor_limits import excesses, motor_bounds
-from calmotion.simulation.prepare import Prepared, failure_error, modes_of, prepare
+from calmotion.simulation.preparation import Prepared, failure_error, modes_of, prepare
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.target_errors import IntendedMotion, Objective
 

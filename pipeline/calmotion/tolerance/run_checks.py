@@ -10,7 +10,7 @@ from calmotion.model.run import RunSettings
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.inputs.supported import refuse_fast_motors, refuse_half_turns, refuse_unsupported
 from calmotion.simulation.inputs.time_grid import TimeGrid
-from calmotion.simulation.prepare import grid_of
+from calmotion.simulation.preparation import grid_of
 from calmotion.tolerance.step_choice import FIRST, LAST, chooses_step
 
 

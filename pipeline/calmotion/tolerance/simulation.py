@@ -22,7 +22,7 @@ from calmotion.simulation.bodies import mode_tables
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.time_grid import MAX_STEP
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from calmotion.simulation.simulate import Progress, intended_motion, simulate_shot
 from calmotion.tolerance.integrator_choice import by_fast_scheme
 from calmotion.tolerance.meshes.mesh_budget import mesh_error, patch_error

@@ -20,7 +20,7 @@ from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import AT_ONCE, ForwardRun, reactions_at, run_forward, run_in_pieces
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.open_chains import open_joints
-from calmotion.simulation.prepare import Prepared, failure_error, prepare
+from calmotion.simulation.preparation import Prepared, failure_error, prepare
 from calmotion.simulation.report import elastic_by_body
 from calmotion.tolerance.integrator_choice import SAFE
 

@@ -2,3 +2,7 @@
 
 Nothing here prints or reads arguments of a command line. `import calmotion` offers the names that users need.
 """
+
+from calmotion.public_names import public_names
+
+__getattr__, __dir__ = public_names(__name__)

@@ -100,7 +100,7 @@ def parameter_arguments(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.workflow.shot import with_shot
+    from calmotion.workflow import with_shot
 
     from ..workflow.calibrate import calibrate
 

@@ -54,7 +54,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.workflow.shot import with_shot
+    from calmotion.workflow import with_shot
 
     from ..workflow.refine import refine
 

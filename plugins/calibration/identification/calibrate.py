@@ -10,13 +10,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model.run import RunSettings
-from calmotion.multibody.failure import SimulationFailure
-from calmotion.multibody.integrators.coefficients import IMPLICIT
+from calmotion.model import RunSettings
+from calmotion.multibody import IMPLICIT, SimulationFailure
 from calmotion.recordings import UNITS, SensorRecording
-from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.simulation.inputs.time_grid import MAX_STEP
-from calmotion.simulation.prepare import failure_error, prepare
+from calmotion.simulation import MAX_STEP, CompiledShot, failure_error, prepare
 
 from ..model.estimates import (
     CLOCK_DRIFT,

@@ -15,7 +15,7 @@ from calmotion.arrays import Array, BoolArray
 from calmotion.errors import ShotError, raise_all
 from calmotion.model import Character
 from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER, Channel, SensorRecording
-from calmotion.support.naming import nearest
+from calmotion.support import nearest
 
 from ..model.estimates import BIAS, CLOCK_DRIFT, CLOCK_OFFSET, PLACE
 from .parameters import PRIORS, Parameter

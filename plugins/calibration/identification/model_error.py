@@ -17,10 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.multibody.failure import SimulationFailure
-from calmotion.multibody.parallel import in_parallel
-from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.reduction.scaled_stiffness import with_mode_stiffness, with_scaled_stiffness
+from calmotion.multibody import SimulationFailure, in_parallel
+from calmotion.reduction import ReducedBody, with_mode_stiffness, with_scaled_stiffness
 
 from .robots import robot_at
 from .signals import signals_of

@@ -12,10 +12,10 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.model.motor import DRIVE, PRESCRIBED, SERVO, Motor
-from calmotion.retargeting.robust.scenarios import payload_bodies
-from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.support.naming import nearest
+from calmotion.model import DRIVE, PRESCRIBED, SERVO, Motor
+from calmotion.retargeting import payload_bodies
+from calmotion.simulation import CompiledShot
+from calmotion.support import nearest
 
 from ..model.estimates import (
     ARMATURE,

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model.run import RunSettings
-from calmotion.multibody.failure import SimulationFailure
-from calmotion.multibody.parallel import in_parallel
-from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.support import interrupts
+from calmotion.model import RunSettings
+from calmotion.multibody import SimulationFailure, in_parallel
+from calmotion.simulation import CompiledShot
+from calmotion.support import check
 
 from .measurement import Measurement
 from .parameters import Parameter
@@ -100,7 +99,7 @@ class Calibrated:
             ShotError: It cannot be simulated.
             SimulationFailure: A step fails.
         """
-        interrupts.check()
+        check()
         x = z[: len(self.parameters)]
         if self._last is None or not np.array_equal(self._last[0], x):
             self._last = x.copy(), self._simulated(x)

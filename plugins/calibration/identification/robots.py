@@ -7,13 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.model import Body
-from calmotion.model.character import ElasticMaterial
-from calmotion.model.motor import Motor
-from calmotion.reduction.reduced_body import Invariants, ReducedBody
-from calmotion.reduction.scaled_stiffness import with_graded_stiffness, with_scaled_density, with_scaled_stiffness
-from calmotion.simulation.bodies import with_material_damping
-from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
+from calmotion.model import Body, ElasticMaterial, Motor
+from calmotion.reduction import (
+    Invariants,
+    ReducedBody,
+    with_graded_stiffness,
+    with_scaled_density,
+    with_scaled_stiffness,
+)
+from calmotion.simulation import CompiledShot, compile_shot, with_material_damping
 
 from ..model.estimates import (
     ARMATURE,

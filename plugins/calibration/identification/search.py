@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.multibody.failure import SimulationFailure
-from calmotion.multibody.parallel import in_parallel
+from calmotion.multibody import SimulationFailure, in_parallel
 
 from ..model.estimates import DAMPING, GEAR_STIFFNESS, MODULUS, POSITION_GAIN
 from .least_squares import Solution, chord, loss_of, minimize, posterior, weights_of

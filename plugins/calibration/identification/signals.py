@@ -8,19 +8,10 @@ from functools import cached_property
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import Animation
-from calmotion.model.curves import curve_of
-from calmotion.model.run import RunSettings
-from calmotion.multibody.analysis.reactions import reactions
-from calmotion.multibody.failure import NOWHERE, Reason, SimulationFailure
-from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.motors.drives import joint_values
+from calmotion.model import Animation, RunSettings, curve_of
+from calmotion.multibody import NOWHERE, Reason, SimulationFailure, Workspace, joint_values, reactions
 from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER
-from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.simulation.forward import ForwardRun, run_forward
-from calmotion.simulation.inputs.curves import AT_REST
-from calmotion.simulation.inputs.time_grid import over_grid
-from calmotion.simulation.prepare import Prepared, prepare
+from calmotion.simulation import AT_REST, CompiledShot, ForwardRun, Prepared, over_grid, prepare, run_forward
 from scipy.interpolate import CubicSpline, make_interp_spline
 from scipy.spatial.transform import Rotation
 

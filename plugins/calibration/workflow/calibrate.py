@@ -9,15 +9,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from calmotion.host import SettingError, Settings, merge, nearest, quantity_of
-from calmotion.model import Animation, Character, Provenance
-from calmotion.model.outputs import WrittenLayer
-from calmotion.model.run import OutputPaths, RunSettings, Source
-from calmotion.multibody.integrators.coefficients import IMPLICIT
+from calmotion.model import Animation, Character, OutputPaths, Provenance, RunSettings, Source, WrittenLayer
+from calmotion.multibody import IMPLICIT
 from calmotion.recordings import SensorRecording, measured_prims, read_recordings
-from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.tolerance.reduced_bodies import ConvergedReduction, compiled_in
-from calmotion.workflow.run import Hooks, Outcome, Progress, again, carry_out
-from calmotion.workflow.shot import Given, Path, Shot, read_settings
+from calmotion.simulation import CompiledShot
+from calmotion.tolerance import ConvergedReduction, compiled_in
+from calmotion.workflow import Given, Hooks, Outcome, Path, Progress, Shot, again, carry_out, read_settings
 
 from ..identification.calibrate import CalibrationSettings, calibrate_shot
 from ..identification.measurement import refuse_unknown_channels
@@ -134,7 +131,7 @@ def calibrate(
 
     def tell(fraction: float, message: str) -> None:
         if cancel is not None and cancel():
-            from calmotion.workflow.problems import Cancelled
+            from calmotion.workflow import Cancelled
 
             raise Cancelled(f"{opened.path}: cancelled")
         if progress is not None:
@@ -158,7 +155,7 @@ def compiled_with_sensors(
     """A run that compiles the shot, after everything was refused that does not fit."""
     source = Source("", "", options, measured=measured_prims(recordings))
     if layer is not None:
-        from calmotion.workflow.outputs import refuse_unwritable
+        from calmotion.workflow import refuse_unwritable
 
         refuse_unwritable(layer)
     first = carry_out(
@@ -169,7 +166,7 @@ def compiled_with_sensors(
     refuse_unknown_channels(character, recordings)
     refuse_long(recordings, float(first.require(Animation).frame_times[-1]))
     if layer is not None:
-        from calmotion.usd.writing.result import refuse_inputs
+        from calmotion.usd import refuse_inputs
 
         refuse_inputs(first.require(Provenance), layer)
     outcome = carry_out(
@@ -183,7 +180,7 @@ def compiled_with_sensors(
 def with_sensors(shot: Shot | Path) -> Shot:
     """The shot, to be read again: the prims of sensors are targets of this reading alone."""
     if not isinstance(shot, Shot):
-        from calmotion.workflow.shot import with_shot
+        from calmotion.workflow import with_shot
 
         return Shot(with_shot(os.fspath(shot)))
     return shot.unread()

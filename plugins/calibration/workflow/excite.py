@@ -11,12 +11,10 @@ from typing import Any
 
 from calmotion.errors import ShotError
 from calmotion.host import SettingError, parse_quantity, quantity_of
-from calmotion.model import Character, Provenance
-from calmotion.model.run import RunSettings
+from calmotion.model import Character, Provenance, RunSettings
 from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER
-from calmotion.tolerance.reduced_bodies import compiled_in
-from calmotion.workflow.run import Hooks, Progress
-from calmotion.workflow.shot import Given, Path, Shot, read_settings
+from calmotion.tolerance import compiled_in
+from calmotion.workflow import Given, Hooks, Path, Progress, Shot, read_settings
 
 from ..identification.excitation.design import ExcitationSettings, blank_recordings, excite_shot
 from ..identification.parameters import DEFAULT, refuse_unknown
@@ -47,7 +45,7 @@ class ExcitedShot:
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints."""
         from calmotion.version import __version__
-        from calmotion.workflow.json_values import plain
+        from calmotion.workflow import plain
 
         found = self.excitation
         report: dict[str, Any] = plain(
@@ -130,7 +128,7 @@ def excite(
 
     def tell(fraction: float, message: str) -> None:
         if cancel is not None and cancel():
-            from calmotion.workflow.problems import Cancelled
+            from calmotion.workflow import Cancelled
 
             raise Cancelled("cancelled")
         if progress is not None:
@@ -149,7 +147,7 @@ def excite(
         options, tell,
     )  # fmt: skip
     if target is not None:
-        from calmotion.usd.writing.performances import write_performance
+        from calmotion.usd import write_performance
 
         write_performance(target, outcome.require(Provenance), character, (found.times, found.values), {})
     return ExcitedShot(found, target, time.perf_counter() - begin)

@@ -10,15 +10,10 @@ from typing import Any
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.model.run import OutputPaths, RunSettings
-from calmotion.retargeting.robust.measure import errors_on
-from calmotion.retargeting.robust.scenarios import random_scenarios, uncertain_parameters
-from calmotion.tolerance.reduced_bodies import compiled_in
-from calmotion.tolerance.simulation import found_tracks
-from calmotion.workflow.commands import optimize, simulate
-from calmotion.workflow.results import OptimizationResult, SimulationResult
-from calmotion.workflow.run import Progress
-from calmotion.workflow.shot import Given, Path, Shot
+from calmotion.model import OutputPaths, RunSettings
+from calmotion.retargeting import errors_on, random_scenarios, uncertain_parameters
+from calmotion.tolerance import compiled_in, found_tracks
+from calmotion.workflow import Given, OptimizationResult, Path, Progress, Shot, SimulationResult, optimize, simulate
 
 from ..identification.parameters import DEFAULT
 from .calibrate import CalibratedShot, calibrate
@@ -55,7 +50,7 @@ class RefinedShot:
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints."""
-        from calmotion.workflow.json_values import plain
+        from calmotion.workflow import plain
 
         found, played = self.optimized.report(), self.played.report()
         errors = {row["path"]: row["max_error_m"] for row in played["targets"]}
@@ -153,8 +148,8 @@ def refine(
 
 def _refuse(shot: str, layer: str) -> None:
     """Refuse what the last step would refuse, before the first one writes the model."""
-    from calmotion.usd.writing.root import refuse_layers_of
-    from calmotion.workflow.outputs import refuse_unwritable
+    from calmotion.usd import refuse_layers_of
+    from calmotion.workflow import refuse_unwritable
 
     refuse_unwritable(layer)
     refuse_layers_of(shot, layer)
@@ -162,10 +157,10 @@ def _refuse(shot: str, layer: str) -> None:
 
 def takes_of(root: str) -> int:
     """Number of takes that a shot carries."""
-    from calmotion.usd import stages
+    from calmotion.usd import CALIBRATION, open_stage, role_of
 
-    stage = stages.open_stage(root)  # its layers live as long as it does
-    return sum(stages.role_of(layer) == stages.CALIBRATION for layer in stage.GetLayerStack())
+    stage = open_stage(root)  # its layers live as long as it does
+    return sum(role_of(layer) == CALIBRATION for layer in stage.GetLayerStack())
 
 
 def expected_errors(optimized: OptimizationResult, draws: int = DRAWS) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from calmotion.model.outputs import WrittenLayer
+from calmotion.model import WrittenLayer
 from calmotion.version import __version__
 
 from ..model.estimates import Calibration
@@ -15,7 +15,7 @@ def calibration_report(
     calibration: Calibration, layer: WrittenLayer | None, figures: tuple[str, ...], total_wall_s: float
 ) -> dict[str, Any]:
     """The object that `calibrate --json` prints: plain values, keys as in the USD contract."""
-    from calmotion.workflow.json_values import plain
+    from calmotion.workflow import plain
 
     report: dict[str, Any] = plain(
         {

@@ -13,7 +13,7 @@ from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion, static_motion
 from calmotion.simulation.motor_limits import motor_bounds
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from calmotion.simulation.target_errors import Objective
 
 FINE_FRAMES = np.arange(181) / 120.0

@@ -7,7 +7,7 @@ from calmotion.model import MotorCurve, Result, Simulation, Track
 from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from calmotion.simulation.report import performed_motion
 from calmotion.usd.reading import read_shot
 from calmotion.usd.reading.skeletons import bound_skeletons

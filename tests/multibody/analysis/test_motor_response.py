@@ -14,7 +14,7 @@ from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.intended_motion import rigid_motion
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from linkage_arm import linkage_arm, performance
 from scipy.spatial.transform import Rotation
 

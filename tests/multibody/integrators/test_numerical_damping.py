@@ -10,7 +10,7 @@ from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.simulation.body_reduction import BodyReduction
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 
 PERIODS = 10
 

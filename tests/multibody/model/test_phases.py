@@ -21,7 +21,7 @@ from calmotion.multibody.sensitivity.linearization import linearize
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from calmotion.simulation.simulator import Simulator
 from pxr import Gf, UsdPhysics
 from steppers import FRAMES, LEGS, ROBOT, TORSO, giving, walk, write_stepper

@@ -15,7 +15,7 @@ from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.motor_limits import Bounds
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from calmotion.simulation.simulate import intended_motion
 from calmotion.simulation.standing.held_feet import held_feet
 from steppers import LEGS, ROBOT, giving, write_stepper

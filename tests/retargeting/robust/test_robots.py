@@ -5,7 +5,7 @@ from calmotion.model.robust.robots import Scenario
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.robust.robots import robots_of
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from posed import make_problem
 
 

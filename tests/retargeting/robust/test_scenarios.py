@@ -18,7 +18,7 @@ from calmotion.retargeting.robust.scenarios import (
     uncertain_parameters,
 )
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.simulation.prepare import pose_modes
+from calmotion.simulation.preparation import pose_modes
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from calmotion.retargeting.robust.scenarios import uncertain_parameters
 from calmotion.retargeting.robust.worst_case import WorstCase
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from calmotion.tolerance.simulation import found_tracks
 from posed import ignore_progress, looped
 

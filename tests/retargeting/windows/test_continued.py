@@ -12,7 +12,7 @@ from calmotion.retargeting.windows.parts import part_of
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from long_moves import long_moves
 
 FIRST, LAST = 20, 45  # frames

@@ -13,7 +13,7 @@ from calmotion.retargeting.problem.posing import pose
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from calmotion.simulation.simulate import intended_motion
 
 RATIO = -0.6

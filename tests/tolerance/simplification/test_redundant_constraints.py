@@ -6,7 +6,7 @@ import pytest
 from calmotion.model import Motor
 from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
-from calmotion.simulation.prepare import grid_of
+from calmotion.simulation.preparation import grid_of
 from calmotion.simulation.rigid_run import rigid_bodies, rigid_poses
 from calmotion.tolerance.simplification.redundant_constraints import Closures, closures_of
 from linkage_arm import linkage_arm, performance

@@ -79,7 +79,7 @@ class Scene:
         from calmotion.multibody.integrators.workspace import Workspace
         from calmotion.simulation.forward import run_forward
         from calmotion.simulation.inputs.curves import sample_tracks
-        from calmotion.simulation.prepare import prepare
+        from calmotion.simulation.preparation import prepare
 
         options = RunSettings(step=step, pre_roll=0.0, integrator=integrator)
         prepared = prepare(self.compiled, options)

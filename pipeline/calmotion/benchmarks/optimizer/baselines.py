@@ -26,7 +26,7 @@ from calmotion.retargeting.solver.gauss_newton import minimize
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.shapers import best_delay, delay, shaped
-from calmotion.simulation.prepare import modes_of, prepare
+from calmotion.simulation.preparation import modes_of, prepare
 from calmotion.simulation.simulator import Simulator
 
 

@@ -25,7 +25,7 @@ from calmotion.benchmarks.optimizer.optimizer import make_problem
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 
 STEPS = (1, 2, 4, 8)  # in a 240th of a second
 FINER = 4

@@ -32,7 +32,7 @@ from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion
-from calmotion.simulation.prepare import Prepared, lowest_frequency, prepare
+from calmotion.simulation.preparation import Prepared, lowest_frequency, prepare
 from calmotion.simulation.target_errors import Objective
 
 CLOSE = 1.01  # objectives within this factor of the converged one count as reached

@@ -24,7 +24,7 @@ from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.motor_limits import Bounds, motor_bounds
-from calmotion.simulation.prepare import Prepared
+from calmotion.simulation.preparation import Prepared
 from calmotion.simulation.simulator import Simulator
 from calmotion.simulation.target_errors import IntendedMotion, Objective
 

@@ -18,7 +18,7 @@ from calmotion.multibody.sensitivity.linearization import processors
 from calmotion.retargeting.robust.scenarios import shot_of
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import Simulator
 from calmotion.support import interrupts

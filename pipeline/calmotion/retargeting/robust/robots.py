@@ -9,7 +9,7 @@ from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.robust.scenarios import shot_of
-from calmotion.simulation.prepare import Prepared, prepare
+from calmotion.simulation.preparation import Prepared, prepare
 from calmotion.simulation.simulate import intended_motion
 from calmotion.simulation.simulator import Simulator
 from calmotion.simulation.target_errors import Objective

@@ -39,7 +39,7 @@ from calmotion.retargeting.robust.weighted_errors import WeightedErrors
 from calmotion.retargeting.robust.work import Work
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.prepare import prepare
+from calmotion.simulation.preparation import prepare
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.support import interrupts
 

@@ -20,7 +20,7 @@ from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.motor_limits import excesses, motor_bounds
-from calmotion.simulation.prepare import Prepared
+from calmotion.simulation.preparation import Prepared
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion
 from calmotion.simulation.target_errors import IntendedMotion, Objective
 

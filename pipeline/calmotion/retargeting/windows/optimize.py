@@ -28,7 +28,7 @@ from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import Curves, sample_curves
 from calmotion.simulation.inputs.open_chains import CLOSED, refuse_open_joints
 from calmotion.simulation.inputs.supported import refuse_half_turns
-from calmotion.simulation.prepare import Prepared, failure_error, modes_of, prepare
+from calmotion.simulation.preparation import Prepared, failure_error, modes_of, prepare
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import compile_kernels
 from calmotion.simulation.target_errors import IntendedMotion

@@ -16,7 +16,7 @@ from calmotion.simulation.forward import ForwardRun, run_forward
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.excerpts import later
 from calmotion.simulation.inputs.time_grid import TimeGrid, over_grid
-from calmotion.simulation.prepare import Prepared
+from calmotion.simulation.preparation import Prepared
 from calmotion.simulation.report import at_instants, simulation_of
 from calmotion.simulation.target_errors import IntendedMotion
 

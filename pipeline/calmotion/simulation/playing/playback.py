@@ -18,7 +18,7 @@ from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.supported import refuse_half_turns
 from calmotion.simulation.inputs.time_grid import MAX_STEP, TimeGrid, pre_roll_weights
-from calmotion.simulation.prepare import Prepared, failure_error, prepare
+from calmotion.simulation.preparation import Prepared, failure_error, prepare
 
 STEPS = 8  # of a simulation within a period of the commands, whose corners it must resolve
 SHORTEST = 2.5e-4  # step for such corners [s]; those of faster commands are far above what moves a robot

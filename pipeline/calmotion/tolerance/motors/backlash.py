@@ -24,7 +24,7 @@ from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.kernels.so3 import matrix_of
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.intended_motion import rigid_motion
-from calmotion.simulation.prepare import Prepared, prepare
+from calmotion.simulation.preparation import Prepared, prepare
 
 _QUIET = 0.02  # of a gear's largest torque: less does not move it to its other side
 

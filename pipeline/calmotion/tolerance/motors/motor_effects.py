@@ -22,7 +22,7 @@ from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.prepare import Prepared, failure_error, prepare
+from calmotion.simulation.preparation import Prepared, failure_error, prepare
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.tolerance.integrator_choice import by_fast_scheme
 from calmotion.tolerance.simulation import own_step

@@ -21,7 +21,7 @@ from calmotion.model import Animation
 from calmotion.model.curves import held_curve
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.excerpts import later
-from calmotion.simulation.prepare import pose_modes
+from calmotion.simulation.preparation import pose_modes
 from calmotion.support.processes.workers import Fault
 from calmotion.tolerance.step_error import distance
 

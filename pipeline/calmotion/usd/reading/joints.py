@@ -40,7 +40,7 @@ class JointPrim:
     Attributes:
         prim: The Usd.Prim, None for a joint that the reader added.
         path: Its path.
-        kind: `revolute`, `prismatic`, `spherical`, `fixed` or `floating`; `freedoms.SEVERAL` before
+        kind: `revolute`, `prismatic`, `spherical`, `fixed` or `floating`; `freedoms.SEVERAL_FREEDOMS` before
             `chains.expanded`; or `UNSUPPORTED`, which matters only where the joint is part of the character.
         body0, body1: Paths of the bodies, empty for the world.
         frame0, frame1: Frames in them, m.
@@ -116,13 +116,13 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
         )
     kind, limits = _KINDS.get(str(prim.GetTypeName()), UNSUPPORTED), _LIMITS
     free: tuple[str, ...] = ()
-    if prim.GetTypeName() == freedoms.TYPE:
+    if prim.GetTypeName() == freedoms.GENERIC_JOINT:
         found = freedoms.freedoms(prim)
         kind, drive, axis, limits, free = found.kind, found.freedom, found.axis, found.limits, found.free
         if not kind:
             reading.note(f"{path}: it leaves all directions free and nothing drives it, so it is left out")
             return None
-        if kind != freedoms.SEVERAL:
+        if kind != freedoms.SEVERAL_FREEDOMS:
             reading.note(f"{path}: a generic joint, {kind} by the directions that it locks")
     else:
         drive, axis = _DRIVES.get(kind, ""), _axis(prim) if kind in _WITH_AXIS else ""
@@ -141,7 +141,7 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
         body0, body1 = body1, body0
         position0, position1 = position1, position0
         rotation0, rotation1 = rotation1, rotation0
-        turn = turn @ HALF_TURN if kind != freedoms.SEVERAL else turn
+        turn = turn @ HALF_TURN if kind != freedoms.SEVERAL_FREEDOMS else turn
     return JointPrim(
         prim,
         path,
@@ -154,8 +154,8 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
         upper,
         prim.GetAttribute("physics:excludeFromArticulation").Get() is True,
         drive,
-        free if kind == freedoms.SEVERAL else (),
-        turned and kind == freedoms.SEVERAL,
+        free if kind == freedoms.SEVERAL_FREEDOMS else (),
+        turned and kind == freedoms.SEVERAL_FREEDOMS,
     )
 
 

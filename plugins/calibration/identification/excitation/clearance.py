@@ -13,16 +13,10 @@ from itertools import product
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.mesh.surfaces.distances import triangle_parts
-from calmotion.model import Character
-from calmotion.model.character import Body
-from calmotion.model.run import RunSettings
-from calmotion.multibody.analysis.kinematics import rigid_poses
-from calmotion.multibody.model.model import moves_freely
-from calmotion.multibody.model.topology import Tree
-from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.prepare import prepare
+from calmotion.mesh import triangle_parts
+from calmotion.model import Body, Character, RunSettings
+from calmotion.multibody import Tree, moves_freely, rigid_poses
+from calmotion.simulation import CompiledShot, prepare, sample_tracks
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 

@@ -16,13 +16,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import Animation, Track
-from calmotion.model.motor import SERVO
-from calmotion.model.run import RunSettings
-from calmotion.multibody.failure import SimulationFailure
+from calmotion.model import SERVO, Animation, RunSettings, Track
+from calmotion.multibody import SimulationFailure
 from calmotion.recordings import COMPONENTS, Channel, SensorRecording
-from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.simulation.prepare import pose_modes
+from calmotion.simulation import CompiledShot, pose_modes
 
 from ...model.estimates import ROBOT_KINDS
 from ...model.excitation import Clear, Excitation, MotorUse, PlannedSensor, Predicted

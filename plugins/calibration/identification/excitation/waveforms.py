@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
-from calmotion.model import Animation, Character
-from calmotion.model.curves import curve_of
-from calmotion.simulation.inputs.gearing import coupling_of, leaders
+from calmotion.model import Animation, Character, curve_of
+from calmotion.simulation import coupling_of, leaders
 
 TONES = 5
 RAMP, LONGEST_RAMP = 0.2, 0.6  # of the length, in which the motion fades in and out, and most [s]

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.model import Character
-from calmotion.model.tolerance import reach
+from calmotion.model import Character, reach
 from calmotion.recordings import ANGLE, MARKER, SensorRecording
 
 from ..signals import Signals

@@ -8,7 +8,7 @@ from calmotion.model.motor import DRIVE
 from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.simulation.prepare import pose_modes
+from calmotion.simulation.preparation import pose_modes
 from calmotion_plugins.calibration.identification.robots import robot_with
 from calmotion_plugins.calibration.model.estimates import CENTRE, DAMPING, DELAY, DENSITY, ENCODER_OFFSET, MASS, MODULUS
 

@@ -14,7 +14,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import Frame
 from calmotion.usd.reading.context import Reading
-from calmotion.usd.reading.generic_joints.freedoms import SEVERAL, TRANSLATIONS
+from calmotion.usd.reading.generic_joints.freedoms import SEVERAL_FREEDOMS, TRANSLATIONS
 from calmotion.usd.reading.joints import HALF_TURN, JointPrim, axis_limits
 from calmotion.usd.transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
 
@@ -50,7 +50,7 @@ def expanded(
     found: list[JointPrim] = []
     between: dict[str, Between] = {}
     for joint in joints:
-        if joint.kind != SEVERAL:
+        if joint.kind != SEVERAL_FREEDOMS:
             found.append(joint)
             continue
         found += axis_joints(joint, reading.units.length(1.0))

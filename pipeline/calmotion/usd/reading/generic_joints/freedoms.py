@@ -15,10 +15,10 @@ from calmotion.usd import schemas
 if TYPE_CHECKING:
     from pxr import Usd
 
-TYPE = "PhysicsJoint"
+GENERIC_JOINT = "PhysicsJoint"
 NO_ROTATION, NO_TRANSLATION = 1e-2, 1e-5  # play of a locked direction [deg], [stage length]
 TRANSLATIONS, ROTATIONS = ("transX", "transY", "transZ"), ("rotX", "rotY", "rotZ")
-SEVERAL = "several"  # kind of a joint that is made of hinges and sliders
+SEVERAL_FREEDOMS = "several"  # kind of a joint that is made of hinges and sliders
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class Freedoms:
     """A joint by what it leaves free.
 
     Attributes:
-        kind: `revolute`, `prismatic`, `spherical`, `fixed` or `SEVERAL`; empty where it leaves everything free and
-            nothing drives it, so that it joins nothing.
+        kind: `revolute`, `prismatic`, `spherical`, `fixed` or `SEVERAL_FREEDOMS`; empty where it leaves everything free
+            and nothing drives it, so that it joins nothing.
         free: The free directions, translations before rotations.
     """
 
@@ -66,7 +66,7 @@ def freedoms(prim: Usd.Prim) -> Freedoms:
             return Freedoms("", free)
         if free == ROTATIONS:
             return Freedoms("spherical", free)
-    return Freedoms(SEVERAL, free)
+    return Freedoms(SEVERAL_FREEDOMS, free)
 
 
 def _is_driven(prim: Usd.Prim, name: str) -> bool:

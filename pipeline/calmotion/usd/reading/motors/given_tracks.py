@@ -61,10 +61,10 @@ def length_note(given: MotorTracks, frames: Array) -> str:
 def _paths(prim: Usd.Prim) -> list[str]:
     """The path of a joint, or those of its axes where it has several."""
     path = str(prim.GetPath())
-    if prim.GetTypeName() != freedoms.TYPE:
+    if prim.GetTypeName() != freedoms.GENERIC_JOINT:
         return [path]
     found = freedoms.freedoms(prim)
-    return [f"{path}.{name}" for name in found.free] if found.kind == freedoms.SEVERAL else [path]
+    return [f"{path}.{name}" for name in found.free] if found.kind == freedoms.SEVERAL_FREEDOMS else [path]
 
 
 def given_track(given: MotorTracks, joint: JointPrim) -> Track:

@@ -81,7 +81,7 @@ def refuse_connection(path: str, attribute: Any) -> None:
 
 def _remedy(joint: JointPrim, name: str) -> str:
     direction = name.split(":")[1]
-    if joint.prim.GetTypeName() == freedoms.TYPE:
+    if joint.prim.GetTypeName() == freedoms.GENERIC_JOINT:
         wanted = f"Lock all directions but {direction} by PhysicsLimitAPIs (low above high)"
         return f"{wanted}, or animate {_TARGET_POSITION.format(joint.drive)}" if joint.drive else wanted
     if joint.drive:

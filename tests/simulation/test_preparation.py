@@ -6,7 +6,7 @@ from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.open_chains import open_joints
-from calmotion.simulation.prepare import failure_error, prepare
+from calmotion.simulation.preparation import failure_error, prepare
 
 
 @pytest.fixture(scope="module")

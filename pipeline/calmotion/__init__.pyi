@@ -1,0 +1,33 @@
+"""Public names of `calmotion`: each is imported when it is first used."""
+
+from calmotion.errors import ShotError as ShotError
+from calmotion.host.errors import SettingError as SettingError
+from calmotion.model.run import OutputPaths as OutputPaths
+from calmotion.version import __version__ as __version__
+from calmotion.workflow.batch.report import BatchResult as BatchResult
+from calmotion.workflow.batch.report import JobResult as JobResult
+from calmotion.workflow.batch.run import batch as batch
+from calmotion.workflow.commands import inspect as inspect
+from calmotion.workflow.commands import optimize as optimize
+from calmotion.workflow.commands import rig as rig
+from calmotion.workflow.commands import simulate as simulate
+from calmotion.workflow.commands import verify as verify
+from calmotion.workflow.exporting.export import Export as Export
+from calmotion.workflow.exporting.export import export as export
+from calmotion.workflow.inspection import Inspection as Inspection
+from calmotion.workflow.installation.warmup import Warmup as Warmup
+from calmotion.workflow.installation.warmup import warmup as warmup
+from calmotion.workflow.problems import Cancelled as Cancelled
+from calmotion.workflow.problems import RunError as RunError
+from calmotion.workflow.publishing.gate import publishing_problems as publishing_problems
+from calmotion.workflow.publishing.manifest import write_manifest as write_manifest
+from calmotion.workflow.results import MotorMotion as MotorMotion
+from calmotion.workflow.results import OptimizationResult as OptimizationResult
+from calmotion.workflow.results import RobotMotion as RobotMotion
+from calmotion.workflow.results import SimulationResult as SimulationResult
+from calmotion.workflow.results import TargetMotion as TargetMotion
+from calmotion.workflow.run import Progress as Progress
+from calmotion.workflow.sequence.run import Repertoire as Repertoire
+from calmotion.workflow.sequence.run import sequence as sequence
+from calmotion.workflow.shot import Shot as Shot
+from calmotion.workflow.shot import open_shot as open_shot

@@ -1,0 +1,31 @@
+"""Public names of `calmotion.cli`: each is imported when it is first used."""
+
+from calmotion.cli.options import assignments as assignments
+from calmotion.cli.options import count_of as count_of
+from calmotion.cli.options import json_option as json_option
+from calmotion.cli.options import opened_shot as opened_shot
+from calmotion.cli.options import plugin_option as plugin_option
+from calmotion.cli.options import progress_display as progress_display
+from calmotion.cli.options import quantity as quantity
+from calmotion.cli.options import report_options as report_options
+from calmotion.cli.options import run_arguments as run_arguments
+from calmotion.cli.options import run_options as run_options
+from calmotion.cli.options import shot_arguments as shot_arguments
+from calmotion.cli.options import simulation_arguments as simulation_arguments
+from calmotion.cli.options import simulation_options as simulation_options
+from calmotion.cli.output import FAILED as FAILED
+from calmotion.cli.output import INTERRUPTED as INTERRUPTED
+from calmotion.cli.output import Output as Output
+from calmotion.cli.output import conclude as conclude
+from calmotion.cli.output import notice as notice
+from calmotion.cli.output import print_error as print_error
+from calmotion.cli.parser import entry as entry
+from calmotion.cli.progress import ProgressDisplay as ProgressDisplay
+from calmotion.cli.quantities import angle as angle
+from calmotion.cli.quantities import counted as counted
+from calmotion.cli.quantities import length as length
+from calmotion.cli.quantities import measured as measured
+from calmotion.cli.quantities import quantity_in as quantity_in
+from calmotion.cli.tables import console_on as console_on
+from calmotion.cli.tables import print_table as print_table
+from calmotion.cli.tables import say as say

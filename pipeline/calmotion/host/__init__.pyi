@@ -1,0 +1,32 @@
+"""Public names of `calmotion.host`: each is imported when it is first used."""
+
+from calmotion.host.errors import HostError as HostError
+from calmotion.host.errors import PlanError as PlanError
+from calmotion.host.errors import PluginError as PluginError
+from calmotion.host.errors import SettingError as SettingError
+from calmotion.host.manifest import Manifest as Manifest
+from calmotion.host.manifest import read_manifest as read_manifest
+from calmotion.host.operators import NotAsked as NotAsked
+from calmotion.host.operators import Operator as Operator
+from calmotion.host.operators import Record as Record
+from calmotion.host.operators import RunContext as RunContext
+from calmotion.host.operators import registration as registration
+from calmotion.host.plan import Plan as Plan
+from calmotion.host.properties import Property as Property
+from calmotion.host.properties import PropertyValues as PropertyValues
+from calmotion.host.registry import Host as Host
+from calmotion.host.registry import Plugin as Plugin
+from calmotion.host.registry import PluginState as PluginState
+from calmotion.host.registry import open_host as open_host
+from calmotion.host.run import OperatorResult as OperatorResult
+from calmotion.host.run import Outcome as Outcome
+from calmotion.host.run import Reuse as Reuse
+from calmotion.host.run import Run as Run
+from calmotion.host.settings import Settings as Settings
+from calmotion.host.settings import merge as merge
+from calmotion.host.settings import read_assignment as read_assignment
+from calmotion.host.settings import read_settings_file as read_settings_file
+from calmotion.host.units import has_no_unit as has_no_unit
+from calmotion.host.units import parse_quantity as parse_quantity
+from calmotion.host.units import quantity_of as quantity_of
+from calmotion.support.naming import nearest as nearest

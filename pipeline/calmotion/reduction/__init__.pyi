@@ -1,0 +1,12 @@
+"""Public names of `calmotion.reduction`: each is imported when it is first used."""
+
+from calmotion.reduction.damping import modal_damping as modal_damping
+from calmotion.reduction.inertia import inertia_integrals as inertia_integrals
+from calmotion.reduction.reduce import LinearModes as LinearModes
+from calmotion.reduction.reduced_body import Invariants as Invariants
+from calmotion.reduction.reduced_body import ReducedBody as ReducedBody
+from calmotion.reduction.scaled_stiffness import with_graded_stiffness as with_graded_stiffness
+from calmotion.reduction.scaled_stiffness import with_mode_stiffness as with_mode_stiffness
+from calmotion.reduction.scaled_stiffness import with_scaled_density as with_scaled_density
+from calmotion.reduction.scaled_stiffness import with_scaled_stiffness as with_scaled_stiffness
+from calmotion.reduction.soft_bodies import refuse_soft_bodies as refuse_soft_bodies

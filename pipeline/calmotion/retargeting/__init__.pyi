@@ -1,0 +1,13 @@
+"""Public names of `calmotion.retargeting`: each is imported when it is first used."""
+
+from calmotion.retargeting.checkpoint import checkpoint_path as checkpoint_path
+from calmotion.retargeting.checkpoint import remove_checkpoint as remove_checkpoint
+from calmotion.retargeting.found_curves import best_so_far as best_so_far
+from calmotion.retargeting.robust.measure import errors_on as errors_on
+from calmotion.retargeting.robust.scenarios import payload_bodies as payload_bodies
+from calmotion.retargeting.robust.scenarios import random_scenarios as random_scenarios
+from calmotion.retargeting.robust.scenarios import uncertain_parameters as uncertain_parameters
+from calmotion.retargeting.run_checks import check_search as check_search
+from calmotion.retargeting.to_tolerance import optimize_to_tolerance as optimize_to_tolerance
+from calmotion.retargeting.windows.plan import least_gain as least_gain
+from calmotion.retargeting.windows.store import windows_path as windows_path

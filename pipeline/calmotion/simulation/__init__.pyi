@@ -1,0 +1,37 @@
+"""Public names of `calmotion.simulation`: each is imported when it is first used."""
+
+from calmotion.simulation.bodies import bodies_in_parallel as bodies_in_parallel
+from calmotion.simulation.bodies import fem_anchors as fem_anchors
+from calmotion.simulation.bodies import flexible_modes as flexible_modes
+from calmotion.simulation.bodies import mode_tables as mode_tables
+from calmotion.simulation.bodies import weak_seat_notes as weak_seat_notes
+from calmotion.simulation.bodies import with_elasticity as with_elasticity
+from calmotion.simulation.bodies import with_material_damping as with_material_damping
+from calmotion.simulation.body_reduction import BodyReduction as BodyReduction
+from calmotion.simulation.body_reduction import reduction_for as reduction_for
+from calmotion.simulation.compiled_shot import CompiledShot as CompiledShot
+from calmotion.simulation.compiled_shot import compile_shot as compile_shot
+from calmotion.simulation.forward import ForwardRun as ForwardRun
+from calmotion.simulation.forward import run_forward as run_forward
+from calmotion.simulation.inputs.curves import AT_REST as AT_REST
+from calmotion.simulation.inputs.curves import sample_tracks as sample_tracks
+from calmotion.simulation.inputs.excerpts import busiest as busiest
+from calmotion.simulation.inputs.gearing import coupling_of as coupling_of
+from calmotion.simulation.inputs.gearing import leaders as leaders
+from calmotion.simulation.inputs.supported import refuse_unsupported as refuse_unsupported
+from calmotion.simulation.inputs.time_grid import MAX_STEP as MAX_STEP
+from calmotion.simulation.inputs.time_grid import over_grid as over_grid
+from calmotion.simulation.playing.body_poses import LocalPoses as LocalPoses
+from calmotion.simulation.playing.body_poses import body_tree as body_tree
+from calmotion.simulation.playing.body_poses import local_poses as local_poses
+from calmotion.simulation.playing.body_poses import motor_values as motor_values
+from calmotion.simulation.playing.body_poses import near_turn as near_turn
+from calmotion.simulation.playing.parallel_frames import ParallelSkeleton as ParallelSkeleton
+from calmotion.simulation.playing.parallel_frames import euler_angles as euler_angles
+from calmotion.simulation.playing.parallel_frames import interpolated_values as interpolated_values
+from calmotion.simulation.playing.parallel_frames import parallel_skeleton as parallel_skeleton
+from calmotion.simulation.preparation import Prepared as Prepared
+from calmotion.simulation.preparation import failure_error as failure_error
+from calmotion.simulation.preparation import pose_modes as pose_modes
+from calmotion.simulation.preparation import prepare as prepare
+from calmotion.simulation.simulate import shape_tracks as shape_tracks

@@ -1,0 +1,37 @@
+"""Public names of `calmotion.views`: each is imported when it is first used."""
+
+from calmotion.views.playback import carriers as carriers
+from calmotion.views.playback import deformed_points as deformed_points
+from calmotion.views.playback import deviations as deviations
+from calmotion.views.playback import modes_of as modes_of
+from calmotion.views.playback import relative_poses as relative_poses
+from calmotion.views.playback import sample_motion as sample_motion
+from calmotion.views.raster import rasterize as rasterize
+from calmotion.views.rendering import Camera as Camera
+from calmotion.views.rendering import Mask as Mask
+from calmotion.views.rendering import Model as Model
+from calmotion.views.rendering import View as View
+from calmotion.views.rendering import draw_over_ghost as draw_over_ghost
+from calmotion.views.rendering import fit_camera as fit_camera
+from calmotion.views.rendering import floor_below as floor_below
+from calmotion.views.rendering import pose as pose
+from calmotion.views.rendering import prepare as prepare
+from calmotion.views.shading import split_at_creases as split_at_creases
+from calmotion.views.spectrum import error_spectrum as error_spectrum
+from calmotion.views.spectrum import highest_frequency as highest_frequency
+from calmotion.views.style import AFTER as AFTER
+from calmotion.views.style import BEFORE as BEFORE
+from calmotion.views.style import INTENDED as INTENDED
+from calmotion.views.style import LIMIT as LIMIT
+from calmotion.views.style import NORMAL as NORMAL
+from calmotion.views.style import SMALL as SMALL
+from calmotion.views.style import TEXT as TEXT
+from calmotion.views.style import new_figure as new_figure
+from calmotion.views.style import save as save
+from calmotion.views.style import short as short
+from calmotion.views.style import tidy as tidy
+from calmotion.views.style import titles as titles
+from calmotion.views.viewpoint import choose_viewpoint as choose_viewpoint
+from calmotion.views.viewpoint import eye_that_sees as eye_that_sees
+from calmotion.views.viewpoint import moving_cloud as moving_cloud
+from calmotion.views.viewpoint import near_scenery as near_scenery

@@ -1,0 +1,27 @@
+"""Public names of `calmotion_plugins.calibration`: each is imported when it is first used."""
+
+from collections.abc import Callable
+
+from calmotion.host import Host, Operator
+
+from .identification.calibrate import CalibrationSettings as CalibrationSettings
+from .identification.calibrate import calibrate_shot as calibrate_shot
+from .identification.parameters import robot_parameters as robot_parameters
+from .identification.robots import Robot as Robot
+from .identification.robots import robot_with as robot_with
+from .identification.signals import Signals as Signals
+from .identification.signals import signals_of as signals_of
+from .model.estimates import HIGHER_MODES as HIGHER_MODES
+from .model.estimates import Calibration as Calibration
+from .model.estimates import CalibrationFigures as CalibrationFigures
+from .workflow.calibrate import CalibratedShot as CalibratedShot
+from .workflow.calibrate import calibrate as calibrate
+from .workflow.excite import ExcitedShot as ExcitedShot
+from .workflow.excite import excite as excite
+from .workflow.refine import RefinedShot as RefinedShot
+from .workflow.refine import refine as refine
+
+class PlotCalibration(Operator): ...
+
+register: Callable[[Host], None]
+unregister: Callable[[Host], None]
