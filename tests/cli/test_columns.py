@@ -51,6 +51,8 @@ def test_help_and_lists(lines_of, command):
 def test_help_of_a_benchmark(name, monkeypatch, capsys):
     from importlib import import_module
 
+    if name == "calibration":
+        pytest.importorskip("calmotion_plugins.calibration")
     monkeypatch.setenv("COLUMNS", str(WIDTH))
     with pytest.raises(SystemExit):
         import_module(f"calmotion.benchmarks.{BENCHMARKS[name]}").main(["--help"])

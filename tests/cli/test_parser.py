@@ -9,7 +9,8 @@ from calmotion.cli import parser as texts
 from calmotion.cli.commands.table import all_commands
 from calmotion.cli.main import build_parser, main
 
-EXAMPLES = {name: getattr(command.load(), "EXAMPLES", ()) for name, command in all_commands().items()}
+PRESENT = {name: command for name, command in all_commands().items() if not command.disabled}
+EXAMPLES = {name: getattr(command.load(), "EXAMPLES", ()) for name, command in PRESENT.items()}
 COMMANDS = next(action for action in build_parser()._actions if action.choices and "inspect" in action.choices).choices
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import calmotion as cm
 import numpy as np
 import pytest
-from calmotion.model import MotorCurve
+from calmotion.model import Frame, MotorCurve
 from calmotion.model.curves import commanded_curves
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import read_shot
@@ -18,7 +18,7 @@ from pxr import Gf, Sdf, UsdGeom, UsdPhysics
 from scipy.spatial.transform import Rotation
 from small_shots import ELBOW, FORE, FRAMES, LENGTH, UPPER, make_target, write_arm
 
-STILL = cm.shot.Frame(np.zeros(3), np.array([1.0, 0, 0, 0]))
+STILL = Frame(np.zeros(3), np.array([1.0, 0, 0, 0]))
 PHASE = 2.0 * np.pi * np.arange(FRAMES + 1) / FRAMES
 CURVES = {"rotX": 25.0 * (1.0 - np.cos(PHASE)), "rotY": 15.0 * np.sin(PHASE) ** 3, "rotZ": -20.0 * np.sin(PHASE) ** 3}
 
