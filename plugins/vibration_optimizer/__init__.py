@@ -175,7 +175,7 @@ class OptimizeShot(Operator):
             "scenarios",
             int,
             7,
-            minimum=3,
+            minimum=1,
             maximum=999,
             description="Number of these robots; with 1 + 2 n for n uncertain parameters they have their covariance",
         ),
@@ -214,13 +214,6 @@ class OptimizeShot(Operator):
             maximum=99,
             description="Number of further robust curves that are told, each of which may be twice as far off on the "
             "model as the one before",
-        ),
-        Property(
-            "bound",
-            bool,
-            False,
-            description="Tell an error below which no curves can bring the largest one on these robots; takes about as "
-            "long as the robust search",
         ),
     )
 
@@ -291,9 +284,7 @@ class OptimizeShot(Operator):
             window=values.window if values.window >= 0.0 else None,
             robust=None
             if values.robust == "off"
-            else RobustSettings(
-                values.robust, values.scenarios, values.draws, values.nominal_error, values.tradeoff, values.bound
-            ),
+            else RobustSettings(values.robust, values.scenarios, values.draws, values.nominal_error, values.tradeoff),
         )
 
 

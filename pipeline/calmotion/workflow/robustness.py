@@ -46,6 +46,5 @@ def robustness_report(result: Result) -> dict[str, Any]:
             }
             for row in found.compromises
         ],
-        "least_possible_m": found.least_possible,
         "failed_draws": {name: int(np.sum(~np.isfinite(found.drawn[name]).all(axis=1))) for name in CURVES},
     }

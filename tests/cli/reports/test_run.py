@@ -134,15 +134,18 @@ def test_curves_on_random_robots_are_a_table():
     stream = io.StringIO()
     names = ("nominal_max_error_m", "p95_max_error_m", "worst_max_error_m")
     between = {"nominal_allowed_m": 2e-3, **{name: [v] for name, v in zip(names, (2e-3, 6e-3, 7e-3), strict=True)}}
-    report = {"scenarios": [], "draws": 200, "targets": [target], "tradeoff": [between], "least_possible_m": None}
+    report = {"scenarios": [], "draws": 200, "targets": [target], "tradeoff": [between]}
     print_robustness(console_on(stream), report)
     text = stream.getvalue()
     assert "Largest error on 200 random robots" in text and "failed" in text
     assert [line.split()[-2:] for line in text.splitlines()[-3:]] == [["9", "mm"], ["5", "mm"], ["7", "mm"]]
-    assert "model within 2 mm" in text and "No curves" not in text
+    assert "model within 2 mm" in text and "no robust curves" not in text
     stream = io.StringIO()
-    print_robustness(console_on(stream), report | {"least_possible_m": 4.5e-3})
-    assert "below 4.5 mm while the model" in " ".join(stream.getvalue().split())
+    kept = target | {"robustness": rows | {"robust": rows["nominal"]}}
+    print_robustness(console_on(stream), report | {"targets": [kept]})
+    assert "no robust curves were found: the layer has the curves optimised for the model" in " ".join(
+        stream.getvalue().split()
+    )
     stream = io.StringIO()
     print_robustness(console_on(stream), {"targets": []})
     assert stream.getvalue() == ""

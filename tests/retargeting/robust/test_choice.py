@@ -53,6 +53,13 @@ def test_the_nominal_robot_is_first_and_others_are_opposite_pairs(shot):
     assert sorted(away) == pytest.approx([REACH / 2, REACH / 2, REACH, REACH])
 
 
+@pytest.mark.parametrize("kind", ["worst", "mean"])
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_robot_alone_is_the_nominal_one(shot, kind, count):
+    (alone,) = chosen(shot, count, kind)
+    assert not alone.factors and alone.weight == 1.0
+
+
 def test_a_mean_over_the_robots_is_that_of_their_distribution(shot):
     parameters = uncertain_parameters(shot)
     found = chosen(shot, 3, "mean")

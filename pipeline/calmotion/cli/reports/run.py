@@ -177,12 +177,11 @@ def print_robustness(console: Console, report: dict[str, Any]) -> None:
             rows.append([target["path"], f"model within {length(row['nominal_allowed_m'])}", told[0], "", *told[1:]])
     title = f"Largest error on {report['draws']} random robots"
     print_table(console, title, ["target", "curves", "model", "median", "95%", "worst"], rows, texts=2)
-    if report["least_possible_m"] is not None:
-        least = length(report["least_possible_m"])
-        console.print(
-            f"No curves of these motors bring the largest error below {least} while the model "
-            "is off by no more than with the robust ones (by linear models, with the knots of these curves; errors and "
-            "turns of targets count as they weigh)."
+    if all(target["robustness"]["robust"] == target["robustness"]["nominal"] for target in report["targets"]):
+        say(
+            console,
+            "no robust curves were found: the layer has the curves optimised for the model, since none that leave as "
+            "little error on it as allowed leave less on the robots that differ",
         )
 
 

@@ -51,8 +51,6 @@ class Robustness:
         drawn: The same on random robots that the optimisation did not see, shape [draws, K]; infinite where a robot
             could not be simulated.
         compromises: Curves of larger and larger errors on the nominal robot.
-        least_possible: Largest weighted error on the random robots below which no curves can bring it, with errors on
-            the nominal robot as allowed, or as those of the robust curves [m]; None where it is not known.
     """
 
     kind: str
@@ -60,4 +58,3 @@ class Robustness:
     nominal: Mapping[str, Array]
     drawn: Mapping[str, Array]
     compromises: tuple[Compromise, ...] = ()
-    least_possible: float | None = None

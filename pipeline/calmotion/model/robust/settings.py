@@ -41,7 +41,6 @@ class RobustSettings:
             tolerance; curves for the nominal robot alone may have more.
         tradeoff: Number of further curves, each of which may be twice as far off on the nominal robot as the one
             before.
-        bound: Whether a bound is worked out below which no curves can bring the largest error.
     """
 
     kind: str = WORST
@@ -49,4 +48,3 @@ class RobustSettings:
     draws: int = 200
     nominal_error: float = 2.0
     tradeoff: int = 0
-    bound: bool = False

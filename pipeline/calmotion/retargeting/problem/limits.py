@@ -79,12 +79,6 @@ class LimitTerms:
         derivative: Array = self.rho * self.h * (upper - lower) / self.bounds[name].scale
         return derivative
 
-    def multiplied(self, name: str, v: Array) -> float:
-        """The excess of a quantity over its limits times the multipliers that it leads to."""
-        sides = self._sides(name, v)
-        multipliers = self.rho * self.h * np.maximum(0.0, sides + self.multipliers[name])
-        return float(np.sum(multipliers * np.where(multipliers > 0.0, sides - MARGIN, 0.0)))
-
     def curvature(self, name: str, v: Array) -> Array:
         """Second derivative of the terms where they act, shape [T, M]."""
         if not self.on:
@@ -99,7 +93,7 @@ class LimitTerms:
 
     def excess(self, values: dict[str, Array]) -> float:
         """Largest excess over the narrowed limits; at most 0 if all are kept."""
-        return max(float(np.max(self._sides(name, values[name]))) for name in self.bounds)
+        return max((float(np.max(self._sides(name, values[name]))) for name in self.bounds), default=-np.inf)
 
     def tighten(self, values: dict[str, Array]) -> bool:
         """Switch the terms on if limits are violated, or update the multipliers at a minimum with the terms.

@@ -35,7 +35,11 @@ CLOSENESS_OF_COMMANDS = 3e-6  # the same where motors give: commands are ahead o
 
 
 def pose(
-    prepared: Prepared, curves: Curves, intended: IntendedMotion, options: RunSettings
+    prepared: Prepared,
+    curves: Curves,
+    intended: IntendedMotion,
+    options: RunSettings,
+    kind: type[RetargetProblem] = RetargetProblem,
 ) -> tuple[RetargetProblem, Array, bool]:
     """The retargeting problem of a shot, the start of its search, shape [n], and whether its knots are adaptive.
 
@@ -44,6 +48,7 @@ def pose(
         curves: The animator's curves on the grid.
         intended: The intended motion of the targets.
         options: Of the run.
+        kind: Class of the problem.
 
     Raises:
         ShotError: No motor may change, or options contradict each other.
@@ -54,7 +59,7 @@ def pose(
         ahead = _rigid_offsets(prepared, curves)
     known = unknowns(character, animation, grid, options, ahead)
     smoothness = next(v for v in (options.smoothness, character.retarget.smoothness, SMOOTHNESS) if v is not None)
-    problem = RetargetProblem(
+    problem = kind(
         prepared.model, grid, curves, Objective.over(prepared.model, intended, grid, animation.weights),
         OffsetSpace(known.basis, known.motors, known.coupling, smoothness, closeness_of(character)), prepared.world,
         LimitTerms(known.bounds, grid.judged, grid.h, 1.0) if known.bounds else None, known.continuous,

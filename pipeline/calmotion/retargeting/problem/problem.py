@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
+from typing import Self
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.parallel import in_parallel
+from calmotion.retargeting.problem import several_robots
 from calmotion.retargeting.problem.ground import GROUND, Place, with_ground_rows
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
@@ -27,16 +29,7 @@ from calmotion.retargeting.problem.rigid_approximation import (
     rigid_response,
 )
 from calmotion.retargeting.problem.robot import Robot
-from calmotion.retargeting.problem.several_robots import (
-    adjoints,
-    continuous_adjoints,
-    further_efforts,
-    joined_residuals,
-    on_ground,
-    reversal_curvatures,
-    squared_errors,
-    tangents,
-)
+from calmotion.retargeting.solver.norm import Norm, SumOfSquares
 from calmotion.retargeting.solver.preconditioner import Preconditioner, RigidPreconditioner
 from calmotion.simulation.forward import ForwardRun, limited_values
 from calmotion.simulation.inputs.curves import Curves
@@ -68,6 +61,7 @@ class RetargetProblem:
         self.curves, self.world, self.limits = curves, world, limits
         self.robots: tuple[Robot, ...] = (Robot(Simulator(model, grid.h, world, grid.cyclic), objective),)
         self.failure: SimulationFailure | None = None  # of the last point that could not be simulated
+        self.norm: Norm = SumOfSquares()
         self._continuous = continuous
         self._limited: dict[str, Array] | None = None
         self.x = self._linearized_x = np.zeros(0)  # points evaluated and linearised last
@@ -79,7 +73,7 @@ class RetargetProblem:
         # twice the objective of an error of one metre at every instant
         self._unit = max(float(np.sum(objective.weights**2)) / max(1, 3 * len(model.targets.component)), 1e-300)
 
-    def for_robots(self, robots: Sequence[Robot]) -> RetargetProblem:
+    def for_robots(self, robots: Sequence[Robot]) -> Self:
         """The same problem for several robots that perform the same curves, the nominal one first: the sum of their
         weighted objectives, and limits of effort that each of them keeps."""
         other = copy(self)
@@ -139,12 +133,12 @@ class RetargetProblem:
     @property
     def error(self) -> float:
         """Root-mean-square error of the point evaluated last, weighted [m]."""
-        return float(np.sqrt(squared_errors(self.robots) / self._unit))
+        return float(np.sqrt(several_robots.squared_errors(self.robots) / self._unit))
 
     @property
     def residuals(self) -> Array:
         """Weighted residuals of the point evaluated last, robot after robot, shape [S T, R]."""
-        return joined_residuals(self.robots)
+        return several_robots.joined_residuals(self.robots)
 
     @property
     def _acting(self) -> LimitTerms | None:
@@ -163,8 +157,8 @@ class RetargetProblem:
             bounds = {} if self.limits is None else self.limits.bounds
             self._limited = limited_values(self.model, bounds.keys() & set(QUANTITIES), self.changed_curves, self.run)
             if EFFORT in bounds:
-                self._limited |= further_efforts(self.robots, self.changed_curves)
-            self._limited |= on_ground(self.robots)
+                self._limited |= several_robots.further_efforts(self.robots, self.changed_curves)
+            self._limited |= several_robots.on_ground(self.robots)
         return self._limited
 
     def hold(self, first: int) -> None:
@@ -206,7 +200,7 @@ class RetargetProblem:
 
     def objective_value(self) -> float:
         """The objective at the point evaluated last, without the terms of the limits."""
-        return 0.5 * float(np.sum(self.residuals**2)) + self.penalty_value(self.x)
+        return self.norm.value(self.residuals) + self.penalty_value(self.x)
 
     def linearize(self) -> Array:
         """Linearise at the point evaluated last, and the gradient there."""
@@ -222,11 +216,12 @@ class RetargetProblem:
         """Gradient of the merit where it was linearised; the limits may have changed since."""
         if self._continuous:
             return self.continuous_gradient()
-        return self.vjp(self.residuals, self._limit_pulls()) + self.penalty_gradient(self.x)
+        pulled = self.vjp(self.norm.gradient(self.residuals), self._limit_pulls())
+        return pulled + self.penalty_gradient(self.x)
 
     def continuous_gradient(self) -> Array:
         """The same by the continuous adjoint, which has its own linearisation and does not support limits of effort."""
-        pulls = continuous_adjoints(self.robots)
+        pulls = several_robots.continuous_adjoints(self.robots)
         return self._to_unknowns(*pulls, self._limit_pulls()) + self.penalty_gradient(self.x)
 
     def _limit_pulls(self) -> dict[str, Array]:
@@ -235,7 +230,7 @@ class RetargetProblem:
 
     def vjp(self, residuals: Array, limited: dict[str, Array]) -> Array:
         """The transpose of `jvp`: weighted residuals and limited quantities to the unknowns."""
-        return self._to_unknowns(*adjoints(self.robots, residuals, limited), limited)
+        return self._to_unknowns(*several_robots.adjoints(self.robots, residuals, limited), limited)
 
     def _to_unknowns(self, by_value: Array, by_rate: Array, limited: dict[str, Array]) -> Array:
         """Derivatives by the motors' values and rates, and by limited curves, shape [T, M], gathered by unknown."""
@@ -249,7 +244,9 @@ class RetargetProblem:
     def jvp(self, direction: Array) -> tuple[Array, dict[str, Array]]:
         """Change of the weighted residuals along a direction, shape [S T, R], and of the limited quantities."""
         bounds, space = {} if self._acting is None else self._acting.bounds, self.space
-        residuals, efforts = tangents(self.robots, *space.offsets(direction), EFFORT in bounds, GROUND in bounds)
+        residuals, efforts = several_robots.tangents(
+            self.robots, *space.offsets(direction), EFFORT in bounds, GROUND in bounds
+        )
         changes = {name: space.spread(spline, direction) for name, spline in space.splines.items() if name in bounds}
         return residuals, changes | efforts
 
@@ -270,7 +267,7 @@ class RetargetProblem:
         residuals, changes = self.jvp(direction)
         if self.limits is not None:
             changes = {name: self.limits.curvature(name, self.limited[name]) * v for name, v in changes.items()}
-        return self.vjp(residuals, changes) + self.penalty_product(direction)
+        return self.vjp(self.norm.product(self.residuals, residuals), changes) + self.penalty_product(direction)
 
     def precondition(self, fixed: BoolArray, values: dict[str, Array] | None = None) -> Callable[[Array], Array]:
         """The rigid robot's Gauss-Newton matrix, or that of `sharpen`, inverted over the entries that are not fixed.
@@ -280,10 +277,10 @@ class RetargetProblem:
         """
         response, acting = self._rigid(), self._acting
         if self.preconditioner is None:
-            weights, basis = self.objective.weights, self.space.basis
-            self.preconditioner = RigidPreconditioner(response, weights, basis, self.space.penalty)
+            weights = several_robots.curved_weights(self.robots, self.norm, self.objective.weights)
+            self.preconditioner = RigidPreconditioner(response, weights, self.space.basis, self.space.penalty)
         curvatures = {} if acting is None else acting.curvatures(values or self.limited)
-        curvatures |= reversal_curvatures(self.robots)
+        curvatures |= several_robots.reversal_curvatures(self.robots)
         self.preconditioner.factor(fixed, limit_metrics(response.inertia, self.space, curvatures))
         of_feet = self._ground_rows, partial(self.vjp, np.zeros_like(self.residuals))
         return with_ground_rows(self.preconditioner.solve, acting, values or self.limited, fixed, *of_feet)

@@ -11,6 +11,7 @@ from calmotion.multibody.parallel import in_parallel
 from calmotion.retargeting.problem.ground import ground_of
 from calmotion.retargeting.problem.rigid_approximation import EFFORT, effort_of
 from calmotion.retargeting.problem.robot import Robot
+from calmotion.retargeting.solver.norm import Norm
 from calmotion.simulation.forward import limited_values
 from calmotion.simulation.inputs.curves import Curves
 
@@ -71,6 +72,14 @@ def reversal_curvatures(robots: Sequence[Robot]) -> dict[str, Array]:
     return {
         f"{effort_of(k)}, reversals": robot.by_effort() for k, robot in enumerate(robots) if robot.reversals is not None
     }
+
+
+def curved_weights(robots: Sequence[Robot], norm: Norm, weights: Array) -> Array:
+    """The weights of residuals, shape [T, K, 6], times the root of their mean second derivatives over the robots."""
+    errors = joined_residuals(robots)[:, : weights[0].size]
+    squares = np.sum(norm.roots(errors) ** 2, axis=2).reshape(len(robots), *weights.shape)
+    shares = np.array([robot.weight for robot in robots])
+    return np.asarray(weights * np.sqrt(np.einsum("s,stki->tki", shares, squares)))
 
 
 def _summed(pulls: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Result, Track
 from calmotion.model.robust.robots import Compromise, Robustness, Scenario
@@ -25,19 +25,15 @@ from calmotion.retargeting.robust.choice import (
 )
 from calmotion.retargeting.robust.measure import errors_on, silent
 from calmotion.retargeting.robust.scenarios import Parameter, random_scenarios, uncertain_parameters
-from calmotion.retargeting.robust.worst_case import WorstCase
+from calmotion.retargeting.robust.worst_case import LeastMaximum, least_maximum
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
 from calmotion.tolerance.simulation import found_tracks
 
-ROUNDS = 6  # most searches with other weights
-FALLING = 0.98  # of the largest error: a smaller gain ends them
 _SEARCHED = 0.6  # share of the searches in the progress
 SEARCHES = 3  # most for the largest error, each with more robots than the one before
 FARTHER = 2.0  # error that each compromise allows on the nominal robot, over that of the one before
-BOUNDED = 6  # random robots for which a bound is worked out; of the bartender, 4 and 16 give the same to 0.1%
-LEAST = 1e-3  # smallest weight of a robot, over the mean
 Continued = Callable[[Result, Result], Result]
 
 
@@ -48,13 +44,10 @@ def retarget_robustly(
 
     An interrupt (Ctrl-C) ends both; the result then has the best curves so far.
 
-    The largest error is minimised as `WorstCase` does. Where that is not possible, as for loops, feet on the ground and
-    very long shots, the weights of the robots with large errors are raised until the largest stops falling.
-
     Args:
         shot: The shot as animated.
         options: Of the search, with its time step and `robust`.
-        nominal: The result for the nominal robot.
+        nominal: The result for the nominal robot, which is also that of the largest error where no other is better.
         continued: The result of a second search with the work of the first one.
         progress: Called with a fraction and a message.
 
@@ -65,102 +58,76 @@ def retarget_robustly(
     assert robust is not None
     parameters, animation, best = uncertainties_of(shot), shot.animation, nominal
     allowed = robust.nominal_error * tolerance_of(shot.character, options.tolerance)
+
+    def searching(fraction: float, message: str) -> None:
+        progress(_SEARCHED * fraction, message)
+
     try:
         tracks = found_tracks(nominal, animation)
         used = chosen_scenarios(shot, options, tracks, parameters, robust.scenarios, robust.kind)
-        worst = WorstCase(shot, options, tracks, used) if robust.kind == WORST else None
-        if worst is None or not worst.possible:
-            worst = None
-            best, used = _by_weights(shot, options, nominal, used, continued, progress)
+        if robust.kind == WORST:
+            begin = time.perf_counter(), time.process_time()
+            worst = _worst(shot, options, tracks, used, allowed, searching)
+            used = worst.scenarios
+            if any(one is not other for one, other in zip(worst.tracks, tracks, strict=True)):
+                best = continued(nominal, _simulated(shot, options, worst, begin))
         else:
-            _minimize(shot, options, worst, allowed, _part(progress, 0, 1))
-            used = worst.weighted()
-            best = _of_least_maximum(shot, options, nominal, worst, used, continued)
+            best = continued(nominal, _searched(shot.with_tracks(tracks), options, searching, used))
         if best.interrupted:
             return best
         draws = random_scenarios(parameters, robust.draws)
-        if worst is None or not robust.tradeoff:
-            worst = None  # it is large
         measured = replace(best, robustness=_robustness(shot, options, nominal, best, used, draws, progress))
-        if worst is not None:
-            measured = _with_compromises(shot, options, measured, draws, worst)
-            worst = None
-        return _with_bound(shot, options, measured, draws) if robust.bound else measured
+        if robust.kind == WORST and robust.tradeoff:
+            measured = _with_compromises(shot, options, measured, draws, allowed)
+        return measured
     except KeyboardInterrupt:
         return best_so_far(best)
 
 
-def _minimize(
-    shot: CompiledShot, options: RunSettings, worst: WorstCase, allowed: float, progress: Progress
-) -> None:  # fmt: skip
+def _worst(
+    shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], scenarios: tuple[Scenario, ...], allowed: float,
+    progress: Progress,
+) -> LeastMaximum:  # fmt: skip
     """The smallest largest error over some robots, and those on which it turns out larger."""
     parameters = uncertainties_of(shot)
-    points = tried_robots(parameters)
-    with worst.work.timed():
-        worst.minimize(allowed, progress)
-        for _ in range(SEARCHES - 1):
-            known = float(largest_weighted(shot, worst.errors())[1:].max())
-            added, points = worse_robots(shot, options, worst.tracks, parameters, known, points)
-            if not (added and worst.take_in(added)):
-                break
-            worst.minimize(allowed, progress)
+    points, found = tried_robots(parameters), least_maximum(shot, options, tracks, scenarios, allowed, progress)
+    for _ in range(SEARCHES - 1):
+        known = float(largest_weighted(shot, found.errors).max())
+        added, points = worse_robots(shot, options, found.tracks, parameters, known, points)
+        if not added:
+            break
+        latest = least_maximum(shot, options, found.tracks, (*found.scenarios, *added), allowed, progress)
+        found = replace(
+            latest,
+            evaluations=found.evaluations + latest.evaluations,
+            linearizations=found.linearizations + latest.linearizations,
+            sweeps=found.sweeps + latest.sweeps,
+        )
+    return found
 
 
-def _of_least_maximum(
-    shot: CompiledShot, options: RunSettings, nominal: Result, worst: WorstCase, scenarios: Sequence[Scenario],
-    continued: Continued,
-) -> Result:  # fmt: skip
-    """The result with the curves of the smallest largest error."""
+def _simulated(shot: CompiledShot, options: RunSettings, worst: LeastMaximum, begin: tuple[float, float]) -> Result:
+    """The result with the curves of the smallest largest error, and the work since a time of clock and processor."""
     as_they_are = replace(options, max_iterations=0)
-    found = optimize_shot(shot.with_tracks(worst.tracks), as_they_are, silent, None, scenarios)
-    return continued(
-        nominal,
-        replace(
-            found,
-            iterations=worst.work.evaluations,
-            gradients=worst.work.linearizations,
-            linearized_sweeps=worst.work.sweeps,
-            forward_simulations=found.forward_simulations + worst.work.evaluations + worst.work.linearizations,
-            wall_s=worst.work.wall_s,
-            processor_s=worst.work.processor_s,
-        ),
+    found = optimize_shot(shot.with_tracks(worst.tracks), as_they_are, silent, None, worst.scenarios)
+    return replace(
+        found,
+        iterations=worst.evaluations,
+        gradients=worst.linearizations,
+        linearized_sweeps=worst.sweeps,
+        forward_simulations=found.forward_simulations + worst.evaluations,
+        wall_s=time.perf_counter() - begin[0],
+        processor_s=time.process_time() - begin[1],
     )
 
 
-def _by_weights(
-    shot: CompiledShot, options: RunSettings, nominal: Result, scenarios: tuple[Scenario, ...], continued: Continued,
-    progress: Progress,
-) -> tuple[Result, tuple[Scenario, ...]]:  # fmt: skip
-    """The result of searches for weighted sums of squares, and their robots."""
-    assert options.robust is not None
-    best, used, least, rounds = nominal, scenarios, np.inf, ROUNDS if options.robust.kind == WORST else 1
-    for number in range(rounds):
-        begun = shot.with_tracks(found_tracks(best, shot.animation))
-        latest = _searched(begun, options, _part(progress, number, rounds), scenarios)
-        if latest.interrupted:
-            return continued(best, latest), used
-        errors = _largest_on(shot, options, found_tracks(latest, shot.animation), scenarios)
-        if errors.max() > FALLING * least:
-            break
-        best, used, least = continued(best, latest), scenarios, float(errors.max())
-        scenarios = _reweighted(scenarios, errors)
-    return best, used
-
-
 def _searched(shot: CompiledShot, options: RunSettings, progress: Progress, scenarios: tuple[Scenario, ...]) -> Result:
-    """A search for a set of robots; where it fails, the error tells on which of them."""
+    """A search for the sum over a set of robots; where it fails, the error tells on which of them."""
     try:
         return optimize_shot(shot, options, progress, None, scenarios)
     except ShotError as error:
-        off = _largest_on(shot, options, shot.animation.tracks, scenarios)
+        off = errors_on(shot, options, {"": shot.animation.tracks}, scenarios)[""].max(axis=1)
         raise beyond_simulation(shot, scenarios[int(np.argmax(off))], error.problem) from error
-
-
-def _largest_on(
-    shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], scenarios: Sequence[Scenario]
-) -> Array:  # fmt: skip
-    """The largest error of any target on each robot [m], shape [S]."""
-    return np.asarray(errors_on(shot, options, {"": tracks}, scenarios)[""].max(axis=1))
 
 
 def uncertainties_of(shot: CompiledShot) -> tuple[Parameter, ...]:
@@ -181,14 +148,6 @@ def uncertainties_of(shot: CompiledShot) -> tuple[Parameter, ...]:
             "rigid body at the end of a chain is payload, a motor that gives has gains; or leave out --robust.",
         )
     return parameters
-
-
-def _reweighted(scenarios: Sequence[Scenario], errors: Array) -> tuple[Scenario, ...]:
-    """The robots with weights that are raised where errors are large."""
-    weights = np.array([scenario.weight for scenario in scenarios]) * (errors / errors.mean()) ** 2
-    weights = np.maximum(weights / weights.sum(), LEAST / len(scenarios))
-    weights /= weights.sum()
-    return tuple(replace(s, weight=float(weight)) for s, weight in zip(scenarios, weights, strict=True))
 
 
 def _robustness(
@@ -213,7 +172,7 @@ def _robustness(
 
 
 def _with_compromises(
-    shot: CompiledShot, options: RunSettings, robust: Result, draws: tuple[Scenario, ...], worst: WorstCase
+    shot: CompiledShot, options: RunSettings, robust: Result, draws: tuple[Scenario, ...], allowed: float
 ) -> Result:
     """The robust result with as many compromises as wanted, which may be farther and farther off on the nominal robot.
 
@@ -221,42 +180,14 @@ def _with_compromises(
     """
     found, asked, compromises = robust.robustness, options.robust, list[Compromise]()
     assert found is not None and asked is not None
-    allowed = asked.nominal_error * tolerance_of(shot.character, options.tolerance)
+    tracks, scenarios = found_tracks(robust, shot.animation), found.scenarios
     try:
         for _ in range(asked.tradeoff):
             allowed *= FARTHER
-            _minimize(shot, options, worst, allowed, silent)
-            errors = errors_on(shot, options, {"": worst.tracks}, (*found.scenarios[:1], *draws))[""]
-            compromises.append(Compromise(worst.weighted()[0].weight, allowed, errors[0], errors[1:]))
+            worst = _worst(shot, options, tracks, scenarios, allowed, silent)
+            tracks, scenarios = worst.tracks, worst.scenarios
+            errors = errors_on(shot, options, {"": tracks}, (*scenarios[:1], *draws))[""]
+            compromises.append(Compromise(scenarios[0].weight, allowed, errors[0], errors[1:]))
     except KeyboardInterrupt:
         interrupts.answer()
     return replace(robust, robustness=replace(found, compromises=tuple(compromises)))
-
-
-def _with_bound(
-    shot: CompiledShot, options: RunSettings, robust: Result, draws: tuple[Scenario, ...]
-) -> Result:  # fmt: skip
-    """The robust result with the error below which no curves can bring the largest one on the random robots: on those
-    of them on which it is largest, which is at most as large as on all. None after an interrupt (Ctrl-C)."""
-    found, asked = robust.robustness, options.robust
-    assert found is not None and asked is not None
-    errors = largest_weighted(shot, found.drawn["robust"])
-    most = np.argsort(-np.where(np.isfinite(errors), errors, 0.0))[:BOUNDED]
-    tracks = found_tracks(robust, shot.animation)
-    allowed = asked.nominal_error * tolerance_of(shot.character, options.tolerance)
-    try:
-        several = WorstCase(shot, options, tracks, (Scenario(), *(draws[k] for k in most)))
-        if several.possible:
-            return replace(robust, robustness=replace(found, least_possible=several.least_possible(allowed)))
-    except KeyboardInterrupt:
-        interrupts.answer()
-    return robust
-
-
-def _part(progress: Progress, number: int, rounds: int) -> Progress:
-    """Progress of one of several searches."""
-
-    def part(fraction: float, message: str) -> None:
-        progress(_SEARCHED * (number + fraction) / rounds, message)
-
-    return part

@@ -1,310 +1,258 @@
-"""Curves with the smallest largest error over some robots, where the nominal one is not far off.
+"""Curves with the smallest largest error over some robots, where the nominal one is off by no more than is allowed.
 
-Each round linearises the robots, finds the smallest p-norm of the linear errors (`least_maximum`), and simulates. An
-error of the nominal robot counts f times, so that it comes to what is allowed where the largest one of the others is f
-times as large; f follows from a few such minima.
+The largest error is made smooth by a power mean (`solver.norm`). Each round linearises all robots, finds the minimum of
+the model under the limits (`solver.limited_step`), and simulates. An error of the nominal robot counts f times, so that
+it comes to what is allowed where the largest one of the others is f times as large.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from calmotion.arrays import Array
-from calmotion.linear_algebra.blas_threads import one_blas_thread
+from calmotion.arrays import Array, BoolArray
 from calmotion.model import Track
 from calmotion.model.robust.robots import Scenario
 from calmotion.model.run import RunSettings
-from calmotion.multibody.parallel import in_parallel
-from calmotion.multibody.sensitivity.linearization import spare_memory
+from calmotion.retargeting.avoided_reversals import count_reversals, play_of
 from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.kept_feet import keep_feet
-from calmotion.retargeting.problem.limits import FIRST_PENALTY
+from calmotion.retargeting.problem.limits import FIRST_PENALTY, MARGIN, LimitTerms
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.retargeting.problem.response_gram import COST, dense_responses
-from calmotion.retargeting.problem.rigid_approximation import rigid_response
-from calmotion.retargeting.problem.robot import Robot
-from calmotion.retargeting.robust import least_possible as bound
-from calmotion.retargeting.robust.least_maximum import ORDERS, STEPS, Rest, least_maximum
-from calmotion.retargeting.robust.linear_errors import LinearErrors, lengths, merit, weights_of
-from calmotion.retargeting.robust.measure import largest_of
-from calmotion.retargeting.robust.rest_of_merit import RestOfMerit
+from calmotion.retargeting.problem.response_gram import COST
+from calmotion.retargeting.robust.choice import beyond_simulation, largest_weighted
+from calmotion.retargeting.robust.measure import errors_on, largest_of
+from calmotion.retargeting.robust.responses import RespondingProblem
 from calmotion.retargeting.robust.robots import robots_of
-from calmotion.retargeting.robust.weighted_errors import WeightedErrors
-from calmotion.retargeting.robust.work import Work
+from calmotion.retargeting.solver.limited_step import limited_step
+from calmotion.retargeting.solver.norm import PowerMean
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.preparation import prepare
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.support import interrupts
 
-ROUNDS = 16  # most linear models and trust regions for one allowed error
-FACTORS, MET = 5, (0.9, 1.05)  # most minima by which f is found, and what they have to meet of the allowed error
+ORDERS = (8, 16)  # of the power means, one after the other
+ROUNDS = 20  # most models
 FIRST_FACTOR = 0.4  # of the largest error over the allowed one: the others' errors fall as well
-FALLING, AS_PREDICTED = 0.1, 0.25  # a smaller relative decrease of the merit ends, a smaller share of it is refused
-FORETOLD = 0.25  # relative error of a predicted decrease up to which the linear model serves once more
-DAMPED = 10.0  # growth of the damping after a refused step
-_FREE = 1e-3  # of the merit over the squared step: a smaller damping does not hold it back
-_LARGEST, _SHARE = 3000, 0.5  # most unknowns, and most of the free memory
+AIM, CHANGE = 0.97, 1.6  # of the allowed error, where the nominal robot's is to be; most by which f changes at once
+FALLING, AS_FORETOLD = 0.05, 0.25  # a smaller share of the merit ends; a smaller one of what was foretold is refused
+DAMPED, FREE = 10.0, 1e-3  # growth of the damping after a refused step; share of the merit that does not hold it back
+SHARE, ENOUGH, PRODUCTS = 0.01, 3e-4, 60  # of a model's decrease, and of the merit; most products of a system
+BISECTIONS = 6  # of the way back to where it began, until the nominal robot is within what is allowed
 
 
-class WorstCase:
-    """The robots of some scenarios, and the curves found so far.
+@dataclass(frozen=True, eq=False)
+class LeastMaximum:
+    """Curves with the smallest largest error.
+
+    Attributes:
+        tracks: The curves; those where it began, where no others are better.
+        scenarios: The robots, with the weights of their squared errors in the sum that is stationary at these curves.
+        errors: Largest error of each target on each robot [m], shape [S, K].
+        evaluations, linearizations, sweeps: Simulations and linearisations of all robots, and the linearised sweeps
+            whose cost these had.
+    """
+
+    tracks: tuple[Track, ...]
+    scenarios: tuple[Scenario, ...]
+    errors: Array
+    evaluations: int
+    linearizations: int
+    sweeps: int
+
+
+def least_maximum(
+    shot: CompiledShot,
+    options: RunSettings,
+    tracks: Sequence[Track],
+    scenarios: Sequence[Scenario],
+    allowed: float,
+    progress: Progress,
+) -> LeastMaximum:
+    """The smallest largest error over some robots.
 
     Args:
         shot: The shot as animated.
         options: Of the search, with its time step.
         tracks: Where it begins.
-        scenarios: The robots, the nominal one first, kept as `scenarios`.
+        scenarios: The robots, the nominal one first.
+        allowed: Error that a target may have on the nominal robot [m]; where it begins with more, as much.
+        progress: Called with a fraction and a message.
+
+    Raises:
+        ShotError: A robot cannot be simulated.
+    """
+    search = _Search(shot, options, tracks, scenarios, allowed)
+    search.run(progress)
+    search.keep_bound()
+    mean = power_mean(search.problem, ORDERS[-1], search.factors)
+    weights = mean.weights(search.problem.residuals).reshape(len(scenarios), -1).sum(axis=1)
+    weighted = [replace(s, weight=float(w)) for s, w in zip(scenarios, weights / weights.sum(), strict=True)]
+    found = tuple(tracks) if search.x is search.start else search.tracks()
+    sweeps = search.linearizations * round(2.0 * COST * search.problem.size)
+    return LeastMaximum(found, tuple(weighted), search.errors, search.evaluations, search.linearizations, sweeps)
+
+
+class _Search:
+    """The search from some curves; arguments as of `least_maximum`.
+
+    Attributes:
+        problem: Of all robots.
+        start, x: Where it began, and the best point, evaluated last, shape [n].
+        bound: Error that each target may have on the nominal robot [m], shape [K].
+        factors: f of each target, shape [K].
     """
 
     def __init__(
-        self, shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], scenarios: Sequence[Scenario]
-    ):  # fmt: skip
-        prepared = prepare(shot.with_tracks(tracks), options)
-        curves = sample_curves(prepared.shot.animation.tracks, prepared.grid)
-        intended = intended_motion(prepared, curves.angles, curves.rates)
-        problem, self._x, _ = pose(prepared, curves, intended, options)
-        self.scenarios, self._animation = tuple(scenarios), shot.animation
-        self._prepared, self._options = prepared, options
-        self._motors = len(shot.character.motors)
-        self._problem = problem.for_robots(self._robots(problem, scenarios))
-        space = problem.space
-        self._fixed = locked_coefficients(shot.animation, space.basis, space.motors, prepared.grid.end)
-        self._inertia = rigid_response(problem.model, problem.grid, curves, problem.world, space.coupling).inertia
-        self._weighted = WeightedErrors.of_objective(problem.objective, problem.grid, len(scenarios), problem.size)
-        self._factors = np.ones((len(scenarios), len(self._weighted.places)))
-        self._linear: tuple[LinearErrors, RestOfMerit] | None = None
-        self._made_at: Array = np.zeros(0)  # the point of its derivatives
-        self._damping = 0.0  # that it needed last
-        self.work = Work()
-        self._own: Array = np.zeros(0)  # errors of the nominal robot where it began, shape [G]
-        self._performed: Array = np.zeros(0)  # the point that all robots performed last
-
-    @cached_property
-    def possible(self) -> bool:
-        """Whether derivatives of all errors by all unknowns can be made and stored, and nothing else is asked for.
-
-        What feet ask of the ground, and the play of gears, have no such derivatives.
-        """
-        problem = self._problem
-        if self._options.avoid_reversals or not self._performs(self._x):
-            return False
-        keep_feet(self._prepared, problem)
-        if any(robot.ground is not None for robot in problem.robots):
-            return False
-        if not (self._fit(len(self.scenarios)) and problem.size <= _LARGEST and self._weighted.dense_enough):
-            return False
-        problem.linearize()
-        return all(robot.simulator.can_be_blocked() for robot in problem.robots)
-
-    def take_in(self, scenarios: Sequence[Scenario]) -> bool:
-        """Take in further robots: only their linear models are made. False, without them, where this cannot be."""
-        known, _ = self._linearized()
-        robots = self._robots(self._problem, scenarios)
-        problem = self._problem.for_robots([*self._problem.robots, *robots])
-        if not (self._fit(len(problem.robots)) and np.isfinite(problem.value(self._x))):
-            return False
-        in_parallel(Robot.linearize, robots)
-        if not all(robot.simulator.can_be_blocked() for robot in robots):
-            return False
-        self.scenarios, self._problem = (*self.scenarios, *scenarios), problem
-        self._performed = self._x.copy()
-        self._factors = np.concatenate([self._factors, np.ones((len(robots), self._factors.shape[1]))])
-        linear = known.with_robots(self._errors(), self._changes(robots))
-        self._start_limits(linear)
-        self._moved(linear)
-        return True
-
-    def _robots(self, problem: RetargetProblem, scenarios: Sequence[Scenario]) -> list[Robot]:
-        """The robots of scenarios, of equal weights."""
-        alike = [Scenario(scenario.factors) for scenario in scenarios]
-        return robots_of(self._prepared, problem, alike, self._options)
-
-    def _fit(self, robots: int) -> bool:
-        """Whether the derivatives for so many robots fit in memory."""
-        rows = robots * self._factors.shape[1] * len(self._weighted.at)
-        return 24.0 * rows * self._problem.size <= _SHARE * spare_memory()
-
-    def minimize(self, allowed: float, progress: Progress) -> None:
-        """Minimise the largest error while the nominal robot's targets are off by at most so much.
-
-        Args:
-            allowed: Error of the position of a target on the nominal robot [m]; where it began with more, as much.
-            progress: Called with a fraction and a message.
-        """
-        problem, damping, orders, refused = self._problem, self._damping, ORDERS, False
-        linear, rest = self._linearized()
-        if not len(self._own):
-            self._own = largest_of(linear.errors[0])
-        most = self._most(linear, np.maximum(allowed, self._own), FIRST_FACTOR)
-        for number in range(ROUNDS):
-            interrupts.check()
-            now = 1e3 * float(np.linalg.norm(linear.errors, axis=3).max())
-            progress(number / ROUNDS, f"largest weighted error on {len(self.scenarios)} robots: {now:.3f} mm")
-            rest = replace(rest, damping=damping)
-            d = self._minimum(linear, rest, most, orders)
-            before = self._merit(linear, linear.errors, rest.value(np.zeros_like(d)))
-            foretold = before - self._merit(linear, linear.at(d), rest.value(d))
-            kept = problem.limits is None or problem.limits.kept(rest.limited)
-            fresh, least = np.array_equal(self._made_at, self._x), before / max(rest.squared(d), 1e-300)
-            if not np.any(d):
-                break
-            if foretold < FALLING * before and kept:
-                if fresh if refused else damping <= _FREE * least:
-                    break
-                if refused:
-                    linear, rest = self._linearize()  # the model of other curves misled
-                damping, refused = damping / DAMPED, False
-                continue
-            gained = 0.0
-            self.work.evaluations += 1
-            if self._performs(self._x + d):
-                gained = before - self._merit(linear, self._errors(), self._rest(damping, d))
-            if gained < AS_PREDICTED * foretold or gained <= 0.0:
-                damping = max(DAMPED * damping, least)
-                if refused and foretold > FALLING * before and not fresh:
-                    linear, rest = self._linearize()  # damped, the model of other curves misleads as well
-                refused = True
-                continue
-            self._x, small = self._x + d, gained < FALLING * before
-            right = abs(gained - foretold) < FORETOLD * foretold
-            linear, rest = self._moved(linear) if small or right else self._linearized()
-            if small and np.all(largest_of(linear.errors[0]) <= MET[1] * most) and not problem.tighten():
-                break
-            # the next model has a smaller damping unless this one needed it
-            self._damping = damping = damping if refused else damping / DAMPED
-            refused, orders = False, ORDERS[-1:]
-
-    def least_possible(self, allowed: float) -> float:
-        """A bound below which no curves can bring the largest weighted error on these robots [m] (`least_possible`).
-
-        Args:
-            allowed: As of `minimize`; where the curves found have more, as much.
-        """
-        linear, rest = self._linearized()
-        most = self._most(linear, np.maximum(allowed, largest_of(linear.errors[0])), bound.FIRST_FACTOR)
-        even = bound.EvenErrors.of(linear, rest)
-        d = self._minimum(linear, even, most, bound.ORDERS, bound.MET, bound.STEPS)
-        return bound.least_possible(linear, self._factors, most, even, self._fixed, d, self._problem.grid.end)
+        self,
+        shot: CompiledShot,
+        options: RunSettings,
+        tracks: Sequence[Track],
+        scenarios: Sequence[Scenario],
+        allowed: float,
+    ):
+        self.shot, self.evaluations, self.linearizations = shot, 0, 0
+        self.problem, self.start, self._fixed = _posed(shot, options, tracks, scenarios)
+        if not np.isfinite(self._value(self.start)):
+            off = errors_on(shot, options, {"": tracks}, scenarios)[""].max(axis=1)
+            raise beyond_simulation(shot, scenarios[int(np.argmax(off))])
+        self.x = self.start
+        self.bound = np.maximum(allowed, self.errors[0])
+        self.factors = np.maximum(FIRST_FACTOR * self._largest() / self.bound, 1.0)
+        self._began, self._exceeded = self._largest(), self._excess()
 
     @property
-    def tracks(self) -> tuple[Track, ...]:
-        """The curves found so far."""
-        curves, _ = found_curves(self._problem, self._motors, self._x)
-        times = self._animation.frame_times
-        return tuple(
-            Track(times, curve.frame_values) if curve.changed else track
-            for curve, track in zip(curves, self._animation.tracks, strict=True)
-        )
-
     def errors(self) -> Array:
-        """The largest error of each target on each robot for the curves found, which are simulated for it, shape [S, K]
-        [m]."""
-        self._performs(self._x)
-        at, robots = self._problem.grid.judged, self._problem.robots
+        """The largest error of each target on each robot at the point evaluated last [m], shape [S, K]."""
+        at, robots = self.problem.grid.judged, self.problem.robots
         motions = [(robot.run.target_positions, robot.objective.intended.target_positions) for robot in robots]
         return np.array([largest_of((performed - intended)[at]) for performed, intended in motions])
 
-    def weighted(self) -> tuple[Scenario, ...]:
-        """The robots with the weights of their squared errors in the sum that is smallest for the curves found, which
-        are simulated for it."""
-        self._performs(self._x)
-        m = lengths(self._errors(), self._factors)
-        totals = weights_of(m, self._factors, ORDERS[-1]).sum(axis=(1, 2))
+    def run(self, progress: Progress) -> None:
+        """Minimise."""
+        problem, orders, refused = self.problem, list(ORDERS), False
+        for number in range(ROUNDS):
+            interrupts.check()
+            told = f"largest weighted error on {len(problem.robots)} robots: {1e3 * self._largest():.3f} mm"
+            progress(number / ROUNDS, told)
+            problem.norm = power_mean(problem, orders[0], self.factors)
+            self.linearizations += not problem.linearized_at(self.x)
+            problem.linearize()
+            step = limited_step(problem, self._fixed, SHARE, ENOUGH * problem.merit(), PRODUCTS)
+            merit, foretold = problem.merit(), step.predicted(1.0)
+            whole = merit / max(problem.squared(step.step), 1e-300)
+            if foretold < FALLING * merit:
+                if problem.damping > FREE * whole and not refused:
+                    problem.damping /= DAMPED
+                elif len(orders) > 1:
+                    orders.pop(0)
+                elif not self._adapted():
+                    break
+                continue
+            gained = merit - self._value(self.x + step.step)
+            if not gained > AS_FORETOLD * foretold:
+                problem.damping, refused = max(DAMPED * problem.damping, whole), True
+                self._value(self.x)
+                continue
+            self.x = problem.x
+            problem.damping, refused = problem.damping if refused else problem.damping / DAMPED, False
+            if gained < FALLING * merit and len(orders) > 1:
+                orders.pop(0)
+            self._adapted()
+
+    def keep_bound(self) -> None:
+        """Go back towards the start until bound and limits are kept, and all the way where nothing is won."""
+        if not self._kept():
+            found, inside, outside = self.x, 0.0, 1.0
+            for _ in range(BISECTIONS):
+                middle = 0.5 * (inside + outside)
+                self._value(self.start + middle * (found - self.start))
+                inside, outside = (middle, outside) if self._kept() else (inside, middle)
+            self.x = self.start + inside * (found - self.start)
+            self._value(self.x)
+        if not self._largest() < self._began:
+            self.x = self.start
+            self._value(self.x)
+
+    def tracks(self) -> tuple[Track, ...]:
+        """The curves found."""
+        animation = self.shot.animation
+        curves, _ = found_curves(self.problem, len(self.shot.character.motors), self.x)
         return tuple(
-            replace(scenario, weight=float(total))
-            for scenario, total in zip(self.scenarios, totals / totals.sum(), strict=True)
+            Track(animation.frame_times, curve.frame_values) if curve.changed else track
+            for curve, track in zip(curves, animation.tracks, strict=True)
         )
 
-    def _most(self, linear: LinearErrors, allowed: Array, factor: float) -> Array:
-        """Largest errors of the nominal robot, shape [G]; its first factors are a share of the others' over these."""
-        most = np.where(self._weighted.of_position, allowed, np.inf)
-        largest = float(np.linalg.norm(linear.errors[1:], axis=3).max(initial=0.0))
-        self._factors[0] = np.maximum(factor * largest / most, 1.0)
-        return most
+    def _value(self, x: Array) -> float:
+        """The merit at a point, which is then the one evaluated last."""
+        self.evaluations += 1
+        return self.problem.value(x)
 
-    def _minimum(
-        self, linear: LinearErrors, rest: Rest, most: Array, orders: tuple[int, ...],
-        met: tuple[float, float] = MET, steps: int = STEPS,
-    ) -> Array:  # fmt: skip
-        """The least maximum of the linear model, and the factors with which it keeps the allowed error."""
-        d = np.zeros_like(self._x)
-        for left in reversed(range(FACTORS)):
-            with one_blas_thread():  # products by a vector take twice as long with two
-                d = least_maximum(linear, self._factors, rest, self._fixed, d, orders, steps)
-            nominal = largest_of(linear.at(d)[0])
-            free = np.all(self._factors[0] <= 1.0) or np.any(nominal >= met[0] * most)
-            if not left or np.all(nominal <= met[1] * most) and free:
-                break
-            self._factors[0] = np.maximum(self._factors[0] * np.clip(nominal / most, 0.6, 1.6), 1.0)
-            orders = orders[-1:]
-        return d
+    def _largest(self) -> float:
+        """The largest error of all robots but the nominal one, as it weighs [m]; of that where there is no other."""
+        errors = largest_weighted(self.shot, self.errors)
+        return float(errors[1:].max() if len(errors) > 1 else errors[0])
 
-    def _performs(self, x: Array) -> bool:
-        """Whether all robots can perform a point, which they do unless they have just done it."""
-        if not np.array_equal(self._performed, x):
-            self._performed = x.copy() if np.isfinite(self._problem.value(x)) else np.zeros(0)
-        return len(self._performed) > 0
+    def _excess(self) -> float:
+        """Largest excess over limits, as a share."""
+        assert self.problem.limits is not None
+        return self.problem.limits.excess(self.problem.limited)
 
-    def _merit(self, linear: LinearErrors, errors: Array, rest: float) -> float:
-        return merit(linear.scale, lengths(errors, self._factors), ORDERS[-1], rest)
+    def _kept(self) -> bool:
+        """Whether the nominal robot is within its bound, and limits are kept, or as well as where it began."""
+        return bool(np.all(self.errors[0] <= self.bound)) and self._excess() <= max(MARGIN, self._exceeded)
 
-    def _errors(self) -> Array:
-        """The errors of all robots at the point evaluated last, shape [S, t, G, 3] [m]."""
-        return np.array([self._weighted.of(robot.residuals) for robot in self._problem.robots])
+    def _adapted(self) -> bool:
+        """Let the nominal robot's errors count more or less, by how far they are from their bound; whether they were
+        beyond it."""
+        nominal = self.errors[0] / self.bound
+        change = np.clip(nominal / AIM, 1.0 / CHANGE, CHANGE)
+        self.factors = np.maximum(self.factors * change, 1.0)
+        return bool(np.any(nominal > 1.0))
 
-    def _rest(self, damping: float, d: Array) -> float:
-        """The rest of the merit at the point evaluated last, a change d from the one before."""
-        problem = self._problem
-        here = RestOfMerit(problem.space, problem.x, problem.limits, problem.limited, self._inertia, damping)
-        return here.value(np.zeros_like(d)) + 0.5 * damping * here.squared(d)
 
-    def _linearized(self) -> tuple[LinearErrors, RestOfMerit]:
-        """The errors and the rest of the merit about the curves found so far."""
-        if self._linear is None or not np.array_equal(self._linear[1].x, self._x):
-            return self._linearize()
-        return self._linear
+def _posed(
+    shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], scenarios: Sequence[Scenario]
+) -> tuple[RespondingProblem, Array, BoolArray]:
+    """The problem of all robots, with limits that act, the point of some curves, and which unknowns do not change."""
+    prepared = prepare(shot.with_tracks(tracks), options)
+    grid, curves = prepared.grid, sample_curves(shot.animation.tracks, prepared.grid)
+    intended = intended_motion(prepared, curves.angles, curves.rates)
+    nominal, start, _ = pose(prepared, curves, intended, replace(options, adjoint="discrete"), RespondingProblem)
+    alike = [Scenario(scenario.factors, 1.0 / len(scenarios)) for scenario in scenarios]
+    assert isinstance(nominal, RespondingProblem)
+    problem = nominal.for_robots(robots_of(prepared, nominal, alike, options))
+    if not np.isfinite(problem.value(np.zeros(problem.size))):
+        off = errors_on(shot, options, {"": shot.animation.tracks}, scenarios)[""].max(axis=1)
+        raise beyond_simulation(shot, scenarios[int(np.argmax(off))])
+    if options.avoid_reversals:
+        count_reversals(problem, play_of(prepared.character), options.avoid_reversals)
+    keep_feet(prepared, problem)
+    limits = problem.limits = problem.limits or LimitTerms({}, grid.judged, grid.h, 1.0)
+    limits.on, limits.rho = True, FIRST_PENALTY * problem.objective_value() / grid.end
+    fixed = locked_coefficients(shot.animation, problem.space.basis, problem.space.motors, grid.end)
+    return problem, start, fixed
 
-    def _linearize(self) -> tuple[LinearErrors, RestOfMerit]:
-        """The same with derivatives made here."""
-        problem = self._problem
-        self._linear, self._made_at = None, self._x.copy()  # the memory of the model before is needed
-        if not problem.linearized_at(self._x):
-            self._performs(self._x)
-            problem.linearize()
-        self.work.linearizations += 1
-        self.work.sweeps += round(2.0 * COST * problem.size)
-        linear = LinearErrors.of(self._errors(), self._changes(problem.robots), self._weighted.scale)
-        self._start_limits(linear)
-        return self._moved(linear)
 
-    def _changes(self, robots: Sequence[Robot]) -> NDArray[np.float32]:
-        """The derivatives of the errors of robots where they are linearised, shape [S, t, G, 3, n]."""
-        weighted, space = self._weighted, self._problem.space
-        changes = np.empty((len(robots), len(weighted.at), len(weighted.places), 3, space.size), np.float32)
+def power_mean(problem: RetargetProblem, order: int, factors: Array) -> PowerMean:
+    """The power mean of the weighted errors over robots of equal weights, instants, and positions and rotations.
 
-        def responded(k: int) -> None:
-            changes[k] = weighted.thinned(dense_responses(robots[k], space, weighted.at))
-
-        in_parallel(responded, range(len(robots)))
-        return changes
-
-    def _moved(self, linear: LinearErrors) -> tuple[LinearErrors, RestOfMerit]:
-        """The errors and the rest of the merit at the point evaluated last, with the derivatives of a model near it."""
-        problem = self._problem
-        rest = RestOfMerit(problem.space, self._x, problem.limits, problem.limited, self._inertia)
-        self._linear = replace(linear, errors=self._errors()), rest
-        return self._linear
-
-    def _start_limits(self, linear: LinearErrors) -> None:
-        """Limits act from the beginning, with a penalty in proportion to the errors."""
-        limits, grid = self._problem.limits, self._problem.grid
-        if limits is not None and not limits.on:
-            limits.on = True
-            limits.rho = FIRST_PENALTY * self._merit(linear, linear.errors, 0.0) / grid.end
+    Args:
+        problem: Of the robots, the nominal one first.
+        order: Of the mean.
+        factors: With which errors of the nominal robot's positions count, shape [K].
+    """
+    quadrature, weights = problem.grid.quadrature, problem.objective.weights
+    squares = weights.reshape(len(weights), -1, 3)[..., 0] ** 2
+    by_time = np.where(quadrature > 0.0, quadrature, np.inf)
+    counted, robots = np.flatnonzero(squares.any(axis=0)), len(problem.robots)
+    units = np.sqrt(float((squares / by_time[:, None]).max()) * by_time / robots)
+    shares = quadrature / (quadrature.sum() * max(len(counted), 1) * robots)
+    every = np.ones((robots, len(weights), squares.shape[1]))
+    every[0, :, ::2] = factors
+    units, shares = (np.tile(part, robots)[:, None] for part in (units, shares))
+    return PowerMean(order, units, shares, every.reshape(-1, squares.shape[1]))

@@ -1,6 +1,7 @@
 """A Gauss-Newton step under limits: the convex model of objective and limits, minimised without simulating.
 
-With residuals r + J s and limited quantities v + A s linear in the step s, the model is piecewise quadratic. Semismooth
+With residuals r + J s and limited quantities v + A s linear in the step s, the model is piecewise quadratic (smooth and
+convex in the residuals where these have another norm). Semismooth
 Newton finds its minimum: conjugate gradients with the active limits fixed, an exact line search along the solution,
 and again with the limits that are active there. Multipliers are updated inside the model, so that its minimum keeps
 the limits.
@@ -15,6 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray
+from calmotion.retargeting.solver.norm import Norm
 from calmotion.retargeting.solver.truncated_cg import conjugate_gradients
 
 Values = dict[str, Array]
@@ -64,6 +66,10 @@ class LimitedProblem(Protocol):
     @property
     def residuals(self) -> Array:
         """Weighted residuals there."""
+
+    @property
+    def norm(self) -> Norm:
+        """What is minimised of the residuals."""
 
     @property
     def limited(self) -> Values:
@@ -123,7 +129,7 @@ class LimitedModel:
 
     def objective(self, point: ModelPoint) -> float:
         """The objective, without the terms of the limits."""
-        return 0.5 * float(np.sum(point.residuals**2)) + self.problem.penalty_value(self.problem.x + point.step)
+        return self.problem.norm.value(point.residuals) + self.problem.penalty_value(self.problem.x + point.step)
 
     def merit(self, point: ModelPoint) -> float:
         """The objective and the terms of the limits."""
@@ -133,12 +139,13 @@ class LimitedModel:
         """Gradient of the merit, shape [n]."""
         pulls = {name: self.limits.gradient(name, v) for name, v in point.values.items()}
         regularized = self.problem.penalty_gradient(self.problem.x + point.step)
-        return self.problem.vjp(point.residuals, pulls) + regularized
+        return self.problem.vjp(self.problem.norm.gradient(point.residuals), pulls) + regularized
 
     def slope(self, point: ModelPoint, direction: ModelPoint) -> float:
         """Slope of the merit along a direction."""
         regularized = self.problem.penalty_gradient(self.problem.x + point.step)
-        slope = float(np.sum(point.residuals * direction.residuals)) + float(direction.step @ regularized)
+        errors = self.problem.norm.gradient(point.residuals)
+        slope = float(np.sum(errors * direction.residuals)) + float(direction.step @ regularized)
         return slope + sum(
             float(np.sum(self.limits.gradient(name, v) * direction.values[name])) for name, v in point.values.items()
         )
@@ -196,7 +203,8 @@ def _newton_direction(
         residuals, values = problem.jvp(d)
         changes.append((residuals, values))
         weighted = {name: weights[name] * v for name, v in values.items()}
-        return np.where(fixed, 0.0, problem.vjp(residuals, weighted) + problem.penalty_product(d))
+        curved = problem.norm.product(point.residuals, residuals)
+        return np.where(fixed, 0.0, problem.vjp(curved, weighted) + problem.penalty_product(d))
 
     inverse = problem.precondition(fixed, point.values)
     path = conjugate_gradients(product, gradient, inverse, np.inf, share, enough, max_products)

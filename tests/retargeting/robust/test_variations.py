@@ -1,0 +1,97 @@
+"""Robust curves of shots with few or many robots, parameters, motors, targets and limits."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from calmotion.model.robust.settings import RobustSettings, Uncertainty
+from calmotion.model.run import RunSettings
+from calmotion.retargeting.optimize import optimize_shot
+from calmotion.retargeting.robust.retarget import retarget_robustly
+from calmotion.retargeting.to_tolerance import _continued
+from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.tolerance.simulation import found_tracks
+from calmotion.workflow.robustness import robustness_report, robustness_row
+from posed import ignore_progress
+
+TOLERANCE = 6e-3
+WORST = RobustSettings("worst", 3, 20)
+
+
+def uncertain(modulus=0.1, damping=1.0, payload=0.1, gains=0.2):
+    return lambda arm: dataclasses.replace(
+        arm,
+        retarget=dataclasses.replace(arm.retarget, uncertainty=Uncertainty(modulus, damping, payload, gains)),
+    )
+
+
+def one_motor(arm):
+    motors = tuple(dataclasses.replace(m, optimize=k == 0) for k, m in enumerate(arm.motors))
+    return dataclasses.replace(arm, motors=motors)
+
+
+def weighing(*weights):
+    """Positions and rotations of the targets weigh so much; further targets are left out."""
+    return lambda arm: dataclasses.replace(
+        arm,
+        targets=tuple(
+            dataclasses.replace(target, position_weight=position, rotation_weight=rotation)
+            for target, (position, rotation) in zip(arm.targets, weights, strict=False)
+        ),
+    )
+
+
+def limited(arm):
+    motors = tuple(dataclasses.replace(m, max_velocity=20.0, max_torque=1e3) for m in arm.motors)
+    return dataclasses.replace(arm, motors=motors)
+
+
+def same(arm):
+    return arm
+
+
+VARIATIONS = {
+    "one robot": (same, dataclasses.replace(WORST, scenarios=1)),
+    "two robots": (same, dataclasses.replace(WORST, scenarios=2)),
+    "an even number of robots": (same, dataclasses.replace(WORST, scenarios=4)),
+    "many robots": (same, dataclasses.replace(WORST, scenarios=15)),
+    "one parameter": (uncertain(damping=0.0, payload=0.0, gains=0.0), WORST),
+    "a parameter that moves nothing": (uncertain(modulus=0.0, damping=1e-9, payload=0.0, gains=0.0), WORST),
+    "a spread of next to nothing": (uncertain(1e-6, 1e-6, 1e-6, 1e-6), WORST),
+    "a motor alone": (one_motor, WORST),
+    "a target alone": (weighing((1.0, 0.0)), WORST),
+    "a target of which the turn alone weighs": (weighing((1.0, 0.0), (0.0, 0.1)), WORST),
+    "targets of other weights": (weighing((0.1, 0.0), (1.0, 0.01)), WORST),
+    "limits": (limited, WORST),
+    "nothing allowed": (same, dataclasses.replace(WORST, nominal_error=0.0)),
+    "very much allowed": (same, dataclasses.replace(WORST, nominal_error=100.0)),
+    "a further set of curves": (same, dataclasses.replace(WORST, tradeoff=1)),
+    "a mean of one robot": (same, dataclasses.replace(WORST, kind="mean", scenarios=1)),
+}
+
+
+@pytest.mark.parametrize("name", VARIATIONS)
+def test_the_error_on_the_model_keeps_its_bound_and_that_on_others_does_not_grow(arm, animation, bodies, name):
+    of, robust = VARIATIONS[name]
+    shot = compile_shot(of(arm), animation, bodies)
+    options = RunSettings(step=1 / 120, tolerance=TOLERANCE, robust=robust)
+    nominal = optimize_shot(shot, options, ignore_progress)
+    result = retarget_robustly(shot, options, nominal, _continued, ignore_progress)
+    found = result.robustness
+    rows = [robustness_row(result, k)["robustness"] for k in range(len(shot.character.targets))]
+    assert robustness_report(result)["scenarios"] and all(np.isfinite(row["robust"]["p95_max_error_m"]) for row in rows)
+    assert sum(scenario.weight for scenario in found.scenarios) == pytest.approx(1.0) and not found.scenarios[0].factors
+    if robust.kind == "worst":
+        own = found.nominal["nominal"]
+        assert np.all(found.nominal["robust"] <= np.maximum(robust.nominal_error * TOLERANCE, own) * (1.0 + 1e-6))
+        weights = np.sqrt([target.position_weight for target in shot.character.targets])
+        worst = {name: (found.drawn[name] * weights).max() for name in ("nominal", "robust")}
+        assert worst["robust"] <= 1.05 * worst["nominal"]
+    kept = all(one.frame_values is other.frame_values for one, other in zip(result.curves, nominal.curves, strict=True))
+    same_curves = all(
+        np.allclose(one.values, other.values, atol=1e-12)
+        for one, other in zip(*(found_tracks(r, animation) for r in (nominal, result)), strict=True)
+    )
+    assert kept == same_curves or robust.kind == "mean"
+    if kept:
+        assert all(row["nominal"] == row["robust"] for row in rows)  # which the report says
