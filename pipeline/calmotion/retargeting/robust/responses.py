@@ -19,7 +19,8 @@ from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.solver.dense_preconditioner import DensePreconditioner, for_each_motor
 
 _LARGEST, _SHARE = 3000, 0.5  # most unknowns, and most of the free memory
-_NOTHING = 1e-7  # of the largest entry of the matrix, added to its diagonal: it is of single precision
+_NOTHING = 1e-7  # of the largest entry of the matrix, added to its diagonal: responses are of single precision
+_BLOCK = 1024  # errors whose rows are in double precision at once
 
 
 class RespondingProblem(RetargetProblem):
@@ -109,7 +110,7 @@ class RespondingProblem(RetargetProblem):
         return (
             all(robot.ground is None and robot.reversals is None for robot in self.robots)
             and self.size <= _LARGEST
-            and 8.0 * self._counted.sum() * self.size <= _SHARE * spare_memory()
+            and 4.0 * self._counted.sum() * self.size <= _SHARE * spare_memory()
             and all(robot.simulator.can_be_blocked() for robot in self.robots)
         )
 
@@ -128,11 +129,15 @@ class RespondingProblem(RetargetProblem):
     def _factor(self, rows: NDArray[np.float32]) -> None:
         """Precondition with the matrix of the second derivatives here."""
         roots = self.norm.roots(self.residuals)[self._counted.reshape(-1, 3).any(axis=1)]
-        rooted = np.einsum("tij,tjn->tin", roots.astype(np.float32), rows.reshape(-1, 3, self.size))
-        rooted = rooted.reshape(-1, self.size)
-        gram = np.asarray(rooted.T @ rooted, float)
         common, share = self.norm.lessened(self.residuals)
-        pulled = (common[self._counted].astype(np.float32) @ rows).astype(float)
+        pulls, errors = common[self._counted].reshape(-1, 3), rows.reshape(-1, 3, self.size)
+        gram, pulled = np.zeros((self.size, self.size)), np.zeros(self.size)
+        for first in range(0, len(errors), _BLOCK):  # in double precision: what is subtracted leaves little of it
+            part = slice(first, first + _BLOCK)
+            changes = errors[part].astype(float)
+            rooted = (roots[part] @ changes).reshape(-1, self.size)
+            gram += rooted.T @ rooted
+            pulled += pulls[part].ravel() @ changes.reshape(-1, self.size)
         gram -= share * np.outer(pulled, pulled)
         gram += self.damping * for_each_motor(self.space.basis.closeness, len(self.space.motors))
         gram[np.diag_indices_from(gram)] += _NOTHING * float(gram.diagonal().max(initial=0.0))
