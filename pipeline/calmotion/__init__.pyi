@@ -4,9 +4,6 @@ from calmotion.errors import ShotError as ShotError
 from calmotion.host.errors import SettingError as SettingError
 from calmotion.model.run import OutputPaths as OutputPaths
 from calmotion.version import __version__ as __version__
-from calmotion.workflow.batch.report import BatchResult as BatchResult
-from calmotion.workflow.batch.report import JobResult as JobResult
-from calmotion.workflow.batch.run import batch as batch
 from calmotion.workflow.commands import inspect as inspect
 from calmotion.workflow.commands import optimize as optimize
 from calmotion.workflow.commands import rig as rig
@@ -27,7 +24,5 @@ from calmotion.workflow.results import RobotMotion as RobotMotion
 from calmotion.workflow.results import SimulationResult as SimulationResult
 from calmotion.workflow.results import TargetMotion as TargetMotion
 from calmotion.workflow.run import Progress as Progress
-from calmotion.workflow.sequence.run import Repertoire as Repertoire
-from calmotion.workflow.sequence.run import sequence as sequence
 from calmotion.workflow.shot import Shot as Shot
 from calmotion.workflow.shot import open_shot as open_shot

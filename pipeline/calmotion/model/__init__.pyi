@@ -23,6 +23,7 @@ from calmotion.model.character import TetGeometry as TetGeometry
 from calmotion.model.character import motors_give as motors_give
 from calmotion.model.character import with_ideal_motors as with_ideal_motors
 from calmotion.model.curves import curve_of as curve_of
+from calmotion.model.curves import held_curve as held_curve
 from calmotion.model.meshes import FEMesh as FEMesh
 from calmotion.model.meshes import FEMeshes as FEMeshes
 from calmotion.model.meshes import MeshQuality as MeshQuality

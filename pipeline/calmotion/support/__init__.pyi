@@ -10,10 +10,12 @@ from calmotion.support.files import temporary_folder as temporary_folder
 from calmotion.support.files import try_writing as try_writing
 from calmotion.support.files import write_text as write_text
 from calmotion.support.foreign_files import remedy_for as remedy_for
+from calmotion.support.interrupts import answer as answer
 from calmotion.support.interrupts import check as check
 from calmotion.support.memory import available_memory as available_memory
 from calmotion.support.memory import too_large as too_large
 from calmotion.support.naming import distinct_names as distinct_names
 from calmotion.support.naming import nearest as nearest
+from calmotion.support.processes.workers import Fault as Fault
 from calmotion.support.reading import read_text as read_text
 from calmotion.support.reading import read_toml as read_toml

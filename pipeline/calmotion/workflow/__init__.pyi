@@ -1,6 +1,5 @@
 """Public names of `calmotion.workflow`: each is imported when it is first used."""
 
-from calmotion.workflow.batch.workers import results_on as results_on
 from calmotion.workflow.commands import optimize as optimize
 from calmotion.workflow.commands import simulate as simulate
 from calmotion.workflow.exporting.command_format import CommandFormat as CommandFormat
@@ -10,6 +9,9 @@ from calmotion.workflow.outputs import refuse_unwritable as refuse_unwritable
 from calmotion.workflow.problems import Cancelled as Cancelled
 from calmotion.workflow.problems import problems_of as problems_of
 from calmotion.workflow.problems import value_of as value_of
+from calmotion.workflow.publishing.manifest import changed_files as changed_files
+from calmotion.workflow.publishing.manifest import read_manifest as read_manifest
+from calmotion.workflow.publishing.manifest import sha256_of as sha256_of
 from calmotion.workflow.results import OptimizationResult as OptimizationResult
 from calmotion.workflow.results import SimulationResult as SimulationResult
 from calmotion.workflow.run import Hooks as Hooks
@@ -17,6 +19,12 @@ from calmotion.workflow.run import Outcome as Outcome
 from calmotion.workflow.run import Progress as Progress
 from calmotion.workflow.run import again as again
 from calmotion.workflow.run import carry_out as carry_out
+from calmotion.workflow.running.workers import LOCAL as LOCAL
+from calmotion.workflow.running.workers import executor_on as executor_on
+from calmotion.workflow.running.workers import finished as finished
+from calmotion.workflow.running.workers import refuse_unknown_place as refuse_unknown_place
+from calmotion.workflow.running.workers import result_of as result_of
+from calmotion.workflow.running.workers import results_on as results_on
 from calmotion.workflow.shot import Given as Given
 from calmotion.workflow.shot import Path as Path
 from calmotion.workflow.shot import Shot as Shot

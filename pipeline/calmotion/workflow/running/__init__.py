@@ -1,0 +1,1 @@
+"""How runs are repeated and divided: again when a file is saved, and as jobs in other processes."""

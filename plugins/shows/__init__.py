@@ -1,0 +1,8 @@
+"""Many shots: the commands `batch`, `sequence` and `submit`, and the first two in Python."""
+
+from calmotion.host import registration
+from calmotion.public_names import public_names
+
+register, unregister = registration()
+
+__getattr__, __dir__ = public_names(__name__)

@@ -1,0 +1,90 @@
+"""`calmotion batch`: many shots as independent jobs."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from calmotion.cli import FAILED, INTERRUPTED, Output, conclude, counted, length, report_options, say
+
+from .forwarding import command_of, extras_of, forwarded, forwarded_options
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+# Outcomes in words, where the word of the JSON object says too little.
+SAID = {"kept": "done before, nothing has changed"}
+
+
+EXAMPLES = (
+    ("calmotion batch shots/*.usda -o calm --workers 2", "two shots at a time, on this machine"),
+    ("calmotion batch shots/*.usda -o calm --on dask://host:8786", "on the workers of a Dask scheduler"),
+)
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    command.add_argument("shots", metavar="SHOTS", nargs="+", help="USD files")
+    command.add_argument(
+        "-o", "--output", metavar="DIR", required=True,
+        help="folder for layers, manifests, logs and the report; the same command goes on after an interruption",
+    )  # fmt: skip
+    report_options(command)
+    command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
+    group = command.add_argument_group("workers")
+    group.add_argument("--on", metavar="WHERE", default="local", help="local (default) or dask://HOST:PORT")
+    group.add_argument(
+        "--workers",
+        metavar="N",
+        type=worker_count,
+        help="most jobs at once (default: one for each processor; elsewhere all)",
+    )
+    forwarded_options(command)
+
+
+def worker_count(text: str) -> int:
+    if not text.isdigit() or not int(text):
+        raise argparse.ArgumentTypeError(f"{text} is not a number of workers")
+    return int(text)
+
+
+def run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.cli import ProgressDisplay
+
+    from ..batch.run import batch
+
+    with ProgressDisplay(args.quiet, args.progress) as display:
+        result = batch(
+            args.shots, args.output, command=command_of(args), arguments=forwarded(args), extras=extras_of(args),
+            on=args.on, workers=args.workers, progress=display,
+        )  # fmt: skip
+    conclude(result.report(), [], output, None if args.quiet else _print)
+    if result.interrupted:
+        return INTERRUPTED
+    return 0 if result.successful else FAILED
+
+
+def _print(report: dict[str, Any], console: Console) -> None:
+    counts = ", ".join(f"{count} {SAID.get(name, name)}" for name, count in report["outcomes"].items())
+    say(console, f"{counted(len(report['jobs']), 'shot')} in {report['wall_s']:.1f} s: {counts}")
+    for job in report["jobs"]:
+        line = f"  {job['name']}: {SAID.get(job['outcome'], job['outcome'])}"
+        before, after = job.get("max_error_before_m", job.get("max_error_m")), job.get("max_error_after_m")
+        if before is not None:
+            line += f", largest error {length(before)}" + ("" if after is None else f" to {length(after)}")
+        if job["tolerance_kept"] is False:
+            line += ", tolerance missed"
+        if job["attempts"] > 1:
+            line += f", {job['attempts']} attempts"
+        say(console, line)
+        if job["problem"]:
+            problem = job["problem"]
+            place = ".".join(filter(None, (problem.get("path"), problem.get("attribute"))))
+            say(console, f"    {place + ': ' if place else ''}{problem['problem']}")
+            say(console, f"    log: {job['log']}")
+    say(console, f"report: {report['folder']}/batch.md")
+    roots = [job["root_layer"] for job in report["jobs"] if job["root_layer"]]
+    if roots:
+        say(console, f"next: open {roots[0]}{' (one for each shot)' if len(roots) > 1 else ''}")
+    if len(roots) < len(report["jobs"]):
+        say(console, "next: the same command runs only what is not done")
