@@ -52,20 +52,6 @@ def test_the_page_of_schemas_has_units_defaults_and_advice(repository):
     assert row.split("|")[2:5] == [" float ", " m² (of rad²) ", " `0` "] and "0.05" in row
 
 
-def test_the_keys_of_an_export_are_those_of_the_page(repository, tmp_path, calmotion):
-    from one_hinge import ONE_HINGE
-
-    (tmp_path / "shot.usda").write_text(ONE_HINGE)
-    done = calmotion("export", tmp_path / "shot.usda", "--to", "csv", "--rate", "30", "--json", "--no-search",
-                     "-o", tmp_path / "a.csv")  # fmt: skip
-    report = json.loads(done.stdout)
-    page = (repository / "docs" / "reference" / "outputs.md").read_text()
-    section = page.split("`export` prints")[1].split("An error is one object")[0]
-    named = set(re.findall(r"`([a-z_]+)`", section))
-    assert set(report) - {"command", "version", "start_delay_s", "total_wall_s"} <= named
-    assert set(report["targets"][0]) <= named
-
-
 def test_every_file_that_names_the_version_names_this_one(repository):
     from calmotion.version import __version__
 

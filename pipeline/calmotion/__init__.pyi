@@ -9,8 +9,6 @@ from calmotion.workflow.commands import optimize as optimize
 from calmotion.workflow.commands import rig as rig
 from calmotion.workflow.commands import simulate as simulate
 from calmotion.workflow.commands import verify as verify
-from calmotion.workflow.exporting.export import Export as Export
-from calmotion.workflow.exporting.export import export as export
 from calmotion.workflow.inspection import Inspection as Inspection
 from calmotion.workflow.installation.warmup import Warmup as Warmup
 from calmotion.workflow.installation.warmup import warmup as warmup

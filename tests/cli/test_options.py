@@ -62,9 +62,6 @@ def test_what_is_no_length_is_not_said_to_lack_a_unit(text, told, capsys):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["export", "a.usda", "--to", "csv", "--rate", "0"], "0 is not 1 to 100000 commands a second"),
-        (["export", "a.usda", "--to", "csv", "--rate", "1e12"], "1e12 is not 1 to 100000 commands a second"),
-        (["export", "a.usda", "--to", "csv", "--tolerance", "0mm"], "above zero"),
         (["watch", "a.usda", "--runs", "0"], "0 is not a number of runs"),
         (["watch", "a.usda", "--runs", "1.5"], "1.5 is not a number of runs"),
         (["simulate", "my", "shot.usda"], "no argument takes shot.usda"),
@@ -79,7 +76,7 @@ def test_numbers_and_arguments_that_do_not_fit_are_refused_at_once(arguments, to
 @pytest.mark.parametrize(
     "words",
     [
-        ["simulate", "a.usda"], ["inspect", "a.usda"], ["watch", "a.usda"], ["export", "a.usda", "--to", "csv"],
+        ["simulate", "a.usda"], ["inspect", "a.usda"], ["watch", "a.usda"],
         ["rig", "a.usda", "-o", "c.usda"],
     ],
 )  # fmt: skip

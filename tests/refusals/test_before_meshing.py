@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion import export, optimize, simulate
+from calmotion import optimize, simulate
 from calmotion.errors import ShotError, each
 from calmotion.host import Outcome
 from calmotion.model.run import OutputPaths
@@ -138,13 +138,6 @@ def no_edit(stage):
     pass
 
 
-def exporting(to):
-    def command(shot, outputs, file=None, **options):
-        export(shot, file or f"{outputs.layer}.{to}", to=to, **options)
-
-    return command
-
-
 CASES = {
     "half turns in each step": (optimize, half_turns, {}, "targetPosition"),
     "half turns in each step of a simulation": (simulate, half_turns, {}, "targetPosition"),
@@ -181,8 +174,6 @@ CASES = {
     "splines and samples": (
         optimize, no_edit, {"settings": {"usd.write": {"splines": True, "samples_per_second": 100.0}}}, "--splines"
     ),
-    "commands on a folder": (exporting("csv"), no_edit, {"file": "."}, "."),
-    "ticks without servos": (exporting("ticks"), no_edit, {}, "export.ticks.motors"),
     "a second body without geometry": (simulate, no_geometry, {}, UPPER),
     "a modulus in GPa": (simulate, soft(2.0), {}, "physics:youngsModulus"),
     "a modulus in MPa": (optimize, soft(2e3), {}, "physics:youngsModulus"),

@@ -113,10 +113,6 @@ def test_files_are_made_of_a_result(simulated, tmp_path):
     with open(table, newline="") as stream:
         rows = list(csv.reader(stream))
     assert rows[0] == list(simulated.columns()) and len(rows) == len(simulated.times) + 1
-    curves = simulated.export(tmp_path / "curves.csv", rate=50.0)
-    with open(curves) as stream:
-        lines = [line for line in stream if not line.startswith("#")]
-    assert len(lines) == 1 + 51
     written = simulated.write(tmp_path / "layer.usda", bake="motors")
     assert (tmp_path / "layer.usda").is_file() and cm.open_shot(written.root).targets == (TIP,)
 

@@ -42,9 +42,6 @@ CASES = {
     "a sublayer": ("simulate", "shot.usda", "--csv", "below.usda"),
     "the root layer that is written as well": ("simulate", "shot.usda", "-o", "calm.usda", "--csv", "calm_root.usda"),
     "a root layer in the place of the shot": ("simulate", "shot.usda", "-o", "calm.usda", "--rrd", "calm_root.usda"),
-    "the shot as commands": ("export", "shot.usda", "--to", "csv", "-o", "shot.usda"),
-    "a sublayer as commands": ("export", "shot.usda", "--to", "csv", "-o", "below.usda"),
-    "the motion as commands": ("export", "shot.usda", "--motion", "motion.csv", "--to", "csv", "-o", "motion.csv"),
 }
 
 
@@ -92,8 +89,7 @@ def test_the_option_and_what_it_would_overwrite_are_named(tmp_path):
     assert error.value.path == "--csv"
 
 
-@pytest.mark.parametrize("command", [("simulate", "--csv"), ("export", "--to", "csv", "-o")])
-def test_a_mesh_of_the_shot_is_never_written_over(tmp_path, calmotion, monkeypatch, command):
+def test_a_mesh_of_the_shot_is_never_written_over(tmp_path, calmotion, monkeypatch):
     def edit(stage):
         make_flexible(stage)
         attribute = stage.GetPrimAtPath(FORE).CreateAttribute("calm:flexible:meshFile", Sdf.ValueTypeNames.Asset)
@@ -102,7 +98,7 @@ def test_a_mesh_of_the_shot_is_never_written_over(tmp_path, calmotion, monkeypat
     write_arm(tmp_path / "shot.usda", edit)
     (tmp_path / "link.msh").write_text("a mesh")
     monkeypatch.chdir(tmp_path)
-    done = calmotion(command[0], "shot.usda", *command[1:], "link.msh", "--json", "--quiet")
+    done = calmotion("simulate", "shot.usda", "--csv", "link.msh", "--json", "--quiet")
     assert done.returncode == 2, done.stdout
     assert "a mesh of the shot" in json.loads(done.stdout)["error"]["problem"]
     assert (tmp_path / "link.msh").read_text() == "a mesh"

@@ -22,6 +22,8 @@ from calmotion.model.character import Target as Target
 from calmotion.model.character import TetGeometry as TetGeometry
 from calmotion.model.character import motors_give as motors_give
 from calmotion.model.character import with_ideal_motors as with_ideal_motors
+from calmotion.model.curves import Sample as Sample
+from calmotion.model.curves import commanded_curves as commanded_curves
 from calmotion.model.curves import curve_of as curve_of
 from calmotion.model.curves import held_curve as held_curve
 from calmotion.model.meshes import FEMesh as FEMesh
@@ -80,3 +82,4 @@ from calmotion.model.run import RunSettings as RunSettings
 from calmotion.model.run import Source as Source
 from calmotion.model.table import columns as columns
 from calmotion.model.tolerance import reach as reach
+from calmotion.model.tolerance import tolerance_of as tolerance_of

@@ -2,9 +2,10 @@
 
 from calmotion.workflow.commands import optimize as optimize
 from calmotion.workflow.commands import simulate as simulate
-from calmotion.workflow.exporting.command_format import CommandFormat as CommandFormat
 from calmotion.workflow.json_values import plain as plain
 from calmotion.workflow.materials import known_materials as known_materials
+from calmotion.workflow.outputs import refuse_layers as refuse_layers
+from calmotion.workflow.outputs import refuse_overwriting as refuse_overwriting
 from calmotion.workflow.outputs import refuse_unwritable as refuse_unwritable
 from calmotion.workflow.problems import Cancelled as Cancelled
 from calmotion.workflow.problems import problems_of as problems_of
@@ -19,6 +20,7 @@ from calmotion.workflow.run import Outcome as Outcome
 from calmotion.workflow.run import Progress as Progress
 from calmotion.workflow.run import again as again
 from calmotion.workflow.run import carry_out as carry_out
+from calmotion.workflow.run import no_input as no_input
 from calmotion.workflow.running.workers import LOCAL as LOCAL
 from calmotion.workflow.running.workers import executor_on as executor_on
 from calmotion.workflow.running.workers import finished as finished

@@ -19,7 +19,7 @@ from calmotion.workflow.run import Outcome, again, no_input
 
 if TYPE_CHECKING:
     from calmotion.workflow.problems import Problem
-    from calmotion.workflow.shot import Given, Path, Shot
+    from calmotion.workflow.shot import Path, Shot
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,36 +250,6 @@ class SimulationResult:
         if samples_per_second is not None:
             options["samples_per_second"] = samples_per_second
         return again(self._outcome, WrittenLayer, OutputPaths(layer=os.fspath(layer)), settings={"usd.write": options})
-
-    def export(
-        self, path: Path, *, to: str = "csv", rate: float = 500.0, degrees: bool = False, settings: Given = None
-    ) -> str:
-        """Write the motors' curves for a controller; returns the path. `calmotion.export` also measures what playing
-        them costs.
-
-        Args:
-            path: File to write.
-            to: Name of the format.
-            rate: Commands a second [Hz].
-            degrees: Angles of a table in degrees, not radians.
-            settings: Settings of operators, such as those of the format.
-
-        Raises:
-            RunError: It cannot be written.
-            SettingError: There is no such format, it has no such rate, or the file is read as the shot.
-        """
-        from calmotion.control.commands import ExportRequest
-        from calmotion.host import merge
-        from calmotion.workflow.exporting.controller_files import curves_of, format_named, write_commands
-        from calmotion.workflow.exporting.given import given_export, refuse_beyond_format
-        from calmotion.workflow.shot import read_settings
-
-        refuse_beyond_format(format_named(self.shot.host, to).highest_rate, given_export(to, rate, 0.0, None))
-        file = no_input(self._outcome, path)
-        chosen = merge([{"export.csv": {"angles": "deg"}} if degrees else {}, read_settings(settings)])
-        curves = curves_of(self._outcome, self.result)
-        written = write_commands(self._outcome, curves, ExportRequest(to, rate, file), chosen)
-        return written.files[0]
 
     def verify(self, on: str = "", workers: int | None = None) -> Verification:
         """Measure the error of the result against a finer run of the same curves: takes several times as long.

@@ -40,7 +40,6 @@ BUILT_IN = {
     "simulate": BuiltIn("shots.simulate", "simulate the shot as animated"),
     "watch": BuiltIn("shots.watch", "simulate or optimise a shot again whenever it is saved"),
     "optimize": BuiltIn("shots.optimize", "change the motor curves so that the robot does not shake"),
-    "export": BuiltIn("shots.export", "write the motor curves for a controller, and measure what playing them costs"),
     "rig": BuiltIn("robots.rig", "make a robot from a skinned character: bodies, joints, motors, targets"),
     "motors": BuiltIn("robots.motors", "list real motors that a joint can name, with their sources"),
     "materials": BuiltIn("robots.materials", "list materials for flexible links, with their sources"),
@@ -52,6 +51,7 @@ BUILT_IN = {
 }
 # The bundled plugins that bring commands: whoever deletes one is told where its command went.
 BROUGHT_BY: dict[str, str] = {
+    "export": "controller_export",
     "batch": "shows",
     "sequence": "shows",
     "submit": "shows",

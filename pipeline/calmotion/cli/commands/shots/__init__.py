@@ -1,1 +1,1 @@
-"""Commands on a shot: inspect, simulate, optimise, export."""
+"""Commands on a shot: inspect, simulate, optimise."""

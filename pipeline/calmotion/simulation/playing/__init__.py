@@ -1,1 +1,0 @@
-"""Commands that are played on the simulated robot: what they cost at the targets, and the lowest rate that does."""

@@ -1,1 +1,0 @@
-"""Commands for controllers: written by formats that are plugins, read back and simulated."""

@@ -1,0 +1,103 @@
+"""A table of commands: comment lines that a person and a program read, then the columns."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator
+from contextlib import suppress
+
+import numpy as np
+from calmotion.errors import ShotError
+from calmotion.support import write_text
+
+from ..commands import CUBIC, HOLD, QUINTIC, Commands, MotorCurves
+
+_DERIVATIVES = (".velocity", ".acceleration")
+
+
+def write_table(file: str, commands: Commands, curves: MotorCurves, rate: float, *, degrees: bool, digits: int) -> None:
+    """Write commands, atomically.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    paths = [motor.path for motor in curves.motors]
+    units = _units(curves, degrees)
+    columns, heads = [commands.positions * units], paths
+    for suffix, values in zip(_DERIVATIVES, (commands.velocities, commands.accelerations), strict=True):
+        if values is not None:
+            columns.append(values * units)
+            heads = [*heads, *(path + suffix for path in paths)]
+    lines = [*_header(curves, commands, rate, degrees), ",".join(["time_s", *heads])]
+    lines += [
+        ",".join([f"{time:.12g}", *(f"{value:.{digits}g}" for value in row)])
+        for time, row in zip(commands.times, np.hstack(columns), strict=True)
+    ]
+    write_text(file, "\n".join(lines) + "\n")
+
+
+def read_table(file: str, curves: MotorCurves) -> Commands:
+    """Read commands.
+
+    Raises:
+        ShotError: The table has other columns, or values that are no numbers.
+    """
+    with open(file, encoding="utf-8", newline="") as stream:
+        lines = stream.read().splitlines()
+    facts = {}
+    for line in lines:
+        if line.startswith("# ") and ": " in line:
+            name, _, value = line[2:].partition(": ")
+            facts[name] = value
+    head, *rows = csv.reader(line for line in lines if not line.startswith("#"))
+    paths = [motor.path for motor in curves.motors]
+    try:
+        values = np.array(rows, np.float64)
+        column = {name: values[:, k] for k, name in enumerate(head)}
+        units = _units(curves, "angle deg" in facts["units"])
+        found = [
+            np.stack([column[path + suffix] for path in paths], axis=1) / units if paths[0] + suffix in column else None
+            for suffix in ("", *_DERIVATIVES)
+        ]
+        interpolation, times = facts["player"], column["time_s"]
+    except (KeyError, ValueError, IndexError) as error:
+        raise ShotError("this table does not hold these commands", path=file, found=error) from error
+    start = None
+    if interpolation == HOLD:
+        with suppress(KeyError, ValueError):
+            start = np.array([float(text) for text in facts["start"].split(", ")]) / units
+    assert found[0] is not None
+    derivatives = found[1:] if interpolation in (CUBIC, QUINTIC) else [None, None]
+    return Commands(interpolation, times, found[0], derivatives[0], derivatives[1], start)
+
+
+def _units(curves: MotorCurves, degrees: bool) -> np.ndarray:
+    """What a radian, or metre, of each motor is in the table."""
+    return np.array([1.0 if motor.linear or not degrees else math.degrees(1.0) for motor in curves.motors])
+
+
+def _header(curves: MotorCurves, commands: Commands, rate: float, degrees: bool) -> Iterator[str]:
+    angle = "deg" if degrees else "rad"
+    yield f"# shot: {curves.shot}"
+    yield f"# rate_hz: {rate:.12g}"
+    yield f"# player: {commands.interpolation}"
+    yield f"# units: time s, angle {angle}, length m, torque N m, force N"
+    if commands.start is not None:
+        yield f"# start: {', '.join(f'{value:.12g}' for value in commands.start * _units(curves, degrees))}"
+    for k, motor in enumerate(curves.motors):
+        yield f"# limits of {motor.path}: {_limits(k, curves, angle)}"
+
+
+def _limits(k: int, curves: MotorCurves, angle: str) -> str:
+    motor = curves.motors[k]
+    unit, effort = ("m", "N") if motor.linear else (angle, "N m")
+    factor = math.degrees(1.0) if unit == "deg" else 1.0
+    shown = (
+        ("lower", curves.limits[k, 0] * factor, unit),
+        ("upper", curves.limits[k, 1] * factor, unit),
+        ("velocity", motor.max_velocity * factor, f"{unit}/s"),
+        ("acceleration", motor.max_acceleration * factor, f"{unit}/s^2"),
+        ("effort", motor.max_torque, effort),
+    )
+    return ", ".join(f"{name} {value:.9g} {u}" for name, value, u in shown if math.isfinite(value)) or "none"

@@ -1,0 +1,133 @@
+"""Commands in the ticks of servos, as JSON and as a header for C."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.errors import ShotError, raise_all
+from calmotion.support import write_text
+from numpy.typing import NDArray
+
+from ..commands import HOLD, Commands, MotorCurves
+from .servos import Servo
+
+
+def write_ticks(
+    file: str, commands: Commands, curves: MotorCurves, rate: float, servos: Sequence[Servo]
+) -> tuple[str, ...]:
+    """Write both files, atomically each; returns their paths.
+
+    Raises:
+        OSError: A file cannot be written.
+        ShotError: A motor leaves the range of its servo.
+    """
+    ticks = ticks_of(commands.positions, curves, servos)
+    _refuse_beyond(ticks, commands.times, curves, servos)
+    start = ticks_of((commands.positions[0] if commands.start is None else commands.start)[None], curves, servos)[0]
+    content = {
+        "shot": curves.shot,
+        "rate_hz": rate,
+        "player": HOLD,
+        "servos": [asdict(servo) for servo in servos],
+        "start": start.tolist(),
+        "ticks": ticks.tolist(),
+    }
+    text = json.dumps(content, indent=1)
+    # one line for each frame
+    text = re.sub(r"\[\s+(-?\d+(?:,\s+-?\d+)*)\s+\]", lambda found: f"[{re.sub(chr(92) + 's+', ' ', found[1])}]", text)
+    write_text(file, text + "\n")
+    header = f"{os.path.splitext(file)[0]}.h"
+    write_text(header, _header(os.path.basename(header), ticks, start, curves, rate, servos))
+    return file, header
+
+
+def read_ticks(file: str, curves: MotorCurves) -> Commands:
+    """Read the JSON file; angles at which the servos stand.
+
+    Raises:
+        ShotError: It holds other servos.
+    """
+    with open(file, encoding="utf-8") as stream:
+        content = json.load(stream)
+    try:
+        servos = [Servo(**entry) for entry in content["servos"]]
+        order = [[servo.name for servo in servos].index(name) for name in curves.names]
+        ticks, start = np.array(content["ticks"], np.float64)[:, order], np.array(content["start"], np.float64)[order]
+        times = np.arange(len(ticks)) / float(content["rate_hz"])
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise ShotError("this file does not hold these servos", path=file, found=error) from error
+    kept = [servos[k] for k in order]
+    return Commands(HOLD, times, angles_of(ticks, curves, kept), start=angles_of(start[None], curves, kept)[0])
+
+
+def ticks_of(positions: Array, curves: MotorCurves, servos: Sequence[Servo]) -> NDArray[np.int64]:
+    """Nearest ticks of positions, shape [n, M]."""
+    scale = np.array([servo.ticks_per(motor.linear) for servo, motor in zip(servos, curves.motors, strict=True)])
+    offset, centre = np.array([servo.offset for servo in servos]), np.array([servo.centre for servo in servos])
+    return np.asarray(np.rint(centre + (positions - offset) * scale), np.int64)
+
+
+def angles_of(ticks: Array, curves: MotorCurves, servos: Sequence[Servo]) -> Array:
+    """Positions of ticks [rad or m], shape [n, M]."""
+    scale = np.array([servo.ticks_per(motor.linear) for servo, motor in zip(servos, curves.motors, strict=True)])
+    offset, centre = np.array([servo.offset for servo in servos]), np.array([servo.centre for servo in servos])
+    return np.asarray(offset + (ticks - centre) / scale, np.float64)
+
+
+def _refuse_beyond(ticks: NDArray[np.int64], times: Array, curves: MotorCurves, servos: Sequence[Servo]) -> None:
+    problems = []
+    for k, (servo, motor) in enumerate(zip(servos, curves.motors, strict=True)):
+        beyond = np.maximum(servo.minimum - ticks[:, k], ticks[:, k] - servo.maximum)
+        n = int(np.argmax(beyond))
+        if beyond[n] > 0:
+            problems.append(
+                ShotError(
+                    f"the motor leaves the range of its servo, {servo.minimum} to {servo.maximum} ticks",
+                    path=motor.path,
+                    attribute="export.ticks.motors",
+                    found=f"{ticks[n, k]} ticks at {times[n]:.3f} s",
+                    remedy="Correct centre, direction or offset of the servo, or limit the joint",
+                )
+            )
+    raise_all(problems)
+
+
+def _header(
+    name: str, ticks: NDArray[np.int64], start: NDArray[np.int64], curves: MotorCurves, rate: float,
+    servos: Sequence[Servo],
+) -> str:  # fmt: skip
+    prefix = re.sub(r"\W", "_", os.path.splitext(name)[0])
+    prefix = f"_{prefix}" if prefix[:1].isdigit() else prefix
+    guard = f"{prefix.upper()}_H"
+    least, most = int(min(ticks.min(), start.min())), int(max(ticks.max(), start.max()))
+    kinds = (("uint16_t", 0, 65535), ("int16_t", -32768, 32767), ("int32_t", -(2**31), 2**31 - 1))
+    kind = next((kind for kind, low, high in kinds if low <= least and most <= high), "int64_t")
+    rows = [f"    {{{', '.join(map(str, row))}}}," for row in ticks.tolist()]
+    comments = [
+        f" *   {k}: {servo.name}" + ("" if servo.id is None else f", id {servo.id}") for k, servo in enumerate(servos)
+    ]
+    return "\n".join(
+        [
+            f"/* Servo ticks of {curves.shot}; send row n at n / {prefix.upper()}_RATE_HZ seconds. Columns:",
+            *comments,
+            " */",
+            f"#ifndef {guard}",
+            f"#define {guard}",
+            "#include <stdint.h>",
+            f"#define {prefix.upper()}_RATE_HZ {rate:.12g}",
+            f"#define {prefix.upper()}_FRAMES {len(ticks)}",
+            f"#define {prefix.upper()}_SERVOS {len(servos)}",
+            f"static const {kind} {prefix}_start[{len(servos)}] = {{{', '.join(map(str, start.tolist()))}}};",
+            f"static const {kind} {prefix}_ticks[{len(ticks)}][{len(servos)}] = {{",
+            *rows,
+            "};",
+            "#endif",
+            "",
+        ]
+    )

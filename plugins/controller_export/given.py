@@ -1,0 +1,80 @@
+"""What the user of an export gave: format, rate, delay and tolerance, refused where no controller or shot has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from numbers import Real
+
+from calmotion.errors import ShotError
+from calmotion.host import SettingError, quantity_of
+from calmotion.model import Animation, Character, RunSettings
+from calmotion.simulation import refuse_unsupported
+
+from .commands import HIGHEST_RATE, LOWEST_RATE
+
+
+@dataclass(frozen=True)
+class GivenExport:
+    """What the user gave: format, rate [Hz], delay [s], tolerance [m]."""
+
+    format: str
+    rate: float
+    delay: float
+    tolerance: float | None
+
+
+def given_export(to: str, rate: float, start_delay: float | str, tolerance: float | str | None) -> GivenExport:
+    """The arguments of an export in SI units.
+
+    Args:
+        to: Name of the format.
+        rate: Commands a second [Hz].
+        start_delay: [s], or text with a unit.
+        tolerance: [m], or text with a unit; None: the shot's own.
+
+    Raises:
+        SettingError: One does not fit.
+    """
+    if not isinstance(rate, Real) or not LOWEST_RATE <= float(rate) <= HIGHEST_RATE:
+        raise SettingError(
+            f"the rate must be {LOWEST_RATE:g} to {HIGHEST_RATE:g} commands a second", path="--rate", found=rate,
+            remedy="Use another rate.",
+        )  # fmt: skip
+    delay = quantity_of(start_delay, "s", "start_delay") or 0.0
+    if delay < 0.0:
+        raise SettingError(
+            "the start delay must not be negative", path="--start-delay", found=start_delay, remedy="Use 5ms."
+        )
+    return GivenExport(to, float(rate), delay, quantity_of(tolerance, "m", "tolerance"))
+
+
+def refuse_beyond_format(highest: float, given: GivenExport) -> None:
+    """Refuse a rate that the player of the format does not take.
+
+    Args:
+        highest: Commands a second that it takes [Hz].
+
+    Raises:
+        SettingError: The rate is higher.
+    """
+    if given.rate > highest:
+        raise SettingError(
+            f"the player of {given.format} takes at most {highest:g} commands a second", path="--rate",
+            found=given.rate, remedy=f"Use {highest:g} or less.",
+        )  # fmt: skip
+
+
+def refuse_beyond_shot(character: Character, animation: Animation, given: GivenExport) -> None:
+    """Refuse a tolerance that no simulation of the shot supports, and a start after its end.
+
+    Raises:
+        ShotError: Either.
+    """
+    refuse_unsupported(character, animation, RunSettings(tolerance=given.tolerance))
+    end = float(animation.frame_times[-1])
+    if given.delay > end:
+        raise ShotError(
+            "the controller would start after the end of the shot", path=character.path, attribute="--start-delay",
+            found=f"{given.delay:g} s, where the shot lasts {end:g} s",
+            remedy="Use a delay that a controller has, such as 5ms.",
+        )  # fmt: skip
