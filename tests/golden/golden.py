@@ -5,7 +5,7 @@
 
 A shot's numbers agree where each error at a target is within a tenth of the shot's tolerance of the kept one, the
 verdict is the same, and the first frequencies are within 2%. The robots of others are read from the folder
-CALMOTION_DATA (in it `converted/`), and left out where it is not there.
+CALMOTION_DATA, and left out where they are not there.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = ("bartender", "boxer", "dancer", "drummer", "lamp", "rapper")
-# name: layer of ours, converted robot, seconds of the motion
+# name: layer of ours, file of others, seconds of the motion
 ROBOTS = {
-    "kuka": ("iiwa_reach.usda", "kuka_iiwa_14/iiwa14.usda", None),
-    "so101": ("so101_arms.usda", "so101_urdf/so101_new_calib.usda", None),
-    "g1": ("g1_arms.usda", "g1_dual_arm/g1_dual_arm.usda", 4.0),
+    "kuka": ("iiwa_reach.usda", "converted/kuka_iiwa_14/iiwa14.usda", None),
+    "so101": ("so101_arms.usda", "converted/so101_urdf/so101_new_calib.usda", None),
+    "g1": ("g1_arms.usda", "shots/g1_dual_arm_disco.usda", 3.0),
 }
 SHARE_OF_TOLERANCE, SHARE_OF_FREQUENCY = 0.1, 0.02
 
@@ -36,7 +36,7 @@ def shot_file(name: str, folder: Path) -> Path | None:
     if name in SAMPLES:
         return ROOT / "samples" / name / f"{name}.usda"
     layer, robot, seconds = ROBOTS[name]
-    file = Path(os.environ.get("CALMOTION_DATA", ROOT.parent / "shared" / "data")) / "converted" / robot
+    file = Path(os.environ.get("CALMOTION_DATA", ROOT.parent / "shared" / "data")) / robot
     if not file.is_file():
         return None
     compose = [
