@@ -26,6 +26,7 @@ def homes(package: str) -> dict[str, str]:
         for statement in statements
         if isinstance(statement, ast.ImportFrom) and statement.module is not None
         for alias in statement.names
+        if alias.asname  # `name as name` is public, other imports serve annotations
     }
 
 

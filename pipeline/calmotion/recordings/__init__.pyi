@@ -1,0 +1,17 @@
+"""Public names of `calmotion.recordings`: each is imported when it is first used."""
+
+from calmotion.recordings.reader import RecordingReader as RecordingReader
+from calmotion.recordings.reader import first_line as first_line
+from calmotion.recordings.reader import hash_of as hash_of
+from calmotion.recordings.reading import measured_prims as measured_prims
+from calmotion.recordings.reading import read_recordings as read_recordings
+from calmotion.recordings.reading import requested as requested
+from calmotion.recordings.recording import ACCELEROMETER as ACCELEROMETER
+from calmotion.recordings.recording import ANGLE as ANGLE
+from calmotion.recordings.recording import COMPONENTS as COMPONENTS
+from calmotion.recordings.recording import EFFORT as EFFORT
+from calmotion.recordings.recording import MARKER as MARKER
+from calmotion.recordings.recording import UNITS as UNITS
+from calmotion.recordings.recording import Channel as Channel
+from calmotion.recordings.recording import RecordingRequest as RecordingRequest
+from calmotion.recordings.recording import SensorRecording as SensorRecording
