@@ -1,4 +1,5 @@
-"""The rooms of the package: imports go down the floors and never up, and no circle of modules (docs/architecture.md).
+"""The rooms of the package: imports go down the floors and never up, and no circle of modules. Nothing needs a
+plugin that can be deleted (docs/architecture.md).
 
 All imports count: those inside functions, and those for type checkers.
 """
@@ -6,15 +7,18 @@ All imports count: those inside functions, and those for type checkers.
 from __future__ import annotations
 
 import ast
+import re
+import textwrap
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
-from floors import FLOORS
+from floors import FLOORS, MEASURED, optional_plugins
 
 PACKAGE = Path(__file__).resolve().parents[1] / "pipeline" / "calmotion"
 PLUGINS = PACKAGE.parents[1] / "plugins"
+TESTS = Path(__file__).resolve().parent
 
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 MODULES_OF_A_FOLDER = 14
@@ -126,6 +130,66 @@ def names_of_import(node: ast.AST) -> list[str]:
     modules = [f"{node.module}.{alias.name}" for alias in node.names]
     public = homes(node.module) if node.module in MODULES else {}
     return [name if name in MODULES and name.rsplit(".", 1)[1] not in public else node.module for name in modules]
+
+
+def plugins_of(path: Path) -> set[str]:
+    """The bundled plugins whose modules a file imports, or names in a text, as for `import_module`.
+
+    A helper of the tests of a plugin counts as the plugin. The modules of `pytest.importorskip` do not count: the test
+    is skipped where the plugin is deleted.
+    """
+    package = ["calmotion_plugins", *path.relative_to(PLUGINS).parts[:-1]] if path.is_relative_to(PLUGINS) else []
+    nodes = list(ast.walk(ast.parse(path.read_text())))
+    calls = [node for node in nodes if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "importorskip"]
+    skipped = {argument for call in calls for argument in call.args}
+    imported, texts = [], []
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            imported += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            imported += [".".join([*base, *filter(None, [node.module]), alias.name]) for alias in node.names]
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in skipped:
+            texts.append(node.value)
+    helpers = {name.partition(".")[0] for name in imported} & set(HELPERS)
+    named = re.findall(r"\bcalmotion_plugins\.(\w+)", "\n".join([*imported, *texts]))
+    return {*named, *(HELPERS[name] for name in helpers)}
+
+
+def is_part(path: Path, plugin: str) -> bool:
+    """Whether a file is of a plugin or its tests, or of those of a plugin that measures it where it is there."""
+    names = {plugin, *(other for other, measured in MEASURED.items() if plugin in measured)}
+    folders = [root / name for root in (PLUGINS, TESTS / "plugins", TESTS / "helpers") for name in names]
+    return path == TESTS / "plugins" / f"test_{plugin}.py" or any(path.is_relative_to(folder) for folder in folders)
+
+
+OPTIONAL = optional_plugins(PLUGINS)
+HELPERS = {path.stem: name for name in OPTIONAL for path in (TESTS / "helpers" / name).glob("*.py")}
+FILES = {path: plugins_of(path) for root in (PACKAGE, PLUGINS, TESTS) for path in sorted(root.rglob("*.py"))}
+
+
+@pytest.mark.parametrize("plugin", OPTIONAL)
+def test_only_an_optional_plugin_itself_and_its_tests_import_it(plugin):
+    users = [str(path) for path, plugins in FILES.items() if plugin in plugins and not is_part(path, plugin)]
+    assert not users
+
+
+def test_every_way_to_name_a_plugin_is_seen(tmp_path, monkeypatch):
+    monkeypatch.setitem(globals(), "PLUGINS", tmp_path)
+    source = """
+        import calmotion_plugins.one.inner
+        from calmotion_plugins import two, three
+        from calmotion_plugins.four import thing
+        import_module("calmotion_plugins.five.inner")
+        from ...six import thing
+        from ... import seven
+        from ..own import thing
+        pytest.importorskip("calmotion_plugins.eight")
+    """
+    file = tmp_path / "mine" / "room" / "module.py"
+    file.parent.mkdir(parents=True)
+    file.write_text(textwrap.dedent(source))
+    assert plugins_of(file) == {"one", "two", "three", "four", "five", "six", "seven", "mine"}
 
 
 def test_folders_and_modules_stay_small():

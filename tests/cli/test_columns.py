@@ -3,7 +3,6 @@
 import tempfile
 
 import pytest
-from calmotion.cli.commands.setup.bench import BENCHMARKS
 from calmotion.support.naming import distinct_names
 from calmotion.usd.reading import read_shot
 from one_hinge import ONE_HINGE
@@ -11,7 +10,7 @@ from one_hinge import ONE_HINGE
 WIDTH = 80
 HELP = [
     ("--help",), ("inspect", "--help"), ("simulate", "--help"), ("optimize", "--help"), ("rig", "--help"),
-    ("bench", "--help"), ("plugins", "--help"), ("cache", "--help"), ("cache", "info"),
+    ("plugins", "--help"), ("cache", "--help"), ("cache", "info"),
     ("plugins", "list"),
     *[("plugins", action, "--help") for action in ("list", "check", "enable", "disable", "new")],
     *[("cache", action, "--help") for action in ("info", "clear", "prune")],
@@ -45,18 +44,6 @@ def check(lines, names=()):
 @pytest.mark.parametrize("command", HELP, ids=" ".join)
 def test_help_and_lists(lines_of, command):
     check(lines_of(*command))
-
-
-@pytest.mark.parametrize("name", BENCHMARKS)
-def test_help_of_a_benchmark(name, monkeypatch, capsys):
-    from importlib import import_module
-
-    if name == "calibration":
-        pytest.importorskip("calmotion_plugins.calibration")
-    monkeypatch.setenv("COLUMNS", str(WIDTH))
-    with pytest.raises(SystemExit):
-        import_module(f"calmotion.benchmarks.{BENCHMARKS[name]}").main(["--help"])
-    check(capsys.readouterr().out.splitlines())
 
 
 def inspected(lines_of, shot):

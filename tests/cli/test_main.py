@@ -85,16 +85,6 @@ def test_help_imports_nothing_heavy():
     assert "optimize" in printed.stdout
 
 
-def test_benchmarks_take_their_own_arguments():
-    def bench(*arguments):
-        command = [sys.executable, "-m", "calmotion", "bench", *arguments]
-        return subprocess.run(command, capture_output=True, text=True, env=_environment())
-
-    done = bench("stability", "--only", "no map")
-    assert done.returncode == 0 and "0 cells run" in done.stdout, done.stderr
-    assert bench("nothing").returncode == 2
-
-
 def _environment():
     return os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
 

@@ -260,6 +260,5 @@ CASES: dict[str, Case] = {
     "a sequence that is no TOML": words("sequence shot.usda -o out --json", "shot.usda", outputs=("out",)),
     "a motor that is none": words("motors XM9999 --json", "XM9999"),
     "a material that is none": words("materials cheese --json", "cheese"),
-    "a benchmark that is none": words("bench nothing", "nothing", statuses=USAGE),
     "an inspection of modes into a file": words("inspect shot.usda --modes shot.usda --json", "shot.usda"),
 }

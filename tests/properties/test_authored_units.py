@@ -10,13 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from calmotion.benchmarks.scenes.beam_arm import beam_mesh
 from calmotion.model import FEMesh, FEMeshes, MeshQuality
 from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
+from calmotion.testing import beam_mesh
 from calmotion.usd import schemas
 from calmotion.usd.reading import read_shot
 from hypothesis import given

@@ -6,7 +6,7 @@ from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.simulation import simulate_to_tolerance
-from calmotion.tolerance.step_error import distance, frames_of, simulate_at
+from calmotion.tolerance.step_error import distance, frames_of_result, simulate_at
 from hypothesis import assume, event, given
 from hypothesis import strategies as st
 from random_shots import linkages, shots
@@ -32,4 +32,4 @@ def test_the_tolerance_is_kept(shot):
         assume(False)
     limit = finer + (finer - fine) / 3.0
     assume(distance(limit, finer) < TOLERANCE)  # the limit is known
-    assert distance(frames_of(result, animation.frame_times).positions, limit) < TOLERANCE
+    assert distance(frames_of_result(result, animation.frame_times).positions, limit) < TOLERANCE

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import chain, compiled, frame
-from calmotion.benchmarks.motors.lumped import simulate_lumped
 from calmotion.model import Animation, MassProperties, Target, Track
 from calmotion.model.motor import Rotor
 from calmotion.model.run import RunSettings
@@ -18,6 +17,7 @@ from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
+from calmotion.testing import simulate_lumped
 from calmotion.tolerance.motors.motor_effects import with_gains_used
 from calmotion.usd.reading import read_shot
 from motor_runs import pitch, run

@@ -10,15 +10,14 @@ import numpy as np
 import pytest
 import trimesh
 from beams import pushed_beam
-from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.model import FEMeshes, SurfaceMesh
 from calmotion.model.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.testing import host_with, run_operator
+from calmotion.testing import beam_arm, host_with, quintic, run_operator, shot_of
 from calmotion.tolerance.reduction import converged_reduction
 from calmotion.tolerance.simulation import simulate_to_tolerance
-from calmotion.tolerance.step_error import frames_of
+from calmotion.tolerance.step_error import frames_of_result
 from mesher_links import PLUGIN
 from swung_beam import square_beam, swing
 
@@ -88,7 +87,7 @@ def test_it_is_swung_as_far_as_the_beam(swung, tolerance):
     result = simulated(swung, animation, tolerance)
     load = PAYLOAD, PAYLOAD * (2.0 * THICKNESS) ** 2 / 6.0
     _, tip = swing(LENGTH, square_beam(MODULUS, DENSITY, THICKNESS), load, turn, 1.0 / 3840.0, 0.45)
-    x, _, z = frames_of(result, animation.frame_times).positions[:, 0].T
+    x, _, z = frames_of_result(result, animation.frame_times).positions[:, 0].T
     angle, tip = turn(animation.frame_times), tip[::20]
     along, across = np.cos(angle) * x + np.sin(angle) * z, np.cos(angle) * z - np.sin(angle) * x
     assert 0.03 < np.abs(tip[:, 1]).max() < 0.032

@@ -2,12 +2,18 @@
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.optimizer.optimizer import make_problem
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
+from calmotion.retargeting.problem.offset_basis import make_basis
+from calmotion.retargeting.problem.offset_space import OffsetSpace
+from calmotion.retargeting.problem.posing import CLOSENESS, SMOOTHNESS
+from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.damping_homotopy import FAR, damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
+from calmotion.simulation.inputs.curves import sample_curves
+from calmotion.simulation.intended_motion import rigid_motion
 from calmotion.simulation.preparation import modes_of, prepare
+from calmotion.simulation.target_errors import Objective
 from made_shots import soft_linkage_shot
 from posed import ignore_progress
 
@@ -17,6 +23,18 @@ OPTIONS = RunSettings(step=1 / 120)
 @pytest.fixture(scope="module")
 def shot():
     return soft_linkage_shot()
+
+
+def make_problem(shot, prepared, spacing):
+    """The problem without limits, knots `spacing` [s] apart."""
+    model, grid, world = prepared.model, prepared.grid, prepared.world
+    curves = sample_curves(shot.animation.tracks, grid)
+    meant = rigid_motion(model, curves.angles, curves.rates, grid.h, world, grid.cyclic)
+    objective = Objective.over(model, meant, grid, shot.animation.weights)
+    count = len(shot.character.motors)
+    motors = np.arange(count, dtype=np.int32)
+    space = OffsetSpace.uncoupled(make_basis(grid, spacing, False), motors, count, SMOOTHNESS, CLOSENESS)
+    return RetargetProblem(model, grid, curves, objective, space, world)
 
 
 def largest(simulation):

@@ -4,8 +4,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.common.timing import fresh_cache
-from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.model.run import RunSettings
 from calmotion.multibody.model.model import body_anchors
 from calmotion.multibody.model.topology import span_tree
@@ -13,6 +11,7 @@ from calmotion.reduction import reduce as finite_elements
 from calmotion.reduction.full_order.full_models import FullModels
 from calmotion.simulation.bodies import full_model_of, reduce_bodies
 from calmotion.simulation.body_reduction import load_envelopes
+from calmotion.testing import beam_arm, fresh_cache, quintic, shot_of
 
 
 def reduced(arm, animation, meshes, tolerance, full=None):

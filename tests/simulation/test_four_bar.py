@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.scenes.beam_arm import quintic, shot_of
 from calmotion.model.run import RunSettings
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.topology import span_tree
@@ -13,6 +12,7 @@ from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.intended_motion import rigid_motion
 from calmotion.simulation.preparation import prepare
+from calmotion.testing import quintic, shot_of
 from four_bar import COUPLER, CRANK, GROUND, ROCKER, corners, four_bar
 
 

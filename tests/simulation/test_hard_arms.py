@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.scenes.beam_arm import IDENTITY, beam_arm, quintic, shot_of
 from calmotion.errors import ShotError
 from calmotion.model import Body, Frame, Joint, MassProperties
+from calmotion.testing import beam_arm, quintic, shot_of
+from calmotion.testing.beam_arms import IDENTITY
 from made_shots import simulated
 
 STEEL = {"youngs_modulus": 2.1e11, "density": 7800.0}

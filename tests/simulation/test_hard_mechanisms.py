@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.errors import ShotError
 from calmotion.model import FEMeshes, Frame
+from calmotion.testing import beam_arm, quintic, shot_of
 from four_bar import four_bar
 from made_shots import simulated
 from neutral_hinges import push_rod, truss, turning

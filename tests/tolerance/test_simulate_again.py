@@ -12,7 +12,7 @@ from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.tolerance import simulate_again
 from calmotion.tolerance.reduced_bodies import RunMemory
 from calmotion.tolerance.simulation import simulate_to_tolerance
-from calmotion.tolerance.step_error import distance, frames_of
+from calmotion.tolerance.step_error import distance, frames_of_result
 
 TOLERANCE = 1e-3
 OPTIONS = RunSettings(tolerance=TOLERANCE)
@@ -42,7 +42,7 @@ def edited(shot, factor):
 
 
 def positions(result, shot):
-    return frames_of(result, shot.animation.frame_times).positions
+    return frames_of_result(result, shot.animation.frame_times).positions
 
 
 def test_an_edit_keeps_step_and_subspaces_and_the_tolerance(shot, first, monkeypatch):

@@ -19,7 +19,7 @@ from calmotion.tolerance import step_choice
 from calmotion.tolerance.pod_subspace import ProjectedShot
 from calmotion.tolerance.simulation import found_tracks, planned_step, simulate_to_tolerance
 from calmotion.tolerance.step_choice import WHOLE
-from calmotion.tolerance.step_error import CLOSED_GAP, distance, frames_of, simulate_at
+from calmotion.tolerance.step_error import CLOSED_GAP, distance, frames_of_result, simulate_at
 
 FINE = 1 / 7680
 
@@ -55,7 +55,7 @@ def test_a_simulation_keeps_its_tolerance_by_a_step_no_smaller_than_it_must(arm,
 def test_efforts_are_stated_with_their_error(arm, animation, bodies, options):
     shot = compile_shot(arm, animation, bodies)
     result, fine = simulate_to_tolerance(shot, options, quiet), simulate_at(shot, RunSettings(), FINE)
-    efforts = frames_of(result, animation.frame_times).efforts
+    efforts = frames_of_result(result, animation.frame_times).efforts
     off, largest = np.abs(efforts - fine.efforts).max(axis=0), np.abs(efforts).max(axis=0)
     assert np.all(off < 1.5 * result.accuracy.efforts)
     assert np.all(result.accuracy.efforts < 0.5 * largest)
@@ -237,4 +237,4 @@ def test_a_search_continues_where_the_pod_subspace_does_not_fit(arm, animation, 
     subspaces = [row for row in result.left_out if "POD subspace" in row.what]
     assert len(subspaces) == 2
     whole = simulate_at(shot.with_tracks(compared[0]), RunSettings(), 1 / 480)
-    assert distance(whole.positions, frames_of(result, animation.frame_times).positions) < 1e-4
+    assert distance(whole.positions, frames_of_result(result, animation.frame_times).positions) < 1e-4

@@ -22,6 +22,7 @@ from calmotion.model.character import Target as Target
 from calmotion.model.character import TetGeometry as TetGeometry
 from calmotion.model.character import motors_give as motors_give
 from calmotion.model.character import with_ideal_motors as with_ideal_motors
+from calmotion.model.character import with_settings as with_settings
 from calmotion.model.curves import Sample as Sample
 from calmotion.model.curves import commanded_curves as commanded_curves
 from calmotion.model.curves import curve_of as curve_of
@@ -77,6 +78,7 @@ from calmotion.model.result import is_reached as is_reached
 from calmotion.model.robust.robots import Robustness as Robustness
 from calmotion.model.robust.settings import RobustSettings as RobustSettings
 from calmotion.model.run import LONG_SHOT as LONG_SHOT
+from calmotion.model.run import SHAPERS as SHAPERS
 from calmotion.model.run import OutputPaths as OutputPaths
 from calmotion.model.run import RunSettings as RunSettings
 from calmotion.model.run import Source as Source

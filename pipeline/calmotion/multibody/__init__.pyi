@@ -2,11 +2,13 @@
 
 from calmotion.model.character import WORLD as WORLD
 from calmotion.multibody.analysis.kinematics import rigid_poses as rigid_poses
+from calmotion.multibody.analysis.kinematics import rigid_state as rigid_state
 from calmotion.multibody.analysis.reactions import reactions as reactions
 from calmotion.multibody.failure import NOWHERE as NOWHERE
 from calmotion.multibody.failure import Reason as Reason
 from calmotion.multibody.failure import SimulationFailure as SimulationFailure
 from calmotion.multibody.integrators.coefficients import IMPLICIT as IMPLICIT
+from calmotion.multibody.integrators.simulation import simulate_on as simulate_on
 from calmotion.multibody.integrators.workspace import Workspace as Workspace
 from calmotion.multibody.mechanism import Mechanism as Mechanism
 from calmotion.multibody.model.joint_arrays import body_anchors as body_anchors
@@ -23,4 +25,5 @@ from calmotion.multibody.runs import ModelRun as ModelRun
 from calmotion.multibody.runs import linearize as linearize
 from calmotion.multibody.runs import natural_modes as natural_modes
 from calmotion.multibody.runs import simulate as simulate
+from calmotion.multibody.statics.equilibrium import equilibrium as equilibrium
 from calmotion.reduction.reduced_body import ReducedBody as ReducedBody

@@ -1,7 +1,15 @@
 """Public names of `calmotion.reduction`: each is imported when it is first used."""
 
+from calmotion.reduction.cache import cache_key as cache_key
+from calmotion.reduction.cache import recomputed as recomputed
 from calmotion.reduction.damping import modal_damping as modal_damping
+from calmotion.reduction.discretization_error import clamped_modes as clamped_modes
+from calmotion.reduction.discretization_error import frequency_errors as frequency_errors
+from calmotion.reduction.elements.assembly import assemble as assemble
 from calmotion.reduction.inertia import inertia_integrals as inertia_integrals
+from calmotion.reduction.load_envelope import LoadEnvelope as LoadEnvelope
+from calmotion.reduction.mesh_refinement import Effort as Effort
+from calmotion.reduction.mesh_refinement import refined_for_frequencies as refined_for_frequencies
 from calmotion.reduction.reduce import LinearModes as LinearModes
 from calmotion.reduction.reduced_body import Invariants as Invariants
 from calmotion.reduction.reduced_body import ReducedBody as ReducedBody

@@ -43,7 +43,7 @@ from calmotion.tolerance.simulation import (
     with_subspaces,
 )
 from calmotion.tolerance.step_choice import FIRST, LAST, allowed_step_error, chooses_step
-from calmotion.tolerance.step_error import StepRun, distance, frames_of, largest_step, order_of, simulate_at
+from calmotion.tolerance.step_error import StepRun, distance, frames_of_result, largest_step, order_of, simulate_at
 
 MARGIN, MOST = 0.8, 3  # safety factor of a new step, and most searches
 FIRST_STEP = 0.2  # of the shake: the error that the step of the first search may have
@@ -189,7 +189,7 @@ def _is_accurate(
     finer = projected.finer_run(result.step_s, options, tracks)
     if finer is None:
         return True
-    off = distance(finer.positions, frames_of(result, animation.frame_times).positions)
+    off = distance(finer.positions, frames_of_result(result, animation.frame_times).positions)
     if off <= HELD * tolerance_of(character, options.tolerance):
         projected.tell(max(off, projected.error_m))
         return True

@@ -17,5 +17,6 @@ from calmotion.support.memory import too_large as too_large
 from calmotion.support.naming import distinct_names as distinct_names
 from calmotion.support.naming import nearest as nearest
 from calmotion.support.processes.workers import Fault as Fault
+from calmotion.support.processes.workers import results_of as results_of
 from calmotion.support.reading import read_text as read_text
 from calmotion.support.reading import read_toml as read_toml

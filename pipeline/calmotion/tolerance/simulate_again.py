@@ -19,7 +19,7 @@ from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.simulate import Progress, simulate_shot
 from calmotion.tolerance.pod_subspace import ProjectedShot, ReferenceRun
 from calmotion.tolerance.reduced_bodies import RunMemory
-from calmotion.tolerance.step_error import StepRun, distance, frames_of, run_or_none, simulate_at
+from calmotion.tolerance.step_error import StepRun, distance, frames_of_result, run_or_none, simulate_at
 
 
 def with_last_choices(
@@ -56,7 +56,7 @@ def with_last_choices(
         result, coarse, finer = in_parallel(lambda task: task(), tasks)
     except IntegrationError:
         return None
-    run = replace(frames_of(result, shot.animation.frame_times), integrator=memory.integrator)
+    run = replace(frames_of_result(result, shot.animation.frame_times), integrator=memory.integrator)
     if coarse is None or coarse.step < 1.5 * run.step:
         return None
     off = 0.0 if finer is None else distance(run.positions, finer.positions)

@@ -33,7 +33,7 @@ from calmotion.tolerance.step_choice import FIRST, allowed_step_error, chooses_s
 from calmotion.tolerance.step_error import (
     StepRun,
     effort_errors,
-    frames_of,
+    frames_of_result,
     order_of,
     run_or_none,
     simulate_at,
@@ -75,7 +75,7 @@ def simulate_to_tolerance(
         trials: list[StepRun] = []
         step, error = chosen_step(projected.shot, options, left_out, trials)
         result = with_modes(simulate_shot(projected.shot, replace(options, step=step), progress), shot.bodies)
-        run = replace(frames_of(result, shot.animation.frame_times), integrator=options.scheme)
+        run = replace(frames_of_result(result, shot.animation.frame_times), integrator=options.scheme)
         if memory is not None:
             memory.projected, memory.step, memory.integrator = projected, step, options.scheme
         accuracy = _accuracy(error, left_out, projected.shot, options, run)
@@ -115,7 +115,7 @@ def with_accuracy(result: Result, shot: CompiledShot, options: RunSettings, left
         shot: With the curves of the result.
         left_out: Error of what the bodies do without [m].
     """
-    own = replace(frames_of(result, shot.animation.frame_times), integrator=options.scheme)
+    own = replace(frames_of_result(result, shot.animation.frame_times), integrator=options.scheme)
     fine, mesh, patch = at_once(
         partial(simulate_at, shot, options, 0.5 * result.step_s),
         partial(mesh_error, shot, options, own),

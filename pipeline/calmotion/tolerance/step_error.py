@@ -121,7 +121,7 @@ def _efforts(prepared: Prepared, run: ForwardRun, frames: IntArray) -> Array:
     return efforts
 
 
-def frames_of(result: Result, frame_times: Array) -> StepRun:
+def frames_of_result(result: Result, frame_times: Array) -> StepRun:
     """The motion of a result that counts, at the frames [s]."""
     motion = (result.after or result.before).motion
     # times are sums of steps, so a frame may come out a rounding later

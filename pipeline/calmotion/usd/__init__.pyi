@@ -9,6 +9,9 @@ from calmotion.usd.layers import EXTENSIONS as EXTENSIONS
 from calmotion.usd.layers import refuse_input_as_output as refuse_input_as_output
 from calmotion.usd.layers import write_layer as write_layer
 from calmotion.usd.reading.actuators.motor_models import DAMPING_ON as DAMPING_ON
+from calmotion.usd.reading.bodies.mass import mass_of as mass_of
+from calmotion.usd.reading.bodies.shapes import shapes_of as shapes_of
+from calmotion.usd.reading.bodies.shapes import tets_of as tets_of
 from calmotion.usd.reading.context import Reading as Reading
 from calmotion.usd.reading.context import body_on as body_on
 from calmotion.usd.reading.context import is_rigid_body as is_rigid_body
@@ -19,6 +22,7 @@ from calmotion.usd.reading.generic_joints.freedoms import TRANSLATIONS as TRANSL
 from calmotion.usd.reading.generic_joints.freedoms import freedoms as freedoms
 from calmotion.usd.reading.generic_joints.freedoms import limits_of as limits_of
 from calmotion.usd.reading.joints import joint_prims as joint_prims
+from calmotion.usd.reading.joints import read_joint as read_joint
 from calmotion.usd.reading.motors.driven_motors import actuated_joints as actuated_joints
 from calmotion.usd.reading.motors.gears.coupling_joints import COUPLED as COUPLED
 from calmotion.usd.reading.motors.gears.coupling_joints import coupled as coupled

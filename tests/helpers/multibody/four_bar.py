@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.benchmarks.scenes.beam_arm import LIFTS, beam_mesh
 from calmotion.model import (
     Body,
     Character,
@@ -20,6 +19,8 @@ from calmotion.model import (
     Target,
 )
 from calmotion.model.character import WORLD
+from calmotion.testing import beam_mesh
+from calmotion.testing.beam_arms import LIFTS
 from scipy.spatial.transform import Rotation
 
 # crank, coupler, rocker and ground [m]: a crank-rocker (Grashof: 0.12 + 0.5 < 0.4 + 0.42)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from calmotion.benchmarks.scenes.beam_arm import IDENTITY, LIFTS
 from calmotion.model import Body, Character, Frame, Joint, MassProperties, Motor, Target
 from calmotion.model.character import WORLD
+from calmotion.testing.beam_arms import IDENTITY, LIFTS
 
 _ANGLE = "drive:angular:physics:targetPosition"
 _HEAVY, _SMALL = 0.4, 1e-3 * np.eye(3)

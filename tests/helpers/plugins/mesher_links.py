@@ -11,6 +11,7 @@ import trimesh
 from calmotion.mesh.repair import closed_solid
 from calmotion.model import Body, Character, ElasticMaterial, FEMeshes, FlexibleSettings, Frame, SurfaceMesh
 from calmotion.testing import run_operator
+from calmotion.tolerance.meshes.accurate_mesh import frames_of
 
 PLUGIN = Path(__file__).resolve().parents[3] / "plugins" / "fe_mesher"
 REST = Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
@@ -80,6 +81,17 @@ def links_of(shared_data, *names):
                 surfaces.append(SurfaceMesh(str(child.GetPath()), points, triangles))
         found[prim.GetName()] = tuple(surfaces)
     return [found[name] for name in names]
+
+
+def link_of(file, name):
+    """The body of a link of a robot's file, with flexible settings, and the frames of its joints."""
+    from calmotion.usd.reading import read_shot
+
+    if not file.is_file():
+        pytest.skip("the robot is not here")
+    character, _, _ = read_shot(str(file), still=True)
+    index = next(k for k, body in enumerate(character.bodies) if body.path.endswith(f"/{name}"))
+    return replace(character.bodies[index], flexible=FLEXIBLE), frames_of(character, index)
 
 
 def divided(points, triangles):

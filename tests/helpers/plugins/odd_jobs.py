@@ -1,4 +1,4 @@
-"""A function that processes run, and that raises, crashes or hangs: they import it by its name."""
+"""A function that processes run, and that refuses, raises, crashes or hangs: they import it by its name."""
 
 from __future__ import annotations
 
@@ -6,8 +6,12 @@ import os
 import signal
 import time
 
+from calmotion.errors import ShotError
+
 
 def odd_job(kind, value):
+    if kind == "refuse":
+        raise ShotError(f"there are no {value}", path="SHOTS")
     if kind == "raise":
         raise ValueError(f"no {value}")
     if kind == "crash":
@@ -17,12 +21,3 @@ def odd_job(kind, value):
     if kind == "hang":
         time.sleep(1e3)
     return value, os.getpid()
-
-
-def odd_survey(link, *rest):
-    """The survey of a link, in which that with the name `fore` ends the process."""
-    from calmotion.benchmarks.links.survey import survey_link
-
-    if link.name == "fore":
-        os.kill(os.getpid(), signal.SIGSEGV)
-    return survey_link(link, *rest)

@@ -11,7 +11,6 @@ from unittest.mock import patch
 
 import four_bar
 import numpy as np
-from calmotion.benchmarks.scenes.beam_arm import beam_mesh, quintic
 from calmotion.model import (
     WORLD,
     Animation,
@@ -35,6 +34,7 @@ from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
+from calmotion.testing import beam_mesh, quintic
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.benchmarks.scenes.beam_arm import IDENTITY, LIFTS, beam_mesh
 from calmotion.model import (
     Animation,
     Body,
@@ -22,6 +21,8 @@ from calmotion.model import (
     Track,
 )
 from calmotion.model.character import WORLD
+from calmotion.testing import beam_mesh
+from calmotion.testing.beam_arms import IDENTITY, LIFTS
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 

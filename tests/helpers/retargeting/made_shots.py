@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.model.run import RunSettings
 from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.simulation.simulate import simulate_shot
+from calmotion.testing import beam_arm, quintic, shot_of
 from linkage_arm import SOFT, linkage_arm, performance
 
 

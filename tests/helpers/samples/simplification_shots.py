@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.benchmarks.scenes.beam_arm import IDENTITY, LIFTS, beam_arm, beam_mesh, quintic, shot_of
 from calmotion.model import (
     Animation,
     Body,
@@ -25,6 +24,8 @@ from calmotion.model import (
     Track,
 )
 from calmotion.model.character import WORLD
+from calmotion.testing import beam_arm, beam_mesh, quintic, shot_of
+from calmotion.testing.beam_arms import IDENTITY, LIFTS
 
 _ANGLE, _LENGTH = "drive:angular:physics:targetPosition", "drive:linear:physics:targetPosition"
 _SIDE = np.roll(np.array([0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)]), 1)  # z to x: a slider's axis along x

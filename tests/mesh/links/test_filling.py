@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.errors import ShotError
-from calmotion.mesh.element_size import shape_of
+from calmotion.mesh.element_sizes import shape_of
 from calmotion.mesh.grids import gridded
 from calmotion.mesh.grids.contacts import without_contacts
 from calmotion.mesh.repair import closed_solid

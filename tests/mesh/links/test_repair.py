@@ -9,7 +9,7 @@ import trimesh
 from calmotion.errors import ShotError
 from calmotion.mesh.repair import closed_solid
 from calmotion.model import SurfaceMesh
-from mesher_links import box, link, links_of, run, solid, surface
+from mesher_links import box, link, link_of, links_of, run, solid, surface
 
 
 def test_overlapping_parts_are_united():
@@ -156,13 +156,8 @@ def test_links_of_a_real_robot_are_closed(shared_data):
 @pytest.mark.parametrize(("name", "volume"), [("link2", 3.947e-3), ("link4", 2.736e-3), ("link7", 3.08e-4)])
 def test_links_in_several_colours_and_with_gaps_of_a_tenth_of_a_millimetre_are_closed(shared_data, name, volume):
     """KUKA iiwa: orange and grey are open meshes of their own; the flange misses the link by 0.1 mm."""
-    from calmotion.benchmarks.scenes.links import read_links
-
-    file = shared_data / "converted" / "kuka_iiwa_14" / "iiwa14.usda"
-    if not file.is_file():
-        pytest.skip("the robot is not here")
-    (found,) = read_links(f"{file}:{name}")
-    made = solid(*(s for s in found.body.surfaces if s.visible))
+    body, _ = link_of(shared_data / "converted" / "kuka_iiwa_14" / "iiwa14.usda", name)
+    made = solid(*(s for s in body.surfaces if s.visible))
     assert made.volume == pytest.approx(volume, rel=5e-3)
     assert any(re.search("joined 2 open|bridged gaps of up to 0.1 mm", repair) for repair in made.repairs)
 

@@ -3,7 +3,6 @@ import dataclasses
 import numpy as np
 import pytest
 from arms import chain, compiled
-from calmotion.benchmarks.scenes.beam_arm import beam_arm
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.modes import elastic_modes, falling_rate, system_modes
 from calmotion.multibody.integrators.workspace import Workspace
@@ -11,6 +10,7 @@ from calmotion.multibody.model.model import compile_model
 from calmotion.multibody.model.topology import span_tree
 from calmotion.multibody.statics.equilibrium import equilibrium
 from calmotion.simulation.bodies import reduce_bodies
+from calmotion.testing import beam_arm, branched_links
 from four_bar import four_bar
 from particles import particle_system
 from sweep_cases import rigid_start
@@ -45,6 +45,11 @@ def reduced(made):
     character, meshes = made
     tree = span_tree(character)
     return compile_model(character, tree, reduce_bodies(character, tree, meshes))
+
+
+def branched():
+    character, bodies = branched_links()
+    return compile_model(character, span_tree(character), bodies)
 
 
 def test_elastic_modes_are_those_of_the_undeformed_character():
@@ -87,10 +92,9 @@ def test_what_hangs_free_has_no_elastic_frequency():
 
 def test_motions_along_a_tree_span_those_that_joints_allow(monkeypatch):
     """`null_space` takes time with the cube of the number of bodies."""
-    from calmotion.benchmarks.speed.scaling import branches, prepared
     from calmotion.multibody.analysis import modes
 
-    model, found, spans = prepared(*branches()), [], []
+    model, found, spans = branched(), [], []
     along = modes._tree_motions
     for motions in (along, lambda *arguments: None):
         monkeypatch.setattr(modes, "_tree_motions", motions)
@@ -106,10 +110,9 @@ def test_motions_along_a_tree_span_those_that_joints_allow(monkeypatch):
 
 
 def test_joints_that_form_a_loop_or_leave_a_child_free_are_not_a_tree_of_welds():
-    from calmotion.benchmarks.speed.scaling import branches, prepared
     from calmotion.multibody.analysis import modes
 
-    model = prepared(*branches())
+    model = branched()
     system, offset = model.system, np.concatenate([[0], np.cumsum(6 + model.system.elastic)])
     rows = np.zeros((6 * len(system.rows), int(offset[-1])))
     assert modes._tree_motions(system, rows, offset) is None, "no row tells anything of a child"

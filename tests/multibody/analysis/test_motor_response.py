@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.scenes.beam_arm import beam_arm, shot_of
 from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.motor_response import motor_responses
 from calmotion.multibody.analysis.rigid_response import RigidResponse
@@ -15,6 +14,7 @@ from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.intended_motion import rigid_motion
 from calmotion.simulation.preparation import prepare
+from calmotion.testing import beam_arm, shot_of
 from linkage_arm import linkage_arm, performance
 from scipy.spatial.transform import Rotation
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.modes import system_modes
@@ -11,6 +10,7 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.simulation.body_reduction import BodyReduction
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.preparation import prepare
+from calmotion.testing import beam_arm, quintic, shot_of
 
 PERIODS = 10
 

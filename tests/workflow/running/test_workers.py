@@ -10,7 +10,7 @@ from calmotion.errors import ShotError
 from calmotion.host import SettingError
 from calmotion.support.processes.workers import Fault
 from calmotion.workflow.running.workers import executor_on, finished, result_of, results_on
-from calmotion_plugins.shows.batch.jobs import jobs_for
+from odd_jobs import odd_job
 
 
 def test_threads_of_this_machine_share_its_processors():
@@ -91,27 +91,27 @@ def test_what_is_lost_has_a_reason():
     assert "OSError: the node is gone" in result_of(lost).reason and "scheduler" in result_of(gone).reason
 
 
-def test_calls_on_this_machine_are_processes_of_their_own(tmp_path):
+def test_calls_on_this_machine_are_processes_of_their_own():
     found = dict(results_on("local", 2, os.getpid, [(), ()]))
     assert os.getpid() not in found.values() and len(found) == 2
     ((_, died),) = results_on("local", 1, os._exit, [(3,)])
     assert isinstance(died, Fault) and "exit status 3" in died.reason
     ((_, failed),) = results_on("local", 1, divmod, [(7, 0)])
     assert isinstance(failed, Fault) and failed.reason.startswith("ZeroDivisionError")
-    ((_, refused),) = results_on("local", 1, jobs_for, [([], str(tmp_path), "optimize")])
+    ((_, refused),) = results_on("local", 1, odd_job, [("refuse", "shots")])
     assert isinstance(refused, ShotError)
     assert (refused.problem, refused.path, refused.found) == ("there are no shots", "SHOTS", None)
 
 
 @pytest.mark.long
-def test_calls_on_dask_come_back_refused_or_with_the_reason_why_they_are_lost(tmp_path):
+def test_calls_on_dask_come_back_refused_or_with_the_reason_why_they_are_lost():
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
     ) as cluster:
         address = cluster.scheduler_address.replace("tcp://", "dask://")
         assert dict(results_on(address, 1, divmod, [(7, 2), (9, 4)])) == {0: (3, 1), 1: (2, 1)}
-        ((_, refused),) = results_on(address, None, jobs_for, [([], str(tmp_path), "optimize")])
+        ((_, refused),) = results_on(address, None, odd_job, [("refuse", "shots")])
         assert isinstance(refused, ShotError) and refused.path == "SHOTS"
         ((_, died),) = results_on(address, None, os._exit, [(3,)])
         assert isinstance(died, Fault) and "KilledWorker" in died.reason

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.element_size import Shape, expected_nodes, smallest_size
+from calmotion.mesh.element_sizes import Shape, expected_nodes, smallest_size
 from calmotion.mesh.grids.boundary_fit import fitted
 from calmotion.mesh.grids.grid_tets import GRID, grid_tets
 from calmotion.mesh.repair.closed_solid import Solid

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.element_size import Shape, envelope, expected_nodes, smallest_size
+from calmotion.mesh.element_sizes import Shape, envelope, expected_nodes, smallest_size
 from calmotion.mesh.grids.contacts import without_contacts
 from calmotion.mesh.grids.gridded import gridded
 from calmotion.mesh.repair.closed_solid import Solid, simplified

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.element_size import ACCURACY, envelope
+from calmotion.mesh.element_sizes import ACCURACY, envelope
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.mesh.tetrahedralize.filling import INTERSECTS, MAX_VOLUME_ERROR, filled
 from calmotion.mesh.tetrahedralize.tetwild import ProcessorTime

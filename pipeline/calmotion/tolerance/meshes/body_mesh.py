@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.element_size import MAX_NODES, element_size, shape_of
+from calmotion.mesh.element_sizes import MAX_NODES, element_size, shape_of
 from calmotion.mesh.grids.contacts import without_contacts
 from calmotion.mesh.mesh_file import read_mesh_file
 from calmotion.mesh.solid import mass_of_solid

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from calmotion.mesh.element_size import Shape
+from calmotion.mesh.element_sizes import Shape
 from calmotion.mesh.repair.closed_solid import Solid
 from calmotion.mesh.tetrahedralize.tetwild import TIME_LIMIT
 

@@ -19,7 +19,7 @@ from calmotion.tolerance.integrator_choice import by_fast_scheme
 from calmotion.tolerance.meshes.mesh_budget import MOST_NODES, mesh_error
 from calmotion.tolerance.pod_subspace import project_to_subspace
 from calmotion.tolerance.simulation import found_tracks
-from calmotion.tolerance.step_error import StepRun, distance, frames_of, simulate_at
+from calmotion.tolerance.step_error import StepRun, distance, frames_of_result, simulate_at
 from calmotion.tolerance.verification.parts_in_time import (
     Elsewhere,
     in_parts,
@@ -57,7 +57,7 @@ def verify(
         shot = shot.with_bodies(_finer(shot, reduction, options, progress))
     progress(0.5, "simulating with a finer step")
     step, frame_times = STEP * result.step_s, shot.animation.frame_times
-    own, modes = frames_of(result, frame_times), _coordinates(shot.bodies)
+    own, modes = frames_of_result(result, frame_times), _coordinates(shot.bodies)
     parts = () if elsewhere is None else parts_in_time(shot.animation, elsewhere.length, lead_time(shot))
     if elsewhere is None or len(parts) < 2 or shot.character.retarget.cyclic or contact_joints(shot.character):
         fine, meshes = finer_run(shot, options, step)

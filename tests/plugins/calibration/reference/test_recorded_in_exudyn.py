@@ -4,9 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.scenes.beam_arm import IDENTITY, beam_arm
-from calmotion.benchmarks.scenes.recorded_arm import MESH
-from calmotion.benchmarks.speed.exudyn_arm import LENGTH, MATERIAL, PAYLOAD, RETARDATION, THICKNESS, Exudyn
 from calmotion.model import Animation, Joint, Track
 from calmotion.model.curves import curve_of
 from calmotion.model.run import RunSettings
@@ -15,17 +12,21 @@ from calmotion.recordings import ACCELEROMETER, MARKER, Channel, SensorRecording
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
+from calmotion.testing import ExudynArm as Arm
+from calmotion.testing import beam_arm
+from calmotion.testing.beam_arms import IDENTITY
 from calmotion_plugins.calibration.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion_plugins.calibration.identification.robots import robot_with
 from calmotion_plugins.calibration.identification.signals import signals_of
 from calmotion_plugins.calibration.model.estimates import HIGHER_MODES
 from scipy.interpolate import make_interp_spline
 
-OTHER_MESH = (20, 3, (2.0, 1.5))  # elements of the arm in Exudyn: along and across, and their grading
+MESH = (24, 4, (2.0, 1.5))  # of the model: elements of the arm along and across, and their grading
+OTHER_MESH = (20, 3, (2.0, 1.5))  # of the arm in Exudyn
 SECONDS, AFTER, RATE = 1.5, 0.8, 1920
 NOISE = {MARKER: 3e-4, ACCELEROMETER: 0.1}  # [m], [m/s^2]
 STIFFER, DAMPED, HEAVIER = 1.25, 1.6, 1.12  # the real arm over that of the shot
-TRUTH = {"modulus": STIFFER * MATERIAL.youngs_modulus, "damping": DAMPED, "mass": HEAVIER * PAYLOAD}
+TRUTH = {"modulus": STIFFER * Arm.MATERIAL.youngs_modulus, "damping": DAMPED, "mass": HEAVIER * Arm.PAYLOAD}
 OPTIONS = RunSettings(step=1 / 480)
 
 
@@ -45,16 +46,16 @@ FIRST, OTHER = motion(0.8, 0.1, 0.5), motion(-0.6, 0.2, 0.8)
 def real():
     pytest.importorskip("exudyn")
     stuff = replace(
-        MATERIAL, youngs_modulus=TRUTH["modulus"], rayleigh=(0.0, DAMPED * RETARDATION)
+        Arm.MATERIAL, youngs_modulus=TRUTH["modulus"], rayleigh=(0.0, DAMPED * Arm.RETARDATION)
     )  # fmt: skip
-    return Exudyn(stuff, TRUTH["mass"], OTHER_MESH)
+    return Arm(stuff, TRUTH["mass"], OTHER_MESH)
 
 
 @pytest.fixture(scope="module")
 def model():
     cells, across, grading = MESH
     character, meshes = beam_arm(
-        length=LENGTH, thickness=THICKNESS, payload=PAYLOAD, elasticity="linear", gravity=0.0, cells=cells,
+        length=Arm.LENGTH, thickness=Arm.THICKNESS, payload=Arm.PAYLOAD, elasticity="linear", gravity=0.0, cells=cells,
         across=across, grading=grading,
     )  # fmt: skip
     link = character.bodies[0]
@@ -64,7 +65,7 @@ def model():
     )
     character = replace(
         character,
-        bodies=(replace(link, flexible=replace(link.flexible, material=MATERIAL)), *character.bodies[1:]),
+        bodies=(replace(link, flexible=replace(link.flexible, material=Arm.MATERIAL)), *character.bodies[1:]),
         joints=(upright, *character.joints[1:]),
     )
     return character, reduce_bodies(character, span_tree(character), meshes)

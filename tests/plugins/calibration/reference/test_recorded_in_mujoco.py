@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import chain, frame
-from calmotion.benchmarks.motors.lumped import simulate_lumped
 from calmotion.model import Animation, Target, Track
 from calmotion.model.curves import curve_of
 from calmotion.model.motor import Rotor
@@ -13,6 +12,7 @@ from calmotion.model.run import RunSettings
 from calmotion.recordings import ANGLE, MARKER, Channel, SensorRecording
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
+from calmotion.testing import simulate_lumped
 from calmotion_plugins.calibration.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion_plugins.calibration.identification.robots import robot_with
 from calmotion_plugins.calibration.identification.signals import signals_of

@@ -1,1 +1,1 @@
-"""Commands for the installation: benchmarks, plugins, caches, checks, completion."""
+"""Commands for the installation: plugins, caches, checks, completion."""

@@ -1,1 +1,0 @@
-"""The benchmarks of `calmotion bench`; only this command imports them."""

@@ -1,0 +1,164 @@
+"""What becomes of every link of robots: one row each, from its geometry to its first frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from calmotion import ShotError
+from calmotion.model import FEMesh
+from calmotion.support import Fault
+
+from ..common.timing import processor_time
+from ..scenes.links import Link, attachments_of, frames_of
+
+LIMIT = 20.0  # processor time of a link that is wanted [s]
+COPY = "the same as"  # begins the note of a link that is meshed with another one
+
+
+@dataclass(frozen=True)
+class LinkRow:
+    """What became of a link.
+
+    Attributes:
+        robot, link: Names.
+        source: What its solid was made of; `refused`, `fault` or `none` (no geometry) where there is none.
+        triangles: Of its visual surfaces.
+        volume: Of its solid [cm^3].
+        of_hull: Volume over that of the convex hull of the visual surfaces.
+        mass: That the robot states [kg].
+        density: The mass over the volume [kg/m^3].
+        joints, off: Its joints, and those whose frames do not touch its solid.
+        farthest: Of these from the solid [mm].
+        nodes: Of the ten-node tetrahedra.
+        volume_error: Of the tetrahedra against the solid [%].
+        seconds: Processor time of solid, mesh, refinement and estimated error [s].
+        f1, f2, f3: First frequencies, held by the joint towards the world, in polyamide [Hz].
+        estimate: Error of the frequencies that is estimated [%].
+        note: Why it was refused, or why another source than the visual surface was taken.
+    """
+
+    robot: str
+    link: str
+    source: str = "refused"
+    triangles: int = 0
+    volume: float = np.nan
+    of_hull: float = np.nan
+    mass: float = np.nan
+    density: float = np.nan
+    joints: int = 0
+    off: int = 0
+    farthest: float = np.nan
+    nodes: int = 0
+    volume_error: float = np.nan
+    seconds: float = np.nan
+    f1: float = np.nan
+    f2: float = np.nan
+    f3: float = np.nan
+    estimate: float = np.nan
+    note: str = ""
+
+    @property
+    def flexible(self) -> bool:
+        """Whether it can be simulated as flexible."""
+        return self.nodes > 0
+
+    @property
+    def outcome(self) -> str:
+        """What became of it, in few words."""
+        if self.flexible:
+            return f"{self.source}, {self.nodes} nodes, {self.seconds:.3g} s, estimate {self.estimate:.2g}%"
+        return self.source if not self.note else f"{self.source}: {self.note}"
+
+
+def faulty_row(link: Link, robot: str, fault: Fault) -> LinkRow:
+    """The row of a link whose process failed."""
+    note = f"{fault.reason}. Give a TetMesh, or a simpler mesh file, for this link, and report the fault"
+    return LinkRow(robot=robot, link=link.name, source="fault", note=note)
+
+
+def same_row(row: LinkRow, link: Link, robot: str) -> LinkRow:
+    """The row of a link that is the same as that of another row."""
+    note = f"{COPY} {row.link}" if row.robot == robot else f"{COPY} {row.link} of {row.robot}"
+    return replace(row, robot=robot, link=link.name, note="; ".join(filter(None, (note, row.note))))
+
+
+def survey_link(link: Link, robot: str, time_limit: float, geometry_only: bool = False) -> LinkRow:
+    """The row of a link, by the bundled mesher; what is wrong with the link is in its note.
+
+    Args:
+        link: From `read_links`.
+        robot: Its name.
+        time_limit: Processor time of its meshes [s].
+        geometry_only: Whether its solid is made but not meshed.
+    """
+    from calmotion.reduction import recomputed
+    from calmotion.tolerance import MeshOptions, geometry_of, mesh_of
+
+    body = replace(link.body, mass=link.mass)
+    frames = frames_of(link)
+    visual = [surface for surface in body.surfaces if surface.visible and len(surface.triangles)]
+    row = LinkRow(
+        robot=robot, link=link.name, triangles=sum(len(surface.triangles) for surface in visual), joints=len(frames),
+        mass=np.nan if link.mass is None else link.mass.mass,
+    )  # fmt: skip
+    if not body.surfaces and body.tets is None and not frames:
+        return replace(row, source="none", note="no geometry and no joints")
+    begin = processor_time()
+    try:
+        options = MeshOptions(time_limit=time_limit, cache=False)
+        geometry = geometry_of(0, body, options, frames)
+        row = _with_solid(row, geometry, visual, frames)
+        if not geometry_only:
+            with recomputed():
+                mesh = mesh_of(0, body, geometry, options, frames, attachments_of(link))
+            row = replace(row, seconds=processor_time() - begin)
+            row = _with_mesh(row, mesh, link)
+    except ShotError as problem:
+        row = replace(row, note=str(problem), nodes=0)
+    return row if row.nodes else replace(row, seconds=processor_time() - begin)
+
+
+def _with_solid(row: LinkRow, geometry: Any, visual: Sequence[Any], frames: Sequence[Any]) -> LinkRow:
+    from calmotion.mesh import boundary_triangles, contact_place
+    from scipy.spatial import ConvexHull
+
+    solid = getattr(geometry, "solid", None)
+    points = geometry.points if solid is None else solid.points
+    triangles = boundary_triangles(geometry.tets) if solid is None else solid.triangles
+    volume = geometry.quality.volume if solid is None else solid.volume
+    hull = np.nan
+    if visual:
+        hull = float(ConvexHull(np.vstack([s.points[s.triangles.ravel()] for s in visual])).volume)
+    places = [contact_place(frame.position, frame.axis, points[triangles], points) for frame in frames]
+    off = [place.distance for place in places if place is not None]
+    return replace(
+        row, source="tetrahedra" if solid is None else solid.source, volume=1e6 * volume, of_hull=volume / hull,
+        density=row.mass / volume, off=len(off), farthest=1e3 * max(off, default=np.nan),
+        note="" if solid is None or solid.source == "visual surface" else solid.repairs[0],
+    )  # fmt: skip
+
+
+def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
+    from calmotion.mesh import interface_patches
+    from calmotion.reduction import assemble, clamped_modes
+
+    settings = link.body.flexible
+    assert settings is not None
+    model = assemble(mesh.points, mesh.tets, settings.material)
+    patches = interface_patches(
+        model.mesh, attachments_of(link), settings.interface_radius, link.body.path, mesh.patches
+    )
+    clamped = patches[0].nodes if link.carrier is not None else None
+    f1, f2, f3 = np.sqrt(mesh.quality.stiffness_factor) * clamped_modes(model, 3, clamped)[0]
+    error = mesh.quality.error
+    late = [
+        note for note in mesh.quality.repairs if "too long" in note or "would exceed" in note or "on a grid" in note
+    ]
+    return replace(
+        row, source=mesh.quality.source, nodes=len(model.mesh.nodes), volume_error=100.0 * mesh.quality.volume_error,
+        f1=float(f1), f2=float(f2), f3=float(f3), estimate=np.nan if error is None else 100.0 * error,
+        note="; ".join(filter(None, (row.note, *late))),
+    )  # fmt: skip

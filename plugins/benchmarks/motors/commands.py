@@ -1,0 +1,212 @@
+"""What commands that are optimised with the model of the motors bring, confirmed by MuJoCo.
+
+`calmotion bench motor-commands SHOT ...` takes robots of rigid bodies whose motors have gains or are named. It
+simulates the animation as the command (that is what an optimisation for ideal motors finds on rigid links), finds
+commands with the model of the motors, and plays both on the motors in Calmotion and in MuJoCo, exactly as they are
+written. MuJoCo has the robot's own file where `--mjcf` names it, else a lumped model of the robot of the shot.
+Errors are the largest distances of the targets from the intended motion. The command fails where optimised commands
+leave more than a tenth of the animation's error, or where Calmotion tells that error more than a tenth off.
+
+`samples/real/compose.py` makes such shots of a KUKA iiwa and of the upper body of a Unitree G1:
+
+python samples/real/compose.py samples/real/iiwa_reach.usda KUKA.usda build/iiwa.usda
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.errors import ShotError
+from calmotion.model import Animation, Character, Result, RunSettings, Track
+from calmotion.retargeting import optimize_shot
+from calmotion.simulation import CompiledShot, compile_shot
+from calmotion.testing import MUJOCO_STEP, simulate_lumped
+from calmotion.tolerance import with_gains_used
+
+from ..common.parsers import bench_parser, output_options
+from .original import simulate_original
+
+ALLOWED = 0.1  # of the error of commands for ideal motors
+TOLD = 0.1  # of that error in MuJoCo, by which Calmotion may be off
+_STEP = 1.0 / 480.0  # of Calmotion [s]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One robot.
+
+    Attributes:
+        shot: Name.
+        motors: Number of motors that give.
+        ideal_mm, optimised_mm: Largest error of the animation as the command, and of the optimised commands [mm].
+        share: The second over the first.
+        mujoco_ideal_mm, mujoco_optimised_mm, mujoco_share: The same in MuJoCo.
+        told: The first error over the one in MuJoCo.
+        apart: Largest difference of the two programs at the joints, for the optimised commands, over their motion.
+    """
+
+    shot: str
+    motors: int
+    ideal_mm: float
+    optimised_mm: float
+    share: float
+    mujoco_ideal_mm: float
+    mujoco_optimised_mm: float
+    mujoco_share: float
+    told: float
+    apart: float
+
+    @property
+    def kept(self) -> bool:
+        """Whether commands and what is told of them are of use."""
+        return max(self.share, self.mujoco_share) <= ALLOWED and abs(self.told - 1.0) <= TOLD
+
+
+def giving_shot(path: str, seconds: float | None) -> CompiledShot:
+    """The shot with rigid bodies and with the gains of its motors in use.
+
+    Args:
+        seconds: How much of its beginning is taken; None: all.
+
+    Raises:
+        ShotError: It cannot be read, a body has no mass of its own, or no motor has gains.
+    """
+    from calmotion.usd import read_shot
+
+    character, animation, _ = read_shot(path)
+    character = with_gains_used(with_rigid_bodies(character))
+    if seconds is not None:
+        animation = beginning(animation, seconds)
+    return compile_shot(character, animation)
+
+
+def with_rigid_bodies(character: Character) -> Character:
+    """The character with the masses that its bodies have as rigid ones."""
+    for body in character.bodies:
+        if body.mass is None:
+            raise ShotError(
+                "a flexible link without a mass of its own",
+                path=body.path,
+                attribute="physics:mass",
+                remedy="Author the mass that it has as a rigid body",
+            )
+    return replace(character, bodies=tuple(replace(body, flexible=None) for body in character.bodies))
+
+
+def beginning(animation: Animation, seconds: float) -> Animation:
+    """The frames up to a time [s]."""
+
+    def cut(track: Track) -> Track:
+        kept = track.times <= seconds + 1e-9
+        return replace(track, times=track.times[kept], values=track.values[kept])
+
+    frames = animation.frame_times[animation.frame_times <= seconds + 1e-9]
+    tracks = tuple(map(cut, animation.tracks))
+    return replace(animation, frame_times=frames, tracks=tracks, current=tracks)
+
+
+def compare(
+    name: str, shot: CompiledShot, mjcf: str | None = None, step: float = _STEP, mujoco_step: float = MUJOCO_STEP,
+    pre_roll: float | None = None,
+) -> Row:  # fmt: skip
+    """Both commands on the motors of a shot, in both programs.
+
+    Args:
+        mjcf: The robot's own file, for MuJoCo; None: a lumped model.
+        step, mujoco_step: Of Calmotion and of MuJoCo [s].
+        pre_roll: See `RunSettings`.
+
+    Raises:
+        ShotError: The robot cannot be simulated, or has no place in the lumped model.
+    """
+    options = RunSettings(step=step, tolerance=1e-5, pre_roll=pre_roll)
+    result = optimize_shot(shot, options, lambda fraction, message: None)
+    assert result.after is not None
+    ours = [_largest(result, run.motion.target_positions) for run in (result.before, result.after)]
+    play = simulate_lumped if mjcf is None else partial(simulate_original, mjcf)
+    played = [
+        play(shot.character, run.motion.times, run.motion.motor_values, mujoco_step)
+        for run in (result.before, result.after)
+    ]
+    theirs = [_largest(result, motion.target_positions) for motion in played]
+    apart = _apart(result.after.motion.target_positions, played[1].target_positions)
+    return Row(
+        name, len(shot.character.motors), 1e3 * ours[0], 1e3 * ours[1], ours[1] / ours[0], 1e3 * theirs[0],
+        1e3 * theirs[1], theirs[1] / theirs[0], ours[0] / theirs[0], apart,
+    )  # fmt: skip
+
+
+def _largest(result: Result, positions: Array) -> float:
+    judged = result.reference.judged
+    off = np.linalg.norm(positions - result.reference.target_positions, axis=2)[judged]
+    return float(off.max())
+
+
+def _apart(ours: Array, theirs: Array) -> float:
+    size = float(np.ptp(theirs, axis=0).max())
+    return float(np.linalg.norm(ours - theirs, axis=2).max()) / size
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command."""
+    parser = bench_parser("motor-commands", __doc__)
+    parser.add_argument(
+        "shots", metavar="SHOT", nargs="+", help="USD file of a robot in a tree whose motors have gains"
+    )
+    parser.add_argument(
+        "--mjcf",
+        metavar="FILE",
+        nargs="+",
+        help="own file of each SHOT's robot, in which MuJoCo plays the commands",
+    )
+    parser.add_argument("--seconds", metavar="S", type=float, help="take only the beginning of each shot")
+    parser.add_argument(
+        "--pre-roll", metavar="S", type=float, help="length of the pre-roll of a shot that starts in motion"
+    )
+    output_options(parser)
+    options = parser.parse_args(arguments)
+    files = options.mjcf or [None] * len(options.shots)
+    if len(files) != len(options.shots):
+        parser.error(f"--mjcf names {len(files)} files for {len(options.shots)} shots")
+    rows = [
+        compare(Path(path).stem, giving_shot(path, options.seconds), file, pre_roll=options.pre_roll)
+        for path, file in zip(options.shots, files, strict=True)
+    ]
+    if options.json:
+        print(json.dumps([asdict(row) for row in rows]))
+    else:
+        _print(rows)
+    return int(not all(row.kept for row in rows))
+
+
+def _print(rows: Sequence[Row]) -> None:
+    from calmotion.cli import console_on, print_table
+
+    heads = [
+        "robot",
+        "motors",
+        "for ideal motors",
+        "with their model",
+        "share",
+        "in MuJoCo",
+        "",
+        "share",
+        "told",
+        "apart",
+    ]
+    shown = [
+        [
+            row.shot, str(row.motors), f"{row.ideal_mm:.2f} mm", f"{row.optimised_mm:.3f} mm", f"{row.share:.4f}",
+            f"{row.mujoco_ideal_mm:.2f} mm", f"{row.mujoco_optimised_mm:.3f} mm", f"{row.mujoco_share:.4f}",
+            f"{row.told:.3f}", f"{row.apart:.1e}",
+        ]
+        for row in rows
+    ]  # fmt: skip
+    print_table(console_on(sys.stdout), "Largest error of commands", heads, shown)

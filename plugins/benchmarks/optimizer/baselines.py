@@ -1,0 +1,112 @@
+"""Input shapers and a low-pass filter in comparison with the optimised curves.
+
+`calmotion bench baselines [SHOT ...]` simulates each shot as animated, through ZV and ZVD shapers for its lowest mode
+and for its lowest two, through a low-pass filter, and optimised. Errors are those of the worst target against the
+animation and, since shapers delay the motion, against the animation with the delay that is best for each method.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.model import SHAPERS, RunSettings
+from calmotion.retargeting import RetargetProblem, damping_homotopy, minimize
+from calmotion.simulation import CompiledShot, Curves, Simulator, best_delay, delay, modes_of, prepare, shaped
+
+from ..common.parsers import bench_parser, output_options, shots_argument
+from ..common.shots import SAMPLES, load
+from ..common.tables import show
+from .optimizer import make_problem
+
+
+@dataclass(frozen=True)
+class Row:
+    """One method on one shot.
+
+    Attributes:
+        shot, method: Names.
+        delay_s: Mean delay of its impulses [s].
+        largest_mm, rms_mm: Error of the worst target against the animation as timed [mm].
+        best_delay_s, delayed_largest_mm: The delay of the animation that suits it best, and the error against that.
+        change_deg: Largest change of a motor's curve [deg], of length motors [mm].
+    """
+
+    shot: str
+    method: str
+    delay_s: float
+    largest_mm: float
+    rms_mm: float
+    best_delay_s: float
+    delayed_largest_mm: float
+    change_deg: float
+
+
+def compare(name: str, shot: CompiledShot) -> list[Row]:
+    """All methods on one shot."""
+    prepared = prepare(shot, RunSettings())
+    problem = make_problem(shot, prepared, 0.05)
+    frequencies, damping = modes_of(prepared)
+    simulator = Simulator(prepared.model, prepared.grid.h, prepared.world, prepared.grid.cyclic)
+    rows = []
+    for kind in ("as animated", *SHAPERS):
+        curves, late = problem.curves, 0.0
+        if kind in SHAPERS:
+            curves = shaped(problem.curves, prepared.grid, kind, frequencies, damping)
+            late = delay(kind, frequencies, damping)
+        run = simulator.run(curves.angles, curves.rates)
+        rows.append(_row(name, kind.replace("2", ", two modes"), late, problem, curves, run.target_positions))
+    zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
+    problem.value(zero)
+    found = minimize(problem, damping_homotopy(problem, zero, free, float(frequencies[0])), free, 5e-6)
+    problem.value(found.x)
+    rows.append(_row(name, "optimised", 0.0, problem, problem.changed_curves, problem.run.target_positions))
+    return rows
+
+
+def _row(shot: str, method: str, late: float, problem: RetargetProblem, curves: Curves, positions: Array) -> Row:
+    grid, intended = problem.grid, problem.objective.intended.target_positions
+    judged = np.flatnonzero(grid.judged)
+    now = np.linalg.norm(positions[judged] - intended[judged], axis=2)
+    best, delayed = best_delay(positions, intended, grid.judged, grid.h)
+    change = np.abs(curves.angles - problem.curves.angles)[judged].max()
+    return Row(
+        shot, method, late, 1e3 * float(now.max()), 1e3 * float(np.sqrt(np.mean(now**2, axis=0)).max()),
+        best, 1e3 * float(delayed.max()), float(np.degrees(change)),
+    )  # fmt: skip
+
+
+HEADS = (
+    "method", "delay", "largest error", "rms error", "least error, animation delayed", "by", "curves change by",
+)  # fmt: skip
+
+
+def cells(rows: list[Row]) -> list[list[str]]:
+    """The table for a person, without its heads."""
+    return [
+        [
+            row.method, f"{1e3 * row.delay_s:.0f} ms", f"{row.largest_mm:.2f} mm", f"{row.rms_mm:.2f} mm",
+            f"{row.delayed_largest_mm:.2f} mm", f"{1e3 * row.best_delay_s:.0f} ms", f"{row.change_deg:.1f}°",
+        ]
+        for row in rows
+    ]  # fmt: skip
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command."""
+    parser = bench_parser("baselines", __doc__)
+    shots_argument(parser, SAMPLES)
+    output_options(parser)
+    options = parser.parse_args(arguments)
+    found: list[Row] = []
+    for path in options.shots:
+        own = compare(Path(path).stem, load(path))
+        found += own
+        if not options.json:
+            show(own[0].shot, HEADS, cells(own))
+    if options.json:
+        print(json.dumps([asdict(row) for row in found]))
+    return 0

@@ -1,0 +1,125 @@
+"""Accuracy and run time of the gradients of both adjoints, against central differences.
+
+`calmotion bench gradients [SHOT ...]` computes the gradient of each shot's objective by the discrete and by the
+continuous adjoint at decreasing steps. It compares them with central differences of the whole simulation along random
+directions, at the same step (error of the discrete objective) and at a quarter of the smallest step (error of the
+continuous objective).
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.model import RunSettings
+from calmotion.retargeting import RetargetProblem
+from calmotion.simulation import CompiledShot, prepare
+
+from ..common.parsers import bench_parser, output_options, shots_argument
+from ..common.shots import SAMPLES, load
+from ..common.tables import show
+from ..common.timing import median_time
+from .optimizer import make_problem
+
+STEPS = (1, 2, 4, 8)  # in a 240th of a second
+FINER = 4
+COARSEST = 1.0 / 240.0
+DIRECTIONS = 3
+SIZE = 5e-4  # of an unknown in a difference [rad]
+REPEATS = 3
+HEADS = ("adjoint", "step", "simulation", "gradient", "error, same step", "floor", "error, finest step")
+
+
+@dataclass(frozen=True)
+class GradientError:
+    """One adjoint at one step.
+
+    Attributes:
+        shot, adjoint: Names.
+        step_s: [s].
+        forward_s, gradient_s: Median time of a simulation, and of linearising it and going back [s].
+        same_step, fine: Largest error of a directional derivative over the largest such derivative, against
+            central differences at the same step and at the finest.
+        floor: How far two central differences of the same step, one with half the distance, disagree: below this
+            nothing is told apart.
+    """
+
+    shot: str
+    adjoint: str
+    step_s: float
+    forward_s: float
+    gradient_s: float
+    same_step: float
+    fine: float
+    floor: float
+
+
+def errors(name: str, shot: CompiledShot, steps: tuple[int, ...] = STEPS) -> list[GradientError]:
+    """Both adjoints of one shot at all steps."""
+
+    def problem_at(divided: float) -> RetargetProblem:
+        return make_problem(shot, prepare(shot, RunSettings(step=COARSEST / divided)), 0.1)
+
+    rng = np.random.default_rng(1)
+    finest = problem_at(FINER * steps[-1])
+    directions = rng.normal(size=(DIRECTIONS, finest.size))
+    judge, _ = _differences(finest, directions)
+    scale = float(np.max(np.abs(judge)))
+    rows = []
+    for divided in steps:
+        problem = problem_at(divided)
+        same, floor = _differences(problem, directions)
+        forward = median_time(partial(problem.value, np.zeros(problem.size)), REPEATS)
+        for adjoint, gradient in (("discrete", problem.linearize), ("continuous", problem.continuous_gradient)):
+            found, seconds = directions @ gradient(), median_time(gradient, REPEATS)
+            off, fine = (float(np.max(np.abs(found - values))) / scale for values in (same, judge))
+            rows.append(GradientError(name, adjoint, problem.grid.h, forward, seconds, off, fine, floor))
+    return rows
+
+
+def _differences(problem: RetargetProblem, directions: Array) -> tuple[Array, float]:
+    """Derivatives along directions by central differences, extrapolated (Richardson), and how far two such disagree."""
+    zero = np.zeros(problem.size)
+
+    def central(d: Array, e: float) -> float:
+        return (problem.value(zero + e * d) - problem.value(zero - e * d)) / (2.0 * e)
+
+    found, other = [], []
+    for d in directions:
+        wide, middle, close = (central(d, SIZE / k) for k in (1, 2, 4))
+        found.append((4.0 * middle - wide) / 3.0)
+        other.append((4.0 * close - middle) / 3.0)
+    values = np.array(found)
+    return values, float(np.max(np.abs(values - other)) / np.max(np.abs(values)))
+
+
+def cells(rows: list[GradientError]) -> list[list[str]]:
+    """The table for a person, without its heads."""
+    return [
+        [
+            row.adjoint, f"1/{1.0 / row.step_s:.0f} s", f"{row.forward_s:.3f} s", f"{row.gradient_s:.3f} s",
+            f"{row.same_step:.1e}", f"{row.floor:.1e}", f"{row.fine:.1e}",
+        ]
+        for row in rows
+    ]  # fmt: skip
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command."""
+    parser = bench_parser("gradients", __doc__)
+    shots_argument(parser, SAMPLES[:1])
+    output_options(parser)
+    options = parser.parse_args(arguments)
+    measured: list[GradientError] = []
+    for path in options.shots:
+        own = errors(Path(path).stem, load(path))
+        measured += own
+        if not options.json:
+            show(f"{own[0].shot}: gradients against central differences", HEADS, cells(own))
+    if options.json:
+        print(json.dumps({"gradients": [asdict(row) for row in measured]}))
+    return 0

@@ -1,0 +1,118 @@
+"""Tolerances of the optimisation, measured: they are kept, and one that is not is told."""
+
+import csv
+import dataclasses
+import json
+from functools import partial
+
+import pytest
+from calmotion.testing import beam_arm, quintic, shot_of
+from calmotion_plugins.benchmarks.accuracy import reference_bench, tolerances
+from calmotion_plugins.benchmarks.accuracy.tolerances import Tolerances
+from calmotion_plugins.benchmarks.common.shots import Unreduced
+
+
+@pytest.fixture(scope="module")
+def shot():
+    character, meshes = beam_arm(payload=0.1, damping=0.02)
+    return Unreduced("arm", character, shot_of(quintic(0.8, 0.35, 0.1), 0.75), meshes)
+
+
+@pytest.fixture
+def few_nodes(monkeypatch):
+    """References take their stiffness from meshes of few nodes."""
+    monkeypatch.setattr(reference_bench, "with_more_nodes", partial(reference_bench.with_more_nodes, stiffness=2_000))
+
+
+@pytest.fixture(scope="module")
+def rows(shot):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reference_bench, "REFERENCE_STEP", 1 / 1920)
+        return [Tolerances(shot, nodes=1.0).kept(tolerance, "optimize") for tolerance in (1e-2, 1e-3)]
+
+
+def test_simulations_keep_their_tolerance(shot):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reference_bench, "REFERENCE_STEP", 1 / 1920)
+        measured = Tolerances(shot, nodes=1.0)
+        measured.warm(1e-2, "simulate")
+        found = [measured.kept(tolerance) for tolerance in (1e-2, 1e-3, 1e-4)]
+    assert all(row.kept and row.reference_m < 0.1 * row.tolerance_m for row in found)
+    assert found[2].step_s < found[0].step_s
+    assert found[0].shake_after_m == found[0].shake_before_m
+
+
+def test_results_keep_their_tolerance(rows):
+    for row, tolerance in zip(rows, (1e-2, 1e-3), strict=True):
+        assert row.kept and row.error_m <= row.tolerance_m == tolerance
+        assert row.shake_after_m < 0.2 * row.shake_before_m
+    assert rows[1].coordinates >= rows[0].coordinates
+
+
+def test_the_command_reports_whether_tolerances_are_kept(shot, rows, monkeypatch, capsys, tmp_path):
+    found = list(rows)
+    monkeypatch.setattr(tolerances, "load_unreduced", lambda path: shot)
+    warmed = []
+    monkeypatch.setattr(Tolerances, "warm", lambda self, *arguments: warmed.append(arguments))
+    monkeypatch.setattr(Tolerances, "kept", lambda self, tolerance, command: found.pop(0))
+    arguments = [
+        "arm.usda",
+        "--tolerances",
+        "10mm",
+        "0.001",
+        "--optimize",
+        "--json",
+        "--csv",
+        str(tmp_path / "rows.csv"),
+        "--markdown",
+        str(tmp_path / "rows.md"),
+    ]
+    assert tolerances.main(arguments) == 0 and warmed == [(0.01, "optimize")]
+    assert [row["kept"] for row in json.loads(capsys.readouterr().out)["rows"]] == [True, True]
+    with open(tmp_path / "rows.csv", newline="") as file:
+        assert [float(row["error_m"]) for row in csv.DictReader(file)] == [row.error_m for row in rows]
+    lines = (tmp_path / "rows.md").read_text().splitlines()
+    assert len(lines) == 4 and lines[0].startswith("| shot | tolerance | error |")
+    assert [line.split(" | ")[1] for line in lines[2:]] == ["10 mm", "1 mm"]
+    found += [rows[0], dataclasses.replace(rows[1], error_m=2e-3)]
+    assert tolerances.main(arguments) == 1
+
+
+def test_an_interrupted_table_goes_on_with_the_rows_that_it_lacks(shot, rows, monkeypatch, tmp_path):
+    table, asked = str(tmp_path / "rows.csv"), []
+    monkeypatch.setattr(tolerances, "load_unreduced", lambda path: shot)
+    monkeypatch.setattr(Tolerances, "warm", lambda self, *arguments: None)
+
+    def kept(self, tolerance, command):
+        asked.append(tolerance)
+        return next(row for row in rows if row.tolerance_m == tolerance)
+
+    monkeypatch.setattr(Tolerances, "kept", kept)
+    common = ["arm.usda", "--optimize", "--json", "--csv", table]
+    assert tolerances.main([*common, "--tolerances", "10mm"]) == 0
+    assert tolerances.main([*common, "--tolerances", "10mm", "1mm", "--resume"]) == 0
+    assert asked == [rows[0].tolerance_m, rows[1].tolerance_m]
+    assert tolerances.main([*common, "--tolerances", "1mm", "--resume"]) == 0 and len(asked) == 2
+    with open(table, newline="") as file:
+        assert sorted(float(row["tolerance_m"]) for row in csv.DictReader(file)) == [1e-3, 1e-2]
+
+
+def test_a_reference_with_finer_meshes_knows_how_far_its_reduction_may_be_off(shot, few_nodes):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reference_bench, "REFERENCE_STEP", 1 / 960)
+        bench = reference_bench.Bench(shot, nodes=2.0)
+        rough, fine = (bench.reference(finest) for finest in (1e-3, 1e-5))
+    assert len(bench.shot.meshes.meshes[0].tets) > len(shot.meshes.meshes[0].tets)
+    assert fine.bar_m < rough.bar_m
+    assert reference_bench.distance(rough.positions, fine.positions) < rough.bar_m
+
+
+def test_references_of_other_curves_have_the_same_finer_meshes(shot, few_nodes):
+    bench = reference_bench.Bench(shot, nodes=2.0)
+    other = bench.of(shot_of(quintic(0.6, 0.35, 0.1), 0.75))
+    assert other.shot.meshes is bench.shot.meshes and other.shot.animation is not shot.animation
+    again = other.of(shot.animation)
+    assert again.shot.meshes is bench.shot.meshes and again.shot.animation is shot.animation
+    positions = [each.run(each.bodies(1e-3), 1 / 240).positions for each in (bench, again, other)]
+    assert reference_bench.distance(positions[0], positions[1]) == 0.0
+    assert reference_bench.distance(positions[0], positions[2]) > 1e-3

@@ -1,0 +1,97 @@
+"""Maps of stability: every cell runs or is refused with a reason, and the boundary of an integrator is where it is."""
+
+import csv
+import json
+
+import pytest
+from calmotion.model.run import INTEGRATORS
+from calmotion_plugins.benchmarks.common.tables import write_rows
+from calmotion_plugins.benchmarks.integrators import stability, stability_map
+from calmotion_plugins.benchmarks.integrators.stability import largest_steps
+from calmotion_plugins.benchmarks.integrators.stability_map import (
+    FAILED,
+    MAPS,
+    REFUSED,
+    RUNS,
+    STEPS,
+    Cell,
+    all_cells,
+    cells_of,
+)
+
+
+def rows_of(name, *values):
+    quantity, _, scene = MAPS[name]
+    return quantity, values, scene
+
+
+def cell(value, step, outcome, integrator="bdf2"):
+    return Cell("load", value, step, integrator, outcome, "" if outcome == RUNS else "why", None, 0.1)
+
+
+def test_every_integrator_has_steps():
+    assert tuple(STEPS) == INTEGRATORS
+
+
+LONG = dict.fromkeys(("load", "speed"), pytest.mark.long)
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=LONG.get(name, ())) for name in MAPS])
+def test_cells_run_or_are_refused_with_a_reason(name):
+    values = MAPS[name][1]
+    steps = {integrator: own[1:2] for integrator, own in STEPS.items()}
+    cells = cells_of(name, rows_of(name, values[0], values[-1]), steps)
+    assert [(c.value, c.integrator) for c in cells] == [(v, i) for v in (values[0], values[-1]) for i in INTEGRATORS]
+    for c in cells:
+        assert c.outcome in (RUNS, REFUSED), c
+        assert (c.error_m is None and c.why.endswith(".")) if c.outcome == REFUSED else (0.0 < c.error_m < 2.0)
+
+
+def test_the_explicit_integrator_needs_tiny_steps_and_the_default_does_not():
+    steps = {"bdf2": (1 / 24,), "rk4": (1 / 24000, 1 / 7200000)}
+    coarse, blown, fine = cells_of("stiffness", rows_of("stiffness", 1e9), steps)
+    assert coarse.outcome == RUNS and blown.outcome == REFUSED and "diverges" in blown.why
+    assert fine.outcome == RUNS and fine.error_m is None, "only its beginning is run"
+
+
+def test_what_takes_too_long_has_failed(monkeypatch):
+    monkeypatch.setattr(stability_map, "PATIENCE", 1e-3)
+    (late,) = cells_of("load", rows_of("load", 1.0), {"bdf2": (1 / 48,)})
+    assert late.outcome == FAILED and "took longer" in late.why and late.error_m is None
+
+
+def test_a_boundary_is_the_largest_step_below_which_all_run():
+    cells = [cell(1.0, 1 / 24, RUNS), cell(1.0, 1 / 48, REFUSED), cell(1.0, 1 / 120, RUNS), cell(1.0, 1 / 240, RUNS)]
+    cells += [cell(2.0, 1 / 24, RUNS), cell(2.0, 1 / 240, REFUSED)]
+    assert largest_steps(cells) == {1.0: 1 / 120, 2.0: None}
+
+
+def test_the_command_writes_cells_and_a_table(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(stability_map, "MAPS", {"load": rows_of("load", 1e-6)})
+    monkeypatch.setattr(stability_map, "STEPS", {"bdf2": (1 / 48,), "rk4": (1 / 24,)})
+    table = tmp_path / "cells.csv"
+    assert stability.main(["--json", "--only", "load", "--csv", str(table)]) == 0
+    report = json.loads(capsys.readouterr().out)
+    stable, refused = report["cells"]
+    assert stable["outcome"] == RUNS and stable["map"] == "load" and stable["step_s"] == 1 / 48 and stable["wall_s"] > 0
+    assert refused["outcome"] == REFUSED and refused["why"].startswith("/Arm/") and refused["error_m"] is None
+    assert [row["integrator"] for row in csv.DictReader(table.open())] == ["bdf2", "rk4"]
+    monkeypatch.setattr(stability_map, "REACH", 0.1)
+    assert stability.main(["--only", "load"]) == 1
+    out = capsys.readouterr().out
+    assert "the target flew away" in out and "1 cells fail" in out and "Largest stable step" in out
+
+
+def test_a_table_keeps_the_reasons(tmp_path):
+    write_rows(str(tmp_path / "a.csv"), Cell, [cell(1.0, 0.5, REFUSED)])
+    (row,) = csv.DictReader((tmp_path / "a.csv").open())
+    assert row["why"] == "why" and row["error_m"] == "" and all_cells({}) == []
+
+
+def test_a_joint_that_comes_apart_and_an_error_of_another_kind_are_failures(monkeypatch):
+    monkeypatch.setattr(stability_map, "CLOSED", -1.0)
+    (apart,) = cells_of("load", rows_of("load", 1e-6), {"bdf2": (1 / 48,)})
+    assert apart.outcome == FAILED and "came apart" in apart.why
+    monkeypatch.setattr(stability_map, "simulate_shot", lambda *arguments: 1 / 0)
+    (broken,) = cells_of("load", rows_of("load", 1e-6), {"bdf2": (1 / 48,)})
+    assert broken.outcome == FAILED and broken.why == "ZeroDivisionError: division by zero"

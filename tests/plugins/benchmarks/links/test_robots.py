@@ -1,0 +1,126 @@
+"""The survey of the links of robots: a row each, whatever becomes of one of them."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+from calmotion_plugins.benchmarks.links import meshing, robots, survey, tables
+from calmotion_plugins.benchmarks.scenes.links import read_links
+from small_shots import LENGTH, WIDTH, write_arm
+
+
+@pytest.fixture(scope="module")
+def shot(tmp_path_factory):
+    return write_arm(tmp_path_factory.mktemp("arm") / "arm.usda")
+
+
+def rows_of(file):
+    with open(file, newline="") as text:
+        return list(csv.DictReader(text))
+
+
+@pytest.mark.long
+def test_the_survey_has_a_row_for_each_link_and_says_what_became_of_it(shot, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "cache"))
+    file = tmp_path / "links.csv"
+    assert meshing.main([f"{shot}:fore", "--csv", str(file)]) == 0
+    with open(file, newline="") as text:
+        (row,) = csv.DictReader(text)
+    assert (row["link"], row["source"], row["note"]) == ("fore", "visual surface", "")
+    assert float(row["volume"]) == pytest.approx(1e6 * LENGTH * WIDTH**2, rel=1e-6)
+    assert float(row["of_hull"]) == pytest.approx(1.0) and int(row["off"]) == 0 and int(row["joints"]) >= 1
+    assert float(row["density"]) == pytest.approx(1e6 * float(row["mass"]) / float(row["volume"]))
+    beam = 3.516 / (2.0 * np.pi) * np.sqrt(1.8e9 * WIDTH**2 / 12.0 / 1200.0) / LENGTH**2
+    assert float(row["f1"]) == pytest.approx(beam, rel=0.03)
+    assert int(row["nodes"]) > 100 and float(row["seconds"]) > 0.0 and float(row["estimate"]) < 5.0
+    printed = capsys.readouterr().out
+    assert "1 of 1 links are flexible (100%)" in printed and "| fore | visual surface |" in printed
+
+
+def test_a_link_that_is_refused_says_why_and_one_whose_process_ends_too(shot, tmp_path, capsys, monkeypatch):
+    (fore,) = read_links(f"{shot}:fore")
+    whole = fore.body.surfaces[0]
+    flat = replace(fore, body=replace(fore.body, surfaces=(replace(whole, triangles=whole.triangles[:1]),)))
+    row = survey.survey_link(replace(flat, mass=None), "arm", 60.0, True)
+    assert row.source == "refused" and "open surface" in row.note and "Close the mesh" in row.note
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))  # where processes find it, too
+    monkeypatch.setattr(robots, "survey_link", import_module("odd_survey").odd_survey)
+    file = tmp_path / "links.csv"
+    assert meshing.main([str(shot), "--geometry-only", "--csv", str(file)]) == 0
+    with open(file, newline="") as text:
+        rows = {row["link"]: row for row in csv.DictReader(text)}
+    assert rows["fore"]["source"] == "fault" and "SIGSEGV" in rows["fore"]["note"]
+    assert "Give a TetMesh" in rows["fore"]["note"] and rows["upper"]["source"] == "visual surface"
+    heard = capsys.readouterr()
+    assert "fault: its process ended (signal SIGSEGV)" in heard.err and "min left" in heard.err
+    assert "arm fore: its process ended" in heard.out
+
+
+def test_a_survey_goes_on_with_the_links_that_its_table_has_not(shot, tmp_path, capsys):
+    file = tmp_path / "links.csv"
+    command = [f"{shot}:upper", f"{shot}:fore", "--geometry-only", "--csv", str(file)]
+    assert meshing.main(command) == 0
+    before = rows_of(file)
+    text = file.read_text().splitlines(keepends=True)
+    kept = text[1].replace("visual surface", "clay")
+    file.write_text(text[0] + kept)  # of another source; the second is missing
+    capsys.readouterr()
+    assert meshing.main([*command, "--resume"]) == 0
+    told = capsys.readouterr().err
+    assert before[1]["link"] in told and f" {before[0]['link']}:" not in told
+    after = rows_of(file)
+    assert [row["link"] for row in after] == [row["link"] for row in before] and after[0]["source"] == "clay"
+    assert meshing.main([*command, "--resume"]) == 0 and "clay" in capsys.readouterr().out  # of the table alone
+    with pytest.raises(SystemExit):
+        meshing.main([str(shot), "--resume"])
+    assert "--resume needs --csv FILE" in capsys.readouterr().err
+
+
+def test_copies_and_mirror_images_are_surveyed_once(shot):
+    (fore,) = read_links(f"{shot}:fore")
+    mirror = np.array([1.0, -1.0, 1.0])
+
+    def moved(link, **changes):
+        parts = [replace(s, points=s.points * mirror, triangles=s.triangles[:, ::-1]) for s in link.body.surfaces]
+        return replace(link, body=replace(link.body, surfaces=tuple(parts)), **changes)
+
+    longer = replace(
+        fore, body=replace(fore.body, surfaces=tuple(replace(s, points=1.1 * s.points) for s in fore.body.surfaces))
+    )
+    heavier = moved(fore, mass=replace(fore.mass, mass=2.0 * fore.mass.mass)) if fore.mass else longer
+    links = [fore, longer, moved(fore), fore, heavier, moved(longer)]
+    first = robots.first_of_its_kind(links)
+    assert first[:4] == [0, 1, 0, 0] and first[5] == 1
+    assert first[4] == (4 if fore.mass else 1)
+
+
+def test_the_summary_counts_copies_with_the_time_of_their_first_and_without(shot):
+    (fore,) = read_links(f"{shot}:fore")
+    late = survey.LinkRow(robot="arm", link="late", source="visual surface", nodes=10, seconds=30.0)
+    quick = replace(late, link="quick", seconds=3.0)
+    assert "1 took no more than 20 s of processor time (50%)" in tables.summary([late, quick])
+    assert "copies" not in tables.summary([late, quick])
+    told = tables.summary([late, quick, survey.same_row(late, fore, "arm"), survey.same_row(quick, fore, "other")])
+    assert "2 took no more than 20 s of processor time (50%)" in told
+    assert "2 are copies or mirror images" in told and "3 took no more (75%)" in told
+
+
+def test_broken_surfaces_are_like_no_other(shot):
+    (fore,) = read_links(f"{shot}:fore")
+    (part, *_) = fore.body.surfaces
+
+    def of(part):
+        return replace(fore, body=replace(fore.body, surfaces=(part,)))
+
+    lost, nowhere = (
+        replace(part, triangles=part.triangles + len(part.points)),
+        replace(part, points=np.nan * part.points),
+    )
+    assert robots.first_of_its_kind([fore, of(lost), of(nowhere), of(replace(part, triangles=lost.triangles[:1]))]) == [
+        0, 1, 2, 3,
+    ]  # fmt: skip
