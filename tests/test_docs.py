@@ -13,11 +13,14 @@ from pathlib import Path
 from urllib.parse import urljoin
 
 import pytest
+from calmotion.cli.commands.table import BROUGHT_BY
 from floors import FLOORS
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PACKAGE = REPOSITORY / "pipeline" / "calmotion"
 PAGES = sorted([*REPOSITORY.glob("docs/**/*.md"), *REPOSITORY.glob("*.md"), REPOSITORY / "samples" / "README.md"])
+ABSENT = sorted({plugin for plugin in BROUGHT_BY.values() if not (REPOSITORY / "plugins" / plugin).is_dir()})
+pytestmark = pytest.mark.skipif(bool(ABSENT), reason=f"the pages name what these plugins have: {', '.join(ABSENT)}")
 PLACES = (REPOSITORY, PACKAGE, PACKAGE / "multibody", REPOSITORY / "docs", REPOSITORY / "samples")
 
 
