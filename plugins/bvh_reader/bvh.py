@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.support import refuse_special, too_large
+from calmotion.support import refuse_lfs_pointers, refuse_special, too_large
 
 _EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
 _AXES = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
@@ -39,6 +39,7 @@ def read_bvh(path: str) -> BvhMotion:
     """
     try:
         refuse_special(path)
+        refuse_lfs_pointers([path])
         if reason := too_large(path, _EXPANSION):
             raise OSError(0, f"it is too large for the memory: {reason}")
         with open(path, encoding="utf-8-sig", errors="replace") as stream:

@@ -10,7 +10,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import MotorTracks
-from calmotion.support import available_memory, refuse_special, too_large
+from calmotion.support import available_memory, refuse_lfs_pointers, refuse_special, too_large
 
 TIME = "time_s"
 _OUTPUTS = (".x", ".y", ".z", ".error", ".rotation_error", ".input", ".output", ".effort")
@@ -37,6 +37,7 @@ def read_motion(path: str, *, angles: str, rate: float, names: Sequence[str]) ->
     """
     try:
         refuse_special(path)
+        refuse_lfs_pointers([path])
         if reason := too_large(path, _EXPANSION):
             raise OSError(0, f"it is too large for the memory: {reason}")
         columns, degrees = (_npz if path.lower().endswith(".npz") else _csv)(path, names)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from calmotion.errors import ShotError, raise_all
-from calmotion.support import is_special, nearest, refuse_special, remedy_for
+from calmotion.support import is_special, nearest, refuse_lfs_pointers, refuse_special, remedy_for
 
 from .mjcf import (
     refuse_curved_followers,
@@ -66,7 +66,7 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
         packages: Folders of ROS packages by name; others are looked for above the file.
 
     Raises:
-        ShotError: It is neither URDF nor MJCF, is a xacro, or a mesh is missing.
+        ShotError: It is neither URDF nor MJCF, is a xacro, or a mesh is missing or a pointer of Git LFS.
     """
     root, prefixes = _root(path)
     if root.tag == "mujoco":
@@ -93,6 +93,7 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
     _refuse_circular_followers(root, path)
     found = _packages(root, path, packages)
     _refuse_missing_meshes(root, path, found)
+    refuse_lfs_pointers((mesh_file(name, path, found) for _, name in _meshes(root)), path=path, attribute="mesh")
     links = root.findall("link")
     shaped = {link for link in links if link.find("visual") is not None or link.find("collision") is not None}
     without = {link for link in links if link.find("inertial") is None}
@@ -196,18 +197,23 @@ def _meshes(root: xml.Element) -> Iterator[tuple[str, str]]:
             yield link.get("name", ""), mesh.get("filename", "")
 
 
-def _refuse_wrong_files(root: xml.Element, path: str, seen: frozenset[str] = frozenset()) -> None:
-    """Refuse named pipes and the like among the files of an MJCF robot, for which a converter would wait for ever, and
-    what `mjcf` refuses in any of them.
+def _refuse_wrong_files(
+    root: xml.Element, path: str, seen: frozenset[str] = frozenset(), outer: Sequence[str] = ()
+) -> None:
+    """Refuse named pipes and the like among the files of an MJCF robot, for which a converter would wait for ever,
+    pointers of Git LFS, and what `mjcf` refuses in any of them.
 
     Args:
         seen: Files that include this one.
+        outer: Folders where these look for files.
     """
     for refuse in (refuse_several_joints, refuse_curved_followers, refuse_other_masses):
         refuse(root, path)
     here = os.path.dirname(os.path.abspath(path))
     named = ("meshdir", "texturedir", "assetdir")
-    folders = [here, *(os.path.join(here, node.get(name, "")) for node in root.iter("compiler") for name in named)]
+    own = [here, *(os.path.join(here, node.get(name, "")) for node in root.iter("compiler") for name in named)]
+    folders = [*own, *outer]
+    files = []
     for node in root.iter():
         for name in (value for key, value in node.items() if key == "file" or key.startswith("file")):
             for file in dict.fromkeys(os.path.join(folder, name) for folder in folders):
@@ -216,8 +222,11 @@ def _refuse_wrong_files(root: xml.Element, path: str, seen: frozenset[str] = fro
                         "this is not a file but a named pipe, a socket or a device", path=path,
                         attribute=f"{node.tag}.file", found=name, remedy="Name a file",
                     )  # fmt: skip
+                if node.tag != "texture":  # a picture changes no motion
+                    files.append(file)
                 if node.tag == "include" and os.path.isfile(file) and file not in seen:
-                    _refuse_wrong_files(_root(file)[0], file, seen | {file})
+                    _refuse_wrong_files(_root(file)[0], file, seen | {file}, folders)
+    refuse_lfs_pointers(files, path=path, attribute="file")
 
 
 def _packages(root: xml.Element, path: str, given: Mapping[str, str]) -> dict[str, str]:

@@ -159,3 +159,10 @@ def test_columns_of_a_table_whose_times_have_another_name_are_named_by_hand(read
     assert list(found.values) == ["pan", "lift"]
     np.testing.assert_allclose(found.times, [0.0, 0.5, 1.0])
     np.testing.assert_allclose(found.values["lift"], LIFT)
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.npz"])
+def test_a_pointer_of_git_lfs_is_no_motion(read, name):
+    with pytest.raises(ShotError, match="Git LFS pointer") as refused:
+        read(name, "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1048584\n")
+    assert refused.value.path.endswith(name) and "git lfs pull" in refused.value.remedy

@@ -4,7 +4,7 @@ import pytest
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
 from calmotion.host.settings import read_settings_file
-from calmotion.support.foreign_files import forbidden_place, kind_of, remedy_for
+from calmotion.support.foreign_files import forbidden_place, kind_of, refuse_lfs_pointers, remedy_for
 from calmotion.usd.stages import open_layer
 
 FILES = {
@@ -14,6 +14,7 @@ FILES = {
     "table.csv": ("time_s,/Robot/Tip.x\n0,1\n", "table"),
     "shot.usda": ("time_s,/Robot/Tip.x\n0,1\n", "table"),
     "dance.bvh": ("HIERARCHY\nROOT hips\n", "bvh"),
+    "pointer.usdc": ("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1048584\n", "lfs"),
 }
 
 
@@ -71,3 +72,15 @@ def test_a_shot_in_the_place_of_settings_needs_no_import(tmp_path):
     (tmp_path / "shot.usda").write_text('#usda 1.0\ndef Xform "Robot" {}\n')
     with pytest.raises(SettingError, match="It needs no import"):
         read_settings_file(tmp_path / "shot.usda")
+
+
+def test_pointers_of_git_lfs_are_named_four_of_them(tmp_path):
+    names = [tmp_path / f"{k}.stl" for k in range(6)]
+    for name in names[1:]:
+        name.write_text(FILES["pointer.usdc"][0])
+    (tmp_path / "mesh.stl").write_text("solid\n")
+    refuse_lfs_pointers([names[0], tmp_path / "mesh.stl", tmp_path])
+    with pytest.raises(ShotError, match="Git LFS pointer") as refused:
+        refuse_lfs_pointers([*names, names[1]], path="robot.urdf", attribute="mesh")
+    assert refused.value.path == "robot.urdf" and "git lfs pull" in refused.value.remedy
+    assert refused.value.found == f"{', '.join(map(str, names[1:5]))}, and 1 more"

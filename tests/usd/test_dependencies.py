@@ -66,3 +66,16 @@ def test_a_clip_that_is_no_usd_file_is_an_error_with_a_remedy(tmp_path):
     with pytest.raises(ShotError) as caught:
         read_shot(str(tmp_path / "broken.usda"))
     assert caught.value.remedy and "clip.txt" in str(caught.value.found)
+
+
+@pytest.mark.parametrize("name", [sublayer, reference, payload, clips])
+def test_layers_that_are_pointers_of_git_lfs_are_refused(tmp_path, name):
+    path = small_shots.write_arm(tmp_path / "arm.usda", small_shots.make_flexible)
+    pointer = tmp_path / "link.usdc"
+    pointer.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1048584\n")
+    layer = Sdf.Layer.OpenAsAnonymous(str(path))
+    name(layer, layer.GetPrimAtPath(small_shots.FORE), str(pointer))
+    layer.Export(str(tmp_path / "broken.usda"))
+    with pytest.raises(ShotError, match="Git LFS pointer") as caught:
+        read_shot(str(tmp_path / "broken.usda"))
+    assert caught.value.found == str(pointer) and "git lfs pull" in caught.value.remedy

@@ -10,6 +10,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.mesh.cells import CORNERS, TRIANGLES, tets_of, triangles_of
 from calmotion.model import SurfaceMesh, TetGeometry
+from calmotion.support.foreign_files import refuse_lfs_pointers
 from calmotion.support.memory import too_large
 
 _EXPANSION = 10.0  # memory of a mesh while it is read, by the size of a binary file
@@ -28,7 +29,8 @@ def read_mesh_file(path: str, scale: float, body: str) -> tuple[TetGeometry | tu
         body: Prim path of the body, for errors.
 
     Raises:
-        ShotError: The file is missing, cannot be read, or has neither volume elements nor faces.
+        ShotError: The file is missing, cannot be read, is a pointer of Git LFS, or has neither volume elements nor
+            faces.
     """
 
     def refuse(problem: str, found: object, remedy: str) -> ShotError:
@@ -36,6 +38,7 @@ def read_mesh_file(path: str, scale: float, body: str) -> tuple[TetGeometry | tu
 
     if not Path(path).is_file():
         raise refuse("the mesh file does not exist", path, "Correct the asset path")
+    refuse_lfs_pointers([path], path=body, attribute="calm:flexible:meshFile")
     if reason := too_large(path, _EXPANSION):
         raise refuse("the mesh file is too large for the memory", f"{path}: {reason}", "Give a coarser mesh")
     try:

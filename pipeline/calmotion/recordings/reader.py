@@ -10,6 +10,7 @@ from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, PropertyValues, RunContext
 from calmotion.recordings.recording import RecordingRequest, SensorRecording
 from calmotion.support.files import refuse_special
+from calmotion.support.foreign_files import refuse_lfs_pointers
 
 
 class RecordingReader(Operator):
@@ -39,6 +40,7 @@ class RecordingReader(Operator):
         request = context.get(RecordingRequest)
         try:
             refuse_special(request.file)
+            refuse_lfs_pointers([request.file])
             recording = self.read(request, context.properties)
         except OSError as error:
             raise ShotError(

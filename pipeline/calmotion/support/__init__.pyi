@@ -9,6 +9,7 @@ from calmotion.support.files import replaced as replaced
 from calmotion.support.files import temporary_folder as temporary_folder
 from calmotion.support.files import try_writing as try_writing
 from calmotion.support.files import write_text as write_text
+from calmotion.support.foreign_files import refuse_lfs_pointers as refuse_lfs_pointers
 from calmotion.support.foreign_files import remedy_for as remedy_for
 from calmotion.support.interrupts import answer as answer
 from calmotion.support.interrupts import check as check

@@ -4,9 +4,16 @@ opened because a shot names them."""
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
+
+from calmotion.errors import ShotError
 
 _HEAD = 4096  # bytes that tell the kind of a file
+_LFS = b"version https://git-lfs.github.com/spec/"  # first line of a pointer (git-lfs, docs/spec.md)
+_PULL = "Run `git lfs pull` in the repository that it comes from, which fetches the file itself"
+_SHOWN = 4  # files in a message
 _KINDS = {
+    "lfs": ("a Git LFS pointer, not the file itself", _PULL),
     "urdf": (
         "a URDF robot",
         "Make a shot of it: `calmotion import ROBOT.urdf --motion FILE -o robot.usda`",
@@ -60,7 +67,8 @@ def forbidden_place(path: str) -> str | None:
 
 
 def kind_of(path: str | os.PathLike[str]) -> str | None:
-    """`urdf`, `mjcf`, `table` (written by `--csv`), `usd`, `bvh`, or None for anything else."""
+    """`lfs` (a pointer of Git LFS), `urdf`, `mjcf`, `table` (written by `--csv`), `usd`, `bvh`, or None for anything
+    else."""
     if not os.path.isfile(path):
         return None
     try:
@@ -68,6 +76,8 @@ def kind_of(path: str | os.PathLike[str]) -> str | None:
             head = file.read(_HEAD)
     except OSError:
         return None
+    if head.startswith(_LFS):
+        return "lfs"
     if head.removeprefix(b"\xef\xbb\xbf").startswith(b"time_s,"):
         return "table"
     if head.startswith((b"#usda", b"PXR-USDC")) or (head.startswith(b"PK") and str(path).lower().endswith(".usdz")):
@@ -84,3 +94,23 @@ def remedy_for(path: str | os.PathLike[str], place: str = "") -> str | None:
     place."""
     kind = kind_of(path)
     return None if kind is None or kind == place else f"This is {_KINDS[kind][0]}. {_KINDS[kind][1]}"
+
+
+def refuse_lfs_pointers(files: Iterable[str | os.PathLike[str]], *, path: str = "", attribute: str = "") -> None:
+    """Refuse the small text files that stand for the files themselves in a clone of a repository without Git LFS.
+
+    Args:
+        files: That are to be read; those that do not exist are none.
+        path: Prim, or file that names them; empty: the first of them.
+        attribute: That names them.
+
+    Raises:
+        ShotError: One is a pointer; it names four of them.
+    """
+    pointers = [str(file) for file in dict.fromkeys(files) if kind_of(file) == "lfs"]
+    if pointers:
+        more = f", and {len(pointers) - _SHOWN} more" if len(pointers) > _SHOWN else ""
+        raise ShotError(
+            f"this is {_KINDS['lfs'][0]}", path=path or pointers[0], attribute=attribute,
+            found=", ".join(pointers[:_SHOWN]) + more, remedy=_PULL,
+        )  # fmt: skip

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError
 from calmotion.support.files import is_special
-from calmotion.support.foreign_files import forbidden_place
+from calmotion.support.foreign_files import forbidden_place, refuse_lfs_pointers
 from calmotion.usd.clips import clip_assets
 from calmotion.usd.diagnostics import quiet
 
@@ -53,7 +53,8 @@ def refuse_special(path: str, named_by: str = "") -> None:
 
 
 def open_dependencies(root: Sdf.Layer) -> list[Sdf.Layer]:
-    """The layers that a layer names, directly or not, opened before the stage so that none is a special file."""
+    """The layers that a layer names, directly or not, opened before the stage so that none is a special file or a
+    pointer of Git LFS."""
     from pxr import Sdf, Tf
 
     opened, names = [root], {root.identifier}
@@ -64,6 +65,7 @@ def open_dependencies(root: Sdf.Layer) -> list[Sdf.Layer]:
             names.add(name)
             refuse_place(name, layer.identifier)
             refuse_special(name, layer.identifier)
+            refuse_lfs_pointers([name], path=layer.identifier)
             try:
                 named = Sdf.Layer.FindOrOpen(name)
             except Tf.ErrorException:  # the composition reports it, with the prim

@@ -34,3 +34,12 @@ def test_a_mesh_file_that_cannot_be_read_is_refused(host, tmp_path, name, text):
         run(host, link(mesh_file=str(tmp_path / name)))
     assert caught.value.path == "/Arm/link" and caught.value.attribute == "calm:flexible:meshFile"
     assert name in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["link.stl", "link.obj", "link.msh", "link.vtu", "link.ply"])
+def test_a_pointer_of_git_lfs_is_no_mesh(host, tmp_path, name):
+    (tmp_path / name).write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1048584\n")
+    with pytest.raises(ShotError, match="Git LFS pointer") as caught:
+        run(host, link(mesh_file=str(tmp_path / name)))
+    assert caught.value.path == "/Arm/link" and caught.value.attribute == "calm:flexible:meshFile"
+    assert name in caught.value.found and "git lfs pull" in caught.value.remedy

@@ -132,3 +132,41 @@ def test_a_named_pipe_is_refused(tmp_path):
     with pytest.raises(ShotError) as error:
         read_description(str(tmp_path / "robot.urdf"), {})
     assert "named pipe" in error.value.message()
+
+
+LFS = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1048584\n"
+MJCF = '<mujoco model="m">{}<worldbody><body><geom type="mesh" mesh="b"/></body></worldbody></mujoco>'
+ASSET = '<asset><mesh name="b" file="b.stl"/></asset>'
+COMPILER = '<compiler meshdir="../meshes"/>'
+
+
+@pytest.mark.parametrize(
+    ("text", "pointer"),
+    [
+        (urdf(mesh("../meshes/b.stl")), "meshes/b.stl"),
+        (urdf(mesh("package://my_robot/meshes/b.dae")), "meshes/b.dae"),
+        (urdf(mesh("b.obj")).replace("visual>", "collision>"), "urdf/b.obj"),
+        (MJCF.format(ASSET), "urdf/b.stl"),
+        (MJCF.format(COMPILER + ASSET), "meshes/b.stl"),
+        (MJCF.format('<compiler assetdir="../meshes"/>' + ASSET.replace("stl", "obj")), "meshes/b.obj"),
+        (MJCF.format('<asset><hfield name="b" file="b.png"/></asset>'), "urdf/b.png"),
+        (MJCF.format('<include file="inner.xml"/>'), "urdf/inner.xml"),
+        (MJCF.format(f'{COMPILER}<include file="assets.xml"/>'), "meshes/b.stl"),
+        (LFS, "urdf/robot.urdf"),
+    ],
+)
+def test_pointers_of_git_lfs_are_refused(read, tmp_path, text, pointer):
+    file = tmp_path / "my_robot" / pointer
+    for folder in (file.parent, tmp_path / "my_robot" / "urdf"):
+        folder.mkdir(parents=True, exist_ok=True)
+    (tmp_path / "my_robot" / "urdf" / "assets.xml").write_text(f"<mujocoinclude>{ASSET}</mujocoinclude>")
+    file.write_text(LFS)
+    with pytest.raises(ShotError, match="Git LFS pointer") as refused:
+        read(text)
+    assert file.name in f"{refused.value.found} {refused.value.path}" and "git lfs pull" in refused.value.remedy
+
+
+def test_a_picture_that_is_a_pointer_of_git_lfs_changes_no_motion(read, tmp_path):
+    (tmp_path / "my_robot" / "urdf").mkdir(parents=True)
+    (tmp_path / "my_robot" / "urdf" / "wood.png").write_text(LFS)
+    assert read(MJCF.format('<asset><texture type="2d" file="wood.png"/></asset>')).kind == "mjcf"
