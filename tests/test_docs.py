@@ -14,7 +14,7 @@ from urllib.parse import urljoin
 
 import pytest
 from calmotion.cli.commands.table import BROUGHT_BY
-from floors import FLOORS
+from floors import FLOORS, REQUIRED_PLUGINS
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PACKAGE = REPOSITORY / "pipeline" / "calmotion"
@@ -130,21 +130,27 @@ def test_every_measured_row_of_simplifications_has_its_times():
     assert len(rows) > 10 and all(len(row) == 9 for row in rows)
 
 
-def test_the_pages_of_the_architecture_name_every_room():
+def test_the_architecture_has_every_room_on_its_floor():
     page = (REPOSITORY / "docs" / "architecture.md").read_text()
-    rooms = [path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists()]
-    assert [room for room in rooms if f"| `{room}/` |" not in page] == []
+    rows = re.findall(r"^\| (\d+) \| (.*?) \|", page, re.MULTILINE)
+    floors = [{name.removesuffix(".py") for name in re.findall(r"`([\w.]+)/?`", names)} for _, names in rows]
+    assert [int(number) for number, _ in rows] == list(range(len(FLOORS), 0, -1))
+    assert floors == [set(names) for names in reversed(FLOORS)]
 
 
-def test_the_floors_are_those_that_are_checked():
+def test_the_architecture_has_every_bundled_plugin():
     page = (REPOSITORY / "docs" / "architecture.md").read_text()
-    listed = re.findall(r"^\d+\. (.*)$", page, re.MULTILINE)
-    floor = {name.removesuffix(".py"): n for n, line in enumerate(listed) for name in re.findall(r"`([\w.]+)`", line)}
-    rooms = [name for names in FLOORS for name in names if name in floor]
-    assert len(rooms) > 15
-    checked = {name: n for n, names in enumerate(FLOORS) for name in names}
-    order = sorted(rooms, key=lambda name: -checked[name])
-    assert [floor[name] for name in order] == sorted(floor[name] for name in order)
+    table = page.split("| bundled plugins |")[1].split("\n\n")[0]
+    first, *others = [set(re.findall(r"`(\w+)`", row.split("|")[1])) for row in table.splitlines()[2:]]
+    assert first == set(REQUIRED_PLUGINS)
+    assert first.union(*others) >= {manifest.parent.name for manifest in REPOSITORY.glob("plugins/*/plugin.toml")}
+
+
+def test_the_guide_of_plugins_has_every_public_package():
+    page = (REPOSITORY / "docs" / "writing_a_plugin.md").read_text()
+    named = set(re.findall(r"^\| `calmotion\.(\w+)` \|", page, re.MULTILINE))
+    fronts = {path.parent.name for path in PACKAGE.glob("*/__init__.pyi")}
+    assert named == fronts | {"arrays", "errors", "public_names"}
 
 
 @pytest.fixture(scope="module")
