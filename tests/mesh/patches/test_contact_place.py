@@ -61,29 +61,3 @@ def test_the_place_turns_with_the_body(flanged):
 def test_a_flat_surface_has_no_inside():
     sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
     assert placed(sheet, 0.5, 0.5, 0.5).kind in ("flange", "face")
-
-
-@pytest.fixture(scope="module")
-def slotted():
-    """A block of 0.1 m with a slit of 0.8 mm from x = -0.03 m on, at z = 0, above 10 mm of it."""
-    boxes = [((0.02, 0.1, 0.1), (-0.04, 0.0, 0.0396)), ((0.08, 0.1, 0.01), (0.01, 0.0, -0.0054))]
-    boxes.append(((0.08, 0.1, 0.0892), (0.01, 0.0, 0.045)))
-    made = []
-    for size, center in boxes:
-        made.append(trimesh.creation.box(size))
-        made[-1].apply_translation(center)
-    return trimesh.boolean.union(made, engine="manifold")
-
-
-def test_a_frame_in_a_slit_across_its_axis_holds_the_nearest_flange_that_is_free(slotted):
-    place = placed(slotted, 0.01, 0.0, -0.0002)
-    assert place.kind == "flange" and place.position == pytest.approx([0.01, 0.0, -0.0104], abs=1e-6)
-    along = placed(slotted, 0.01, 0.0, -0.0002, axis=np.array([1.0, 0.0, 0.0]))
-    assert along is None  # a slit along the axis is the clearance of what turns in it
-
-
-def test_a_slit_that_is_wide_is_held_by_its_sides():
-    boxes = [trimesh.creation.box((0.1, 0.1, 0.03)) for _ in range(2)]
-    for box, side in zip(boxes, (-1.0, 1.0), strict=True):
-        box.apply_translation((0.0, 0.0, side * 0.017))
-    assert placed(trimesh.util.concatenate(boxes), 0.0, 0.0, 0.0) is None

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import trimesh
 from calmotion.mesh.patches.cut_patches import with_rims
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches
 from calmotion.mesh.patches.just_reached import just_reached
@@ -104,19 +103,3 @@ def test_triangles_that_a_cut_left_a_little_outside_belong_to_their_part():
     triangles = np.array([[0, 1, 2], [3, 4, 5], [4, 5, 6]])
     assert just_reached(points, triangles, np.zeros(3), 1.92).tolist() == [False, True, False]
     assert just_reached(points, triangles, np.zeros(3), 1.92, beyond=np.inf).tolist() == [False, True, True]
-
-
-@pytest.mark.parametrize("gap, left", [(5e-4, True), (5e-3, False)])
-def test_the_sides_of_a_slit_across_the_axis_are_not_held(gap, left):
-    """A joint below a disc that is fastened to a block with a slit in between."""
-    disc, block = trimesh.creation.box((0.08, 0.08, 0.01)), trimesh.creation.box((0.08, 0.08, 0.02))
-    disc.apply_translation((0.0, 0.0, 0.005))
-    block.apply_translation((0.0, 0.0, 0.02 + gap))
-    x = trimesh.util.concatenate([disc, block]).subdivide().subdivide()
-    x = np.array(x.triangles)[np.abs(np.array(x.face_normals)[:, 2]) > 0.5]  # without the sides of the blocks
-    points, corners = np.unique(np.round(x.reshape(-1, 3), 9), axis=0, return_inverse=True)
-    found = just_reached(points, corners.reshape(-1, 3), np.zeros(3), 0.03, np.array([0.0, 0.0, 1.0]))
-    height = x[:, :, 2].mean(axis=1)
-    slit = (height > 0.005) & (height < 0.02) & (np.linalg.norm(x.mean(axis=1), axis=1) < 0.02)
-    assert slit.any() and found[slit].all() == left and found[slit].any() == left
-    assert not found[height < 1e-9].any()

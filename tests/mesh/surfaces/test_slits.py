@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from calmotion.mesh.surfaces.slits import facing, slit_fillings
+from calmotion.mesh.surfaces.slits import slit_fillings, slit_widths
 
 
 def blocks(gap, tilt=0.0, side=1.0):
@@ -69,7 +69,7 @@ def test_what_faces_another_side_within_the_width():
     mesh = blocks(5e-3, side=0.5)
     x = np.array(mesh.triangles)
     middle, normal = x.mean(axis=1), np.array(mesh.face_normals)
-    faced = facing(middle, normal, x, 0.01)
+    faced = np.isfinite(slit_widths(middle, normal, x, 0.01))
     under = (np.abs(middle[:, 2] - 0.5) < 0.01) & (np.abs(middle[:, :2]).max(axis=1) < 0.25)
     assert np.array_equal(faced, under) and faced.any()
-    assert not facing(middle, normal, x, 4e-3).any()
+    assert not np.isfinite(slit_widths(middle, normal, x, 4e-3)).any()

@@ -3,9 +3,6 @@
 A frame may be at the joint's place in a neighbour, in the middle of a bearing, or behind a flange. What holds the joint
 is then the nearest part of the surface that goes around its axis: a bore or a boss, as of a bearing or a servo horn,
 or a flange. Without one, it is the nearest place of the surface.
-
-A slit across the axis, between a flange and what it is fastened to, holds nothing, even where it is what a frame is
-next to: link6 of the Panda was held by both walls of one of 1 mm in its middle.
 """
 
 from __future__ import annotations
@@ -15,9 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray
-from calmotion.mesh.surfaces.distances import closest_on_triangles, ray_length, triangle_parts
-from calmotion.mesh.surfaces.nearby_triangles import unit_normals
-from calmotion.mesh.surfaces.slits import facing_along
+from calmotion.mesh.surfaces.distances import closest_on_triangles, triangle_parts
 
 LARGEST_GAP = 0.5  # of the size of a body, between its surface and a frame inside its convex hull that touches it
 OUTSIDE = 0.05  # of the size, by which a frame inside the hull may be outside it
@@ -26,7 +21,6 @@ _SECTORS, _COVERED = 16, 12  # of the angle around the axis, and how many a ring
 _BIN = 0.02  # of the size: rings of one radius, flanges in one plane
 _FEW = 5_000  # triangles, below which a triangle may be long
 _FARTHER, _ASIDE = 1.5, 0.1  # a ring may be farther than the nearest place, by a factor and a part of the size
-_SLIT, _ROUNDING = 0.01, 1e-5  # of the size: widest slit that holds nothing; that of a place on a side
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +39,7 @@ class ContactPlace:
 
 
 def contact_place(center: Array, axis: Array, triangles: Array, points: Array) -> ContactPlace | None:
-    """The contact place of an attachment frame; None where the frame itself touches the body, and not in a slit.
+    """The contact place of an attachment frame; None where the frame itself touches the body.
 
     Args:
         center: Origin of the attachment frame [m], shape [3].
@@ -58,17 +52,9 @@ def contact_place(center: Array, axis: Array, triangles: Array, points: Array) -
     gaps = np.linalg.norm(closest - center, axis=1)
     gap = float(gaps.min())
     inside = gap <= OUTSIDE * size or inside_hull(points, center, OUTSIDE * size)
-    touched = gaps.argmin(keepdims=True)
-    normal = unit_normals(triangles[touched])[0]
-    slit = ray_length(closest[touched[0]], normal[0], triangles, _ROUNDING * size) <= _SLIT * size and bool(
-        facing_along(axis, closest[touched], normal, triangles, _SLIT * size)[0]
-    )
-    if inside and gap <= LARGEST_GAP * size and not slit:
+    if inside and gap <= LARGEST_GAP * size:
         return None
     x, normal = _places(triangles)
-    if slit:
-        held = ~facing_along(axis, x, normal, triangles, _SLIT * size)
-        x, normal = x[held], normal[held]
     away = x - center
     height = away @ axis
     radial = away - height[:, None] * axis
@@ -86,11 +72,7 @@ def contact_place(center: Array, axis: Array, triangles: Array, points: Array) -
     level = _nearest_level(height, flange, sector, np.hypot(radius, height), limit, _BIN * size)
     if level is not None:
         return ContactPlace(center + level * axis, "flange", gap)
-    if not slit:
-        return ContactPlace(np.asarray(closest[int(gaps.argmin())]), "face", gap)
-    if not len(x):
-        return None
-    return ContactPlace(x[int(np.hypot(radius, height).argmin())], "face", gap)
+    return ContactPlace(np.asarray(closest[int(gaps.argmin())]), "face", gap)
 
 
 def inside_hull(points: Array, place: Array, margin: float) -> bool:

@@ -5,7 +5,7 @@ carry a pin, or the other side of a shell. How much of that wall is within the s
 thousandth of the radius: holding it, a fork of the G1 had 320, 346 or 307 Hz on three meshes, in place of 207 Hz.
 
 The axis of a joint tells more. What holds it is around its axis: cheeks, bores and flanges are; the bottom of a fork is
-on one side. And slits across the axis, between parts that are fastened to each other, hold nothing.
+on one side.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ import numpy as np
 
 from calmotion.arrays import Array, BoolArray, Indices
 from calmotion.mesh.surfaces.distances import closest_on_triangles, triangle_parts
-from calmotion.mesh.surfaces.nearby_triangles import unit_normals
-from calmotion.mesh.surfaces.slits import facing_along
 from calmotion.mesh.tetrahedra import part_of_each
 
 _ON = 1e-9  # of the radius: triangles that end on the sphere
@@ -27,7 +25,6 @@ _FARTHEST = 0.75
 # seven robots bottoms of forks cover 1 to 4 sectors and are at 0.8 to 0.95.
 _SECTORS, _COVERED, _MOSTLY, _AWAY = 16, 12, 0.5, 0.75
 _PARTS = triangle_parts(8)
-_SLIT, _MOST = 0.05, 0.5  # widest slit, of the radius; share of a part that is its sides
 
 
 def just_reached(
@@ -57,8 +54,6 @@ def just_reached(
     far = np.asarray(nearest > least + _FARTHEST * (radius - least))
     if axis is not None and len(nearest) > 1:
         far |= _beside(corners[reached] - center, part, radius, axis)
-        slits = _slits(corners[reached], part, radius, axis)
-        far |= slits & ~np.all(far | slits)
     found[reached[far[part]]] = True
     return found
 
@@ -89,20 +84,3 @@ def _beside(corners: Array, part: Indices, radius: float, axis: Array) -> BoolAr
     if area[around].sum() < _MOSTLY * area.sum():
         return np.zeros(count, dtype=bool)
     return np.asarray(~around & (away >= _AWAY * radius) & np.isfinite(away))
-
-
-def _slits(corners: Array, part: Indices, radius: float, axis: Array) -> BoolArray:
-    """Which parts are mostly sides of slits across an axis, shape [number of parts].
-
-    Args:
-        corners: Of triangles [m], shape [k, 3, 3].
-        part: Of each triangle, shape [k].
-        radius: [m].
-        axis: Unit vector, shape [3].
-    """
-    normal, area = unit_normals(corners)
-    faced = facing_along(axis, corners.mean(axis=1), normal, corners, _SLIT * radius)
-    whole, sides = np.zeros((2, int(part.max()) + 1))
-    np.add.at(whole, part, area)
-    np.add.at(sides, part[faced], area[faced])
-    return np.asarray(sides > _MOST * whole)

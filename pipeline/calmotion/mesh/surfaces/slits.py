@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.arrays import Array, BoolArray, Indices
+from calmotion.arrays import Array, Indices
 from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles, unit_normals
 
 _OPPOSITE = -0.85  # largest product of the normals of two sides: within 32 degrees; else they are those of a corner
 _SMOOTH = 0.8  # least product of the normals of triangles with an edge in common that have one filling
 _UPRIGHT = 0.3  # least product of the normals of a triangle and of the far side of its filling
-_ALONG = np.cos(np.radians(15.0))  # least product of an axis and the normals of sides across it
 _ROUNDING = 1e-3  # of the widest slit: how far behind a place the other side may be
 _LATERAL = 2.0  # way of a corner, of that along the normals of its triangles
 
@@ -30,24 +29,6 @@ def slit_widths(places: Array, normals: Array, triangles: Array, widest: float) 
     near = NearbyTriangles(corners, np.arange(len(corners)).reshape(-1, 3), widest)
     gap, product = near.faced(places, normals, _ROUNDING * widest)
     return np.asarray(np.where((gap <= widest) & (product < _OPPOSITE), gap, np.inf))
-
-
-def facing(places: Array, normals: Array, triangles: Array, widest: float) -> BoolArray:
-    """Which places of a surface face another side of it across a slit, shape [n]; arguments as of `slit_widths`."""
-    return np.isfinite(slit_widths(places, normals, triangles, widest))
-
-
-def facing_along(axis: Array, places: Array, normals: Array, triangles: Array, widest: float) -> BoolArray:
-    """Which places face another side across a slit whose sides are across an axis, shape [n].
-
-    Args:
-        axis: Unit vector, shape [3].
-        places, normals, triangles, widest: As of `facing`.
-    """
-    found = np.abs(normals @ axis) > _ALONG
-    if found.any():
-        found[found] = facing(places[found], normals[found], triangles, widest)
-    return np.asarray(found)
 
 
 @dataclass(frozen=True, eq=False)
