@@ -21,7 +21,7 @@ from calmotion.version import __version__
 from calmotion.workflow import Given, Path, known_materials, problems_of, read_settings, value_of
 
 from .converters import BrokenMeshes, convert, converter_python, temporary_folder
-from .descriptions import USD, Description, read_description, repaired
+from .descriptions import MJCF, USD, Description, read_description, repaired
 from .doubts import doubts
 from .robot_layer import FlexibleLinks, RobotOptions, robot_layer
 
@@ -127,7 +127,7 @@ def import_robot(
     options = RobotOptions(
         links, tuple(targets), description.efforts, description.without_mass, description.massless,
         None if solid is None else material_named(solid, known)[1], tracks,
-        None if is_usd and tracks is None else frames_per_second(tracks), tuple(motors),
+        None if is_usd and tracks is None else frames_per_second(tracks), tuple(motors), description.kind == MJCF,
     )  # fmt: skip
     if is_usd:
         return _over_usd(description.path, target, options)

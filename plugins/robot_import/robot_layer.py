@@ -15,6 +15,7 @@ from calmotion.rigging import Material
 from calmotion.support import nearest
 from calmotion.usd import StageUnits, author_material, is_applied, is_rigid_body, open_stage, prims_of, quiet, units_of
 
+from .frames import refuse_moving_frames
 from .robot_motors import author_motors, named, shift_limits
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ class RobotOptions:
         motion: Of its joints, or None.
         frames_per_second: Of the shot; None where no motion is given: that of the robot.
         motors: Patterns of names of joints that motors drive; none: see `robot_motors`.
+        mjcf: Whether the robot is MJCF, for which the converter authors the mass of every link that has one.
     """
 
     flexible: tuple[FlexibleLinks, ...] = ()
@@ -69,6 +71,7 @@ class RobotOptions:
     motion: MotorTracks | None = None
     frames_per_second: float | None = 60.0
     motors: tuple[str, ...] = ()
+    mjcf: bool = False
 
 
 def robot_layer(converted: str, asset: str, options: RobotOptions) -> tuple[Sdf.Layer, tuple[str, ...]]:
@@ -149,10 +152,13 @@ class _Author:
         """Densities of the links that have no inertia, and a milligram for those that have no mass."""
         from pxr import Gf, UsdPhysics
 
-        frames = [prim for prim in self._bodies if named(prim) in self._options.massless or self._weighs_nothing(prim)]
+        frames = [prim for prim in self._bodies if self._is_frame(prim)]
+        if self._options.mjcf:
+            refuse_moving_frames(self._stage, frames)
         for prim in frames:
             api = UsdPhysics.MassAPI.Apply(prim)
             api.CreateMassAttr(_FRAME_MASS / self._units.mass(1.0))
+            api.CreateCenterOfMassAttr(Gf.Vec3f(0.0))
             api.CreateDiagonalInertiaAttr(Gf.Vec3f(_FRAME_INERTIA / self._units.inertia(1.0)))
         if frames:
             names = ", ".join(map(named, frames))
@@ -160,7 +166,7 @@ class _Author:
         self._raise_moments()
         without = [prim for prim in self._bodies if named(prim) in self._options.without_mass]
         if self._options.solid is not None:
-            without += [prim for prim in self._bodies if prim not in without and _has_no_mass(prim)]
+            without += [prim for prim in self._bodies if prim not in (*without, *frames) and _has_no_mass(prim)]
         bending = [prim for prim in without if self._is_flexible(prim)]
         if bending:
             self.notes.append(f"links without inertia have that of their material: {', '.join(map(named, bending))}")
@@ -178,6 +184,11 @@ class _Author:
             api = UsdPhysics.MassAPI.Apply(prim)
             api.CreateDensityAttr(solid.density / self._units.density(1.0))
         self.notes.append(f"links without inertia have that of their geometry as solid parts: {names}")
+
+    def _is_frame(self, body: Usd.Prim) -> bool:
+        """Whether a link has no mass, nor gets that of a material."""
+        without = self._options.mjcf and _has_no_mass(body) and not self._is_flexible(body)
+        return without or named(body) in self._options.massless or self._weighs_nothing(body)
 
     def _weighs_nothing(self, body: Usd.Prim) -> bool:
         """Whether all geoms of a rigid link of an MJCF are of mass 0; where some are, they are made weightless."""
