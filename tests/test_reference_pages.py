@@ -74,7 +74,7 @@ def test_every_file_that_names_versions_of_python_names_the_supported_ones(repos
         assert f"Python {supported[0]} to {supported[-1]}" in (repository / page).read_text(), page
     text = (repository / "Makefile").read_text()
     assert set(re.findall(r"\bpython(3\.\d+)(?= (?:python|;))", text)) >= set(supported)
-    doctor = (repository / "pipeline/calmotion/cli/commands/setup/doctor.py").read_text()
+    doctor = (repository / "pipeline/calmotion/cli/commands/doctor.py").read_text()
     assert f"(3, {lowest}) <= sys.version_info[:2] < (3, {above})" in doctor
     container = re.search(r"^FROM (?:\S+/)?python:(\S+)-slim", (repository / "Containerfile").read_text(), re.MULTILINE)
     assert container[1] in supported

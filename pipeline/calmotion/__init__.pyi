@@ -10,8 +10,6 @@ from calmotion.workflow.commands import rig as rig
 from calmotion.workflow.commands import simulate as simulate
 from calmotion.workflow.commands import verify as verify
 from calmotion.workflow.inspection import Inspection as Inspection
-from calmotion.workflow.installation.warmup import Warmup as Warmup
-from calmotion.workflow.installation.warmup import warmup as warmup
 from calmotion.workflow.problems import Cancelled as Cancelled
 from calmotion.workflow.problems import RunError as RunError
 from calmotion.workflow.publishing.gate import publishing_problems as publishing_problems
@@ -24,3 +22,5 @@ from calmotion.workflow.results import TargetMotion as TargetMotion
 from calmotion.workflow.run import Progress as Progress
 from calmotion.workflow.shot import Shot as Shot
 from calmotion.workflow.shot import open_shot as open_shot
+from calmotion.workflow.warmup import Warmup as Warmup
+from calmotion.workflow.warmup import warmup as warmup

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from calmotion.cli.commands.setup.cache import size
+from calmotion.cli.commands.cache import size
 from calmotion.cli.main import main
 from calmotion.support.caching.caches import store_arrays
 

@@ -60,8 +60,6 @@ from calmotion.model.outputs import SystemModes as SystemModes
 from calmotion.model.outputs import Verification as Verification
 from calmotion.model.outputs import Video as Video
 from calmotion.model.outputs import WrittenLayer as WrittenLayer
-from calmotion.model.provenance import InputLayer as InputLayer
-from calmotion.model.provenance import Provenance as Provenance
 from calmotion.model.result import Accuracy as Accuracy
 from calmotion.model.result import LimitUse as LimitUse
 from calmotion.model.result import ModeTable as ModeTable
@@ -79,7 +77,9 @@ from calmotion.model.robust.robots import Robustness as Robustness
 from calmotion.model.robust.settings import RobustSettings as RobustSettings
 from calmotion.model.run import LONG_SHOT as LONG_SHOT
 from calmotion.model.run import SHAPERS as SHAPERS
+from calmotion.model.run import InputLayer as InputLayer
 from calmotion.model.run import OutputPaths as OutputPaths
+from calmotion.model.run import Provenance as Provenance
 from calmotion.model.run import RunSettings as RunSettings
 from calmotion.model.run import Source as Source
 from calmotion.model.table import columns as columns

@@ -17,7 +17,7 @@ from calmotion.support.memory import available_memory as available_memory
 from calmotion.support.memory import too_large as too_large
 from calmotion.support.naming import distinct_names as distinct_names
 from calmotion.support.naming import nearest as nearest
-from calmotion.support.processes.workers import Fault as Fault
-from calmotion.support.processes.workers import results_of as results_of
 from calmotion.support.reading import read_text as read_text
 from calmotion.support.reading import read_toml as read_toml
+from calmotion.support.worker_processes import Fault as Fault
+from calmotion.support.worker_processes import results_of as results_of

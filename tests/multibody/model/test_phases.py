@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from calmotion.errors import IntegrationError
 from calmotion.model import Body, Character, Frame, Joint, MassProperties
+from calmotion.model.contact import Contact
 from calmotion.model.run import RunSettings
-from calmotion.model.standing.contact import Contact
 from calmotion.multibody.analysis.kinematics import rigid_state, target_jacobians
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.integrators.integrate import integrate

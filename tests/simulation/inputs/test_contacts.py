@@ -6,8 +6,8 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
+from calmotion.model.contact import Contact
 from calmotion.model.run import RunSettings
-from calmotion.model.standing.contact import Contact
 from calmotion.retargeting.windows.plan import window_length
 from calmotion.simulation.inputs.contacts import held_steps
 from calmotion.simulation.inputs.time_grid import make_grid

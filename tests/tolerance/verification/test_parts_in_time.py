@@ -5,7 +5,7 @@ import pytest
 from calmotion.errors import ShotError
 from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.support.processes.workers import Fault
+from calmotion.support.worker_processes import Fault
 from calmotion.tolerance.simulation import simulate_to_tolerance
 from calmotion.tolerance.verification.parts_in_time import (
     Elsewhere,

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from calmotion.cli.commands.shots.watch import _tell
+from calmotion.cli.commands.watch import _tell
 from calmotion.cli.main import main
 from calmotion.cli.output import Output
 from calmotion.errors import ShotError

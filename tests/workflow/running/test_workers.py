@@ -8,7 +8,7 @@ from concurrent.futures import Executor, Future
 import pytest
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
-from calmotion.support.processes.workers import Fault
+from calmotion.support.worker_processes import Fault
 from calmotion.workflow.running.workers import executor_on, finished, result_of, results_on
 from odd_jobs import odd_job
 

@@ -36,17 +36,17 @@ class BuiltIn:
 
 
 BUILT_IN = {
-    "inspect": BuiltIn("shots.inspect", "show the content of the shot and the model simplifications"),
-    "simulate": BuiltIn("shots.simulate", "simulate the shot as animated"),
-    "watch": BuiltIn("shots.watch", "simulate or optimise a shot again whenever it is saved"),
-    "optimize": BuiltIn("shots.optimize", "change the motor curves so that the robot does not shake"),
-    "rig": BuiltIn("robots.rig", "make a robot from a skinned character: bodies, joints, motors, targets"),
-    "motors": BuiltIn("robots.motors", "list real motors that a joint can name, with their sources"),
-    "materials": BuiltIn("robots.materials", "list materials for flexible links, with their sources"),
-    "plugins": BuiltIn("setup.plugins", "list, check, disable and create plugins"),
-    "warmup": BuiltIn("setup.warmup", "compile the kernels ahead of the first shot"),
-    "cache": BuiltIn("setup.cache", "show, clear or prune the caches of kernels, meshes and reduced bodies"),
-    "doctor": BuiltIn("setup.doctor", "check the installation and the machine, and say what to do"),
+    "inspect": BuiltIn("inspect", "show the content of the shot and the model simplifications"),
+    "simulate": BuiltIn("simulate", "simulate the shot as animated"),
+    "watch": BuiltIn("watch", "simulate or optimise a shot again whenever it is saved"),
+    "optimize": BuiltIn("optimize", "change the motor curves so that the robot does not shake"),
+    "rig": BuiltIn("rig", "make a robot from a skinned character: bodies, joints, motors, targets"),
+    "motors": BuiltIn("motors", "list real motors that a joint can name, with their sources"),
+    "materials": BuiltIn("materials", "list materials for flexible links, with their sources"),
+    "plugins": BuiltIn("plugins", "list, check, disable and create plugins"),
+    "warmup": BuiltIn("warmup", "compile the kernels ahead of the first shot"),
+    "cache": BuiltIn("cache", "show, clear or prune the caches of kernels, meshes and reduced bodies"),
+    "doctor": BuiltIn("doctor", "check the installation and the machine, and say what to do"),
 }
 # The bundled plugins that bring commands: whoever deletes one is told where its command went.
 BROUGHT_BY: dict[str, str] = {

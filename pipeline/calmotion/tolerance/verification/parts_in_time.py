@@ -22,7 +22,7 @@ from calmotion.model.curves import held_curve
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.excerpts import later
 from calmotion.simulation.preparation import pose_modes
-from calmotion.support.processes.workers import Fault
+from calmotion.support.worker_processes import Fault
 from calmotion.tolerance.step_error import distance
 
 LEFT = 0.02  # of the slowest vibration, where a part begins to be kept

@@ -17,7 +17,7 @@ from typing import Any
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
 from calmotion.support import interrupts
-from calmotion.support.processes.workers import Fault, results_of
+from calmotion.support.worker_processes import Fault, results_of
 from calmotion.version import __version__
 
 LOCAL, _DASK = "local", "dask://"

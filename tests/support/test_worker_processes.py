@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from calmotion.support.processes.workers import Fault, results_of
+from calmotion.support.worker_processes import Fault, results_of
 from odd_jobs import odd_job
 
 

@@ -20,7 +20,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
     from dataclasses import asdict
 
     from calmotion.cli.progress import ProgressDisplay
-    from calmotion.workflow.installation.warmup import warmup
+    from calmotion.workflow.warmup import warmup
 
     with ProgressDisplay(args.quiet) as display:
         made = warmup(display)

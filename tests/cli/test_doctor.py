@@ -4,8 +4,8 @@ import json
 import re
 
 import pytest
-from calmotion.cli.commands.setup import doctor
-from calmotion.cli.commands.setup.doctor import NOTE, OK, WRONG, examine
+from calmotion.cli.commands import doctor
+from calmotion.cli.commands.doctor import NOTE, OK, WRONG, examine
 
 
 def by_name(findings):

@@ -6,7 +6,7 @@ import os
 import calmotion as cm
 import pytest
 from calmotion.errors import ShotError
-from calmotion.workflow.installation import warmup as module
+from calmotion.workflow import warmup as module
 
 
 def test_a_warm_installation_compiles_nothing_again_and_counts_its_kernels(calmotion, tmp_path, monkeypatch):

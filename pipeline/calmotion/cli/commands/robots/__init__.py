@@ -1,1 +1,0 @@
-"""Commands that make shots: robots from files and characters, materials."""

@@ -1,1 +1,0 @@
-"""Commands for the installation: plugins, caches, checks, completion."""

@@ -1,1 +1,0 @@
-"""What holds a robot on the ground."""

@@ -1,1 +1,0 @@
-"""What an installation needs before its first shot."""
