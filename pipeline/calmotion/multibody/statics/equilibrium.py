@@ -13,10 +13,16 @@ from calmotion.multibody.linear_solver.closed_chains import factor_closed_chains
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.least_multipliers import least_multipliers
 from calmotion.multibody.model.system import Integrator, State, System, allocate_state
-from calmotion.multibody.statics.regularized_statics import regularize
+from calmotion.multibody.statics.regularized_statics import (
+    is_regularized,
+    moves_nothing,
+    regularize,
+    without_regularization,
+)
 
 STATIC = Integrator(velocity=0.0, acceleration=0.0, gamma=0.0, alpha=1.0)
 TOLERANCE = 3e-11  # of a correction, in `System.unit`
+CREEP = 0.5  # of the correction before it, above which the weak springs of free joints may hold up an iteration
 LIMIT = 400  # iterations
 LOAD_STEP_LIMIT = 30  # of a load step
 PSEUDO_TIME = (1e2, 1e4, 1e6)  # first factors of the mass matrix, 1/time^2
@@ -146,6 +152,13 @@ def _iterate(
             factor_closed_chains(system, ws.matrix, border)
         solve_system(system, ws.matrix, x, lam, solution)
         size = float(largest_entry(system, x))
+        exact = max(TOLERANCE, rounding_floor(system, state))
+        settled = size < exact
+        if not settled and inertia == 0.0 and size > CREEP * previous and is_regularized(system):
+            settled = moves_nothing(system, ws.matrix, x, lam, solution, exact)
+            if not settled:
+                x[:], lam[:] = without_regularization(system, ws.matrix, x, lam, solution)
+                size = float(largest_entry(system, x))
         if not np.isfinite(size):
             return worst_component(system, x), iteration + 1
         # a step keeps each component's rotation moderate, so that the linearisation is valid
@@ -155,7 +168,7 @@ def _iterate(
         before.q[:] = state.q
         state.turn[:] = 0.0
         correct(system, before, state, ws.work.R, x, lam, 1.0, ws.scratch.T)
-        if size < max(TOLERANCE, rounding_floor(system, state)) and inertia == 0.0:
+        if settled and inertia == 0.0:
             if chains_closed:
                 least_multipliers(system, border, state.lam)
             return -1, iteration + 1

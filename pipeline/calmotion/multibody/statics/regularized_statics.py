@@ -16,6 +16,8 @@ so much farther than others that redundant constraints could not be detected.
 
 from __future__ import annotations
 
+import numpy as np
+
 from calmotion.arrays import Array
 from calmotion.multibody.kernels.sliders import LENGTH, slides_freely
 from calmotion.multibody.linear_solver.closed_chains import copy_rows, solve_system, solve_system_transposed
@@ -25,6 +27,11 @@ from calmotion.support.compilation import NO, YES, kernel, shared_kernel
 
 REGULARIZATION = 1e-2  # stiffness over inertia [1/s^2]
 REFINEMENTS = 8  # solutions after the first: exact to rounding for a period of six seconds, to 1e-9 for twenty
+KRYLOV = 40  # most solutions of `without_regularization`
+INVARIANT = 1e-13  # of a unit vector, that may lie outside of the space that it spans
+LEAST_STIFFNESS = 1e-7  # of a joint over that of its weak spring, down to which the joint moves by its own
+LARGEST_TURN = 0.5  # of a joint in one correction [rad]
+ROUNDING_LOAD = 1e-13  # of a weak spring over the weight of all bodies, that rounding may have left
 HINGE, BALL = 5, 3  # rows of a joint that rotates freely about one axis (or slides along it), and of a ball joint
 
 
@@ -147,3 +154,77 @@ def solve_statics_transposed(
         for _ in range(REFINEMENTS):
             _refine(system, matrix, x, lam, scratch, YES)
             solve_system_transposed(system, matrix, x, lam, scratch)
+
+
+def without_regularization(
+    system: System, matrix: StepMatrix, x: Array, lam: Array, scratch: SolutionScratch
+) -> tuple[Array, Array]:
+    """A correction that descends by what K says, from that of (K + E) (x, lam) = r.
+
+    Refinement takes as many solutions as a joint's stiffness is smaller than its spring: a million for a rod between
+    two ball joints whose centre of mass lies 1e-10 m off its axis. (K + E)^-1 K is the identity but for the joints that
+    the springs hold, so that an Arnoldi process from x (Saad, Iterative Methods for Sparse Linear Systems, 2003,
+    section 6.3) has the whole of it in about one solution for each different stiffness of theirs. Each part of x in an
+    eigenvector is divided by the absolute eigenvalue, as a negative one is that of a centre of mass above its joint
+    (Dauphin et al., Advances in Neural Information Processing Systems 27, 2014).
+
+    Returns:
+        The correction, shaped as x and lam; no part of it turns a joint by more than half a radian.
+    """
+    size = np.linalg.norm(_weighted(system, x))
+    basis, weighted = [(x / size, lam / size)], [_weighted(system, x / size)]
+    H = np.zeros((KRYLOV + 1, KRYLOV))
+    for k in range(KRYLOV):
+        moved, moved_lam = np.zeros_like(x), np.zeros_like(lam)
+        _add_regularization(system, matrix.Jp, *basis[k], moved, moved_lam, NO)
+        solve_system(system, matrix, moved, moved_lam, scratch)
+        left, left_lam = basis[k][0] - moved, basis[k][1] - moved_lam
+        for row in [*range(k + 1)] * 2:
+            part = float(weighted[row] @ _weighted(system, left))
+            H[row, k] += part
+            left, left_lam = left - part * basis[row][0], left_lam - part * basis[row][1]
+        H[k + 1, k] = np.linalg.norm(_weighted(system, left))
+        if H[k + 1, k] < INVARIANT:
+            break
+        basis.append((left / H[k + 1, k], left_lam / H[k + 1, k]))
+        weighted.append(_weighted(system, basis[-1][0]))
+    values, vectors = np.linalg.eig(H[: k + 1, : k + 1])
+    shares = size * np.linalg.pinv(vectors)[:, 0] / np.maximum(np.abs(values), LEAST_STIFFNESS)
+    turns = np.abs(np.array(weighted[: k + 1]).T @ (vectors * shares)).max(axis=0)
+    parts = np.real(vectors @ (shares * LARGEST_TURN / np.maximum(turns, LARGEST_TURN)))
+    used = basis[: k + 1]
+    return (
+        np.einsum("k,kbi->bi", parts, np.array([part for part, _ in used])),
+        np.einsum("k,kji->ji", parts, np.array([part for _, part in used])),
+    )
+
+
+def _weighted(system: System, x: Array) -> Array:
+    """A correction in `System.unit`, as one row; without the entries that its component does not have."""
+    used = np.arange(x.shape[1]) < 6 + system.elastic[:, None]
+    weighted: Array = np.where(used, x / system.unit, 0.0).ravel()
+    return weighted
+
+
+def moves_nothing(
+    system: System, matrix: StepMatrix, x: Array, lam: Array, scratch: SolutionScratch, tolerance: float
+) -> bool:
+    """Whether the solution of (K + E) (x, lam) = r is a motion of free joints that K does not feel, under loads that
+    are rounding: it changes nothing but the pose of these joints.
+
+    Args:
+        tolerance: Of what K feels of it, (K + E)^-1 K x, in `System.unit`.
+    """
+    load, load_lam = np.zeros_like(x), np.zeros_like(lam)
+    _add_regularization(system, matrix.Jp, x, lam, load, load_lam, NO)
+    weight = system.mass.sum() * np.linalg.norm(system.gravity)
+    if np.abs(_loads(system, load)).max(initial=0.0) > ROUNDING_LOAD * weight:
+        return False
+    solve_system(system, matrix, load, load_lam, scratch)
+    return bool(np.abs(_weighted(system, x - load)).max(initial=0.0) < tolerance)
+
+
+def _loads(system: System, load: Array) -> Array:
+    """Forces, and moments over a length of the mechanism [N]."""
+    loads: Array = load / np.where(np.arange(load.shape[1]) < 3, 1.0, system.unit[0, 0])
+    return loads
