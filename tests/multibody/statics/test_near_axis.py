@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import compiled
-from calmotion.benchmarks.scenes.beam_arm import IDENTITY
 from calmotion.model import Body, Frame, Joint, MassProperties
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.joint_arrays import rotation_matrix
 from calmotion.multibody.model.model import start_angles
 from calmotion.multibody.statics.equilibrium import equilibrium
+from calmotion.testing.beam_arms import IDENTITY
 from neutral_hinges import push_rod, turning
 
 ASIDE = (0.0, 1.0, 0.0)
