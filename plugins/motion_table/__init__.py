@@ -9,6 +9,7 @@ from calmotion.host import NotAsked, Operator, Property, RunContext, registratio
 from calmotion.model import MotorTracks, Source
 
 SUFFIXES = (".csv", ".npz")
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # units of times
 
 
 class ReadTable(Operator):
@@ -21,6 +22,7 @@ class ReadTable(Operator):
     properties = (
         Property("angles", str, "auto", choices=("auto", "rad", "deg"),
                  description="Unit of angles; auto: as a header of the table says, else rad"),
+        Property("times", str, "s", choices=tuple(SECONDS), description="Unit of the times of a table"),
         Property("rate", float, 0.0, unit="Hz", minimum=0.0, maximum=1e5,
                  description="Rows a second of a table without time_s"),
         Property("joints", str, "",
@@ -43,7 +45,7 @@ class ReadTable(Operator):
         path, values = context.get(Source).motion, context.properties
         assert path is not None  # poll
         names = [name.strip() for name in values.joints.split(",")] if values.joints else []
-        tracks = read_motion(path, angles=values.angles, rate=values.rate, names=names)
+        tracks = read_motion(path, angles=values.angles, seconds=SECONDS[values.times], rate=values.rate, names=names)
         context.report("info", f"{path}: {len(tracks.values)} joints, {tracks.times[-1]:.4g} s")
         last = len(tracks.times) - 1
         if values.rate > 0.0 and abs(tracks.times[-1] * values.rate - last) > 0.01 * last:

@@ -19,16 +19,19 @@ _REMEDY = (
     "'# units: angle deg') or m"
 )
 _DEGREES = re.compile(r"(angle|units?)\W+deg", re.IGNORECASE)
+_LONGEST = 1e5  # of a motion [s]: a day
+_UNITS = {"ms": "milliseconds (0.001 s)", "us": "microseconds (1e-6 s)", "ns": "nanoseconds (1e-9 s)"}
 _EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
 _WITHOUT = "--set motion.read.rate=60Hz --set motion.read.joints=NAME,-,... with a name, or -, for each column"
 
 
-def read_motion(path: str, *, angles: str, rate: float, names: Sequence[str]) -> MotorTracks:
+def read_motion(path: str, *, angles: str, seconds: float, rate: float, names: Sequence[str]) -> MotorTracks:
     """The tracks of a table.
 
     Args:
         path: A .csv or .npz file.
         angles: `rad`, `deg`, or `auto`: as the table says.
+        seconds: Unit of the times of a table [s].
         rate: Rows a second of a table without times [Hz]; 0 where it has them.
         names: Joints of the columns of a table without names; `-` leaves one out.
 
@@ -50,10 +53,12 @@ def read_motion(path: str, *, angles: str, rate: float, names: Sequence[str]) ->
         if not rate > 0.0:
             remedy = f"{_REMEDY}; or use {_WITHOUT}"
             raise ShotError("the motion has no times", path=path, attribute=TIME, remedy=remedy)
-        times = np.arange(len(next(iter(columns.values()), np.zeros(0)))) / rate
+        times, seconds = np.arange(len(next(iter(columns.values()), np.zeros(0)))) / rate, 1.0
     _refuse_bad(path, times, columns)
+    times = seconds * (times - times[0])
+    _refuse_long(path, times)
     scale = np.radians(1.0) if angles == "deg" or (angles == "auto" and degrees) else 1.0
-    return MotorTracks(path, times - times[0], {name: scale * values for name, values in columns.items()})
+    return MotorTracks(path, times, {name: scale * values for name, values in columns.items()})
 
 
 def _csv(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
@@ -190,6 +195,18 @@ def _refuse_bad(path: str, times: Array, columns: dict[str, Array]) -> None:
             "times must increase", path=path, attribute=TIME,
             found=f"{times[back[0]]:g} and then {times[back[0] + 1]:g} in row {back[0] + 2}",
             remedy="Sort the rows, and remove those that come twice",
+        )  # fmt: skip
+
+
+def _refuse_long(path: str, times: Array) -> None:
+    """Refuse times of which no shot can have the frames; they are mostly those of a clock that counts nanoseconds."""
+    length, step = float(times[-1] - times[0]), float(np.median(np.diff(times)))
+    if length > _LONGEST:
+        unit = "ns" if step > 1e5 else "us" if step > 1e2 else "ms"
+        raise ShotError(
+            "the motion is too long", path=path, attribute=TIME,
+            found=f"{length:.4g} s in {len(times)} rows, {step:.4g} s apart",
+            remedy=f"Write times in seconds; if they are {_UNITS[unit]}, read them with --set motion.read.times={unit}",
         )  # fmt: skip
 
 

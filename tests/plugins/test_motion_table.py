@@ -49,6 +49,9 @@ def table(head="time_s,pan,lift", times=TIMES, scale=1.0):
         ("a.csv", "# units: degrees\n" + table(scale=180.0 / np.pi), {}),
         ("a.csv", table(scale=180.0 / np.pi), {"angles": "deg"}),
         ("a.csv", "# units: angle deg\n" + table(), {"angles": "rad"}),
+        ("a.csv", table(times=1e3 * TIMES), {"times": "ms"}),
+        ("a.csv", table(times=1e6 * TIMES), {"times": "us"}),
+        ("a.npz", {"time_s": (1e9 * TIMES).astype(int) + 10**15, "pan": PAN, "lift": LIFT}, {"times": "ns"}),
         ("a.csv", table("pan,lift", None), {"rate": 2.0}),
         ("a.csv", table(None, None), {"rate": 2.0, "joints": "pan, lift"}),
         ("a.npz", {"time_s": TIMES, "pan": PAN, "lift": LIFT}, {}),
@@ -166,3 +169,16 @@ def test_a_pointer_of_git_lfs_is_no_motion(read, name):
     with pytest.raises(ShotError, match="Git LFS pointer") as refused:
         read(name, "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1048584\n")
     assert refused.value.path.endswith(name) and "git lfs pull" in refused.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("unit", "step"), [("ns", 1e6), ("ns", 1e7), ("ns", 5e8), ("us", 1e3), ("us", 2e4), ("us", 1e5), ("ms", 50.0)]
+)
+def test_a_motion_of_days_is_refused_with_the_setting_that_reads_it(read, unit, step):
+    arrays = {"time_s": step * np.arange(3000), "pan": np.linspace(0.0, 1.0, 3000)}
+    with pytest.raises(ShotError, match="too long") as refused:
+        read("a.npz", arrays)
+    assert f"motion.read.times={unit}" in refused.value.remedy and "3000 rows" in refused.value.found
+    assert read("a.npz", arrays, times=unit).times[-1] == pytest.approx(
+        2999 * step * {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}[unit]
+    )

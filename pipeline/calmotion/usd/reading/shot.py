@@ -28,6 +28,7 @@ from calmotion.usd.reading.motors.posed_motors import joint_motions, pose_codes,
 from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stacks, performed_on, skeletal_tracks
 from calmotion.usd.reading.motors.tracks import read_track, sample_codes
 from calmotion.usd.reading.motors.unused_animation import target_positions
+from calmotion.usd.reading.plausibility.motions import motion_doubts
 from calmotion.usd.reading.provenance import notes_of_results, provenance_of
 from calmotion.usd.reading.targets import weight_tracks
 from calmotion.usd.reading.unread import misplaced_schemas, unread_attributes
@@ -126,7 +127,9 @@ def read_stage(
         tracks = motor_tracks(reading, skeleton.drives, clock, given)
         moving = moving_frames(reading, skeleton.joints, skeleton.poses, clock)
         _note_dense_samples(tracks, clock, reading)
-        return StageReading(reading, clock, skeleton, build_character(reading, skeleton), tracks, moving)
+        character = build_character(reading, skeleton)
+        notes = (*character.notes, *motion_doubts(character, tracks))
+        return StageReading(reading, clock, skeleton, dataclasses.replace(character, notes=notes), tracks, moving)
 
 
 def shot_clock(stage: Usd.Stage, given: MotorTracks | None) -> Clock:

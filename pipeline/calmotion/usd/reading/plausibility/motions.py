@@ -1,0 +1,87 @@
+"""Animations in other units: degrees or millimetres that were taken for radians or metres, milliseconds for seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calmotion.model import Character, Joint, Motor, Track
+
+_RADIANS = ((np.pi / 180.0, "degrees taken for radians"),)
+_METRES = ((1e-2, "centimetres taken for metres"), (1e-3, "millimetres taken for metres"))
+_FASTEST = 100.0  # mean speed of a joint without a limit of its speed [rad/s or m/s]: 955 turns a minute
+_OVER_LIMIT = 10.0  # mean speed of a joint, of its limit, at which the animation cannot be meant
+_SLOWEST = 0.01  # peak speed of the fastest motor of a robot that moves [rad/s or m/s]
+_SPARSE = 0.5  # time between samples of an animation [s]
+SECONDS = ((1e-3, "milliseconds", "ms"), (1e-6, "microseconds", "us"), (1e-9, "nanoseconds", "ns"))
+
+
+def motion_doubts(character: Character, tracks: Sequence[Track]) -> tuple[str, ...]:
+    """Sentences about animations that are far beyond limits, or almost stand still, and would not in other units.
+
+    Args:
+        tracks: One for each motor [rad or m].
+    """
+    led = [(m, t) for m, t in zip(character.motors, tracks, strict=True) if m.follows is None and len(t.times) > 1]
+    found: dict[tuple[float, str], list[str]] = {}
+    for motor, track in led:
+        for unit, text in _far_beyond(motor, character.joints[motor.joint], track):
+            found.setdefault(unit, []).append(text)
+    notes = []
+    for (factor, name), texts in found.items():
+        more = f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""
+        notes.append(f"{texts[0]}{more}; {factor:.4g} times that would be within: {name}? {_remedy(name)}")
+    return (*notes, *_almost_still(led))
+
+
+def _remedy(name: str) -> str:
+    return "Scale the samples by this factor" + (
+        ", or read the table with --set motion.read.angles=deg" if "degrees" in name else ""
+    )
+
+
+def _far_beyond(motor: Motor, joint: Joint, track: Track) -> list[tuple[tuple[float, str], str]]:
+    """The unit in which an animation would fit the limits that it is far beyond, and by what it is; else nothing."""
+    low, high = float(track.values.min()), float(track.values.max())
+    span = joint.upper - joint.lower
+    beyond = max(joint.lower - low, high - joint.upper)
+    # more than half a turn, and than half the range
+    far = np.isfinite(span) and beyond > (5.0 * span if motor.linear else max(0.5 * span, np.pi))
+    speed = float(np.abs(np.diff(track.values)).sum() / (track.times[-1] - track.times[0]))
+    limit = motor.max_velocity
+    fast = speed > (_OVER_LIMIT * limit if np.isfinite(limit) else _FASTEST)
+    if not far and not fast:
+        return []
+    shown, unit = (1.0, "m") if motor.linear else (180.0 / np.pi, "deg")
+    if far:
+        value, bound = (high, joint.upper) if high - joint.upper == beyond else (low, joint.lower)
+        text = (
+            f"{motor.path}: its animation goes to {value * shown:.4g} {unit}, its limit is {bound * shown:.4g} {unit}"
+        )
+    else:
+        kept = limit if np.isfinite(limit) else _FASTEST
+        text = f"{motor.path}: its animation has a mean speed of {speed * shown:.4g} {unit}/s, where at most "
+        text += f"{kept * shown:.4g} {unit}/s can be"
+    for factor, name in _METRES if motor.linear else _RADIANS:
+        fits = joint.lower <= factor * low + 1e-3 and factor * high <= joint.upper + 1e-3
+        if fits and not (fast and factor * speed > min(limit, _FASTEST)):
+            return [((factor, name), text)]
+    return []
+
+
+def _almost_still(led: Sequence[tuple[Motor, Track]]) -> list[str]:
+    speeds = [float(np.abs(np.diff(t.values) / np.diff(t.times)).max()) for _, t in led]
+    if not speeds or not 0.0 < max(speeds) < _SLOWEST:
+        return []
+    motor, track = led[int(np.argmax(speeds))]
+    step, peak = float(np.median(np.diff(track.times))), max(speeds)
+    if step < _SPARSE:
+        return []
+    factor, name, setting = next((unit for unit in SECONDS if unit[0] * step <= _SPARSE), SECONDS[-1])
+    shown, unit = (1.0, "m/s") if motor.linear else (180.0 / np.pi, "deg/s")
+    return [
+        f"{motor.path}: the fastest motor moves by {peak * shown:.3g} {unit}, and its samples are {step:.4g} s apart; "
+        f"{name} taken for seconds? Scale the times by {factor:g}, or read the table with --set "
+        f"motion.read.times={setting}"
+    ]
