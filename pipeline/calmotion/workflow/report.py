@@ -55,6 +55,9 @@ def target_errors(character: Character, simulation: Simulation, suffix: str) -> 
     ]
 
 
+_STILL = 1e-3  # of the tolerance: what moves by less stands still
+
+
 def left_out_row(row: Simplification) -> dict[str, Any]:
     """One row of `left_out`."""
     return {"what": row.what, "why": row.why, "estimated_error_m": row.estimated_error_m, "skipped": row.skipped}
@@ -90,6 +93,19 @@ def effort_rows(character: Character, result: Result) -> list[dict[str, Any]]:
             "estimated_error": None if errors is None else float(errors[k]),
         }
         for k, motor in enumerate(character.motors)
+    ]
+
+
+def still_targets(character: Character, result: Result) -> list[str]:
+    """Paths of the targets of the input that move neither as animated nor by a shake, as the origin of a link whose
+    hinge stands still; those whose rotation counts are left out."""
+    motion, least = result.before.motion, _STILL * result.tolerance_m
+    places = motion.target_positions[motion.judged]
+    moved = np.max(np.abs(places - places[:1]), axis=(0, 2), initial=0.0)
+    off = np.max(result.before.position_errors[motion.judged], axis=0, initial=0.0)
+    still = np.maximum(moved, off) < least
+    return [
+        target.path for target, at in zip(character.targets, still, strict=True) if at and not target.rotation_weight
     ]
 
 
@@ -131,6 +147,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         **_accuracy(run, result),
         "error_shares": _error_shares(character, result),
         "lost_motion": lost_motion(character, result),
+        "still_targets": still_targets(character, result),
         "efforts": effort_rows(character, result),
         "reactions": reaction_rows(character, final.motion),
         "contacts": contact_rows(character, final.motion),

@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.model import (
+    Body,
+    ElasticMaterial,
+    FlexibleSettings,
+    Frame,
+    Joint,
+    MassProperties,
+    SurfaceMesh,
+)
 from calmotion.usd.reading import read_shot
+from calmotion.usd.reading.targets import default_targets
 from calmotion.usd.transforms import rotation_from_quaternion
 from pxr import Gf, Sdf, UsdGeom
 from small_shots import FORE, HAND, LENGTH, WIDTH, Scale, make_target, write_arm
@@ -103,3 +113,48 @@ def test_zero_weights_are_refused(tmp_path, weights):
     with pytest.raises(ShotError) as caught:
         read(tmp_path, lambda stage: make_target(stage, **weights))
     assert caught.value.path == HAND and caught.value.attribute.startswith("calm:target:")
+
+
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def lever_with_rod(flexible=(), tip=0.12):
+    """Bodies and joints of a horn (0) whose rod (1) turns a lever (2), which ends at the tip above its hinge."""
+    steel = ElasticMaterial("/steel", 2e11, 0.3, 7800.0)
+    mass = MassProperties(0.1, np.zeros(3), 1e-4 * np.eye(3))
+    ends = {"/horn": (0.0, 0.0, 0.02), "/rod": (0.1, 0.0, 0.0), "/lever": (0.0, 0.0, tip)}
+    bodies = [
+        Body(
+            path,
+            Frame(np.zeros(3), UPRIGHT),
+            mass,
+            surfaces=(SurfaceMesh(path, np.array([np.zeros(3), end]), np.zeros((0, 3), dtype=np.int32)),),
+            flexible=FlexibleSettings(steel) if path in flexible else None,
+        )
+        for path, end in ends.items()
+    ]
+    pins = [(-1, 0, 0.0, 0.0), (0, 1, (0, 0, 0.02), 0.0), (-1, 2, (0.1, 0, 0), 0.0), (1, 2, (0.1, 0, 0), (0, 0, 0.02))]
+    joints = [
+        Joint(f"/pin{k}", "revolute", a, b, *(Frame(np.zeros(3) + place, UPRIGHT) for place in places))
+        for k, (a, b, *places) in enumerate(pins)
+    ]
+    return bodies, joints
+
+
+@pytest.mark.parametrize(("flexible", "tip", "expected"), [
+    ((), 0.12, "/rod"), (("/lever",), 0.12, "/lever"), (("/rod",), 0.12, "/rod"), (("/lever", "/rod"), 0.12, "/lever"),
+    (("/horn",), 0.12, "/rod"), (("/lever",), 0.03, "/rod"),
+])  # fmt: skip
+def test_the_target_of_a_linkage_is_the_flexible_link_that_reaches_beyond_it(flexible, tip, expected):
+    (target,) = default_targets(*lever_with_rod(flexible, tip), [1])
+    assert target.path == expected
+    if expected == "/lever":
+        np.testing.assert_allclose(target.frame.position, [0.0, 0.0, tip])
+
+
+def test_a_link_that_carries_a_leaf_is_no_target():
+    bodies, joints = lever_with_rod(("/lever",))
+    hand = Body("/hand", bodies[0].rest, bodies[0].mass)
+    wrist = Joint("/wrist", "revolute", 2, 3, Frame(np.array([0.0, 0.0, 0.1]), UPRIGHT), Frame(np.zeros(3), UPRIGHT))
+    found = default_targets([*bodies, hand], [*joints, wrist], [1, 3])
+    assert [target.path for target in found] == ["/rod", "/hand"]

@@ -278,6 +278,8 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
         # far from the limits, a step of the search promises more than there is
         more = f", {about(gain)} expected gain of one more iteration" if gain is not None and gain < left else ""
         say(console, f"stopped: {report['stopped']}{more}")
+    for path in report["still_targets"]:
+        say(console, f"target {path} does not move, so that it shows no shake: choose a point of a link that moves")
     print_shares(console, report["error_shares"])
     print_lost_motion(console, report["lost_motion"], suffix)
     print_limits(console, report["limits"], bool(suffix))

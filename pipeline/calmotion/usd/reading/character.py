@@ -189,9 +189,9 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         lasting = [joint for joint in skeleton.joints if joint.contact is None]
         joints_as_authored = list(dict.fromkeys(joint.whole or joint for joint in lasting))
         outer = topology.leaves([path for path in skeleton.bodies if path not in skeleton.between], joints_as_authored)
-        chosen = tuple(targets.outermost_target(bodies[numbers[b]], numbers[b], joints) for b in outer)
-        names = outer if len(outer) == 1 else [body.rsplit("/", 1)[-1] for body in outer]
-        what = "the target is the outermost point" if len(outer) == 1 else "targets are the outermost points"
+        chosen = targets.default_targets(bodies, joints, [numbers[body] for body in outer])
+        names = [target.path if len(chosen) == 1 else target.path.rsplit("/", 1)[-1] for target in chosen]
+        what = "the target is the outermost point" if len(chosen) == 1 else "targets are the outermost points"
         reading.note(f"no CalmTargetAPI: {what} of {', '.join(names)}")
     default = reading.stage.GetDefaultPrim()
     whole = default and all(b.startswith(f"{default.GetPath()}/") for b in skeleton.bodies if b not in skeleton.between)

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Body, Frame, Joint, Target, WeightTrack
+from calmotion.model.character import WORLD
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
@@ -125,7 +127,62 @@ def read_target(reading: Reading, prim: Usd.Prim, body: int, pose: Pose) -> Targ
     )
 
 
-def outermost_target(body: Body, index: int, joints: tuple[Joint, ...]) -> Target:
+def default_targets(bodies: Sequence[Body], joints: Sequence[Joint], ends: Sequence[int]) -> tuple[Target, ...]:
+    """The targets where none is authored: the outermost points of the leaf bodies. Flexible bodies in closed chains
+    that reach beyond their joints, and carry no leaf, count as leaves; rods between two joints then do not.
+
+    The leaf of a lever with a push rod is the rod, which shows nothing of how the lever bends.
+
+    Args:
+        bodies: The bodies.
+        joints: The joints of the character.
+        ends: Indices of the leaf bodies.
+    """
+    lasting = [joint for joint in joints if joint.contact is None]
+    reaching = [
+        body
+        for body in range(len(bodies))
+        if bodies[body].simulated_flexible
+        and body not in ends
+        and not _is_between(bodies[body], body, lasting)
+        and _stand_without(body, ends, lasting)
+    ]
+    if reaching:
+        ends = [end for end in ends if not _is_between(bodies[end], end, lasting)]
+    return tuple(outermost_target(bodies[body], body, lasting) for body in [*ends, *reaching])
+
+
+def _is_between(body: Body, index: int, joints: Sequence[Joint]) -> bool:
+    """Whether a body of two joints ends near them: no point of it is farther from both than they are from each
+    other."""
+    origins = _anchors(index, joints)
+    if len(origins) != 2:
+        return len(origins) > 2
+    position = outermost_target(body, index, joints).frame.position
+    return bool(min(np.linalg.norm(position - origin) for origin in origins) <= np.linalg.norm(origins[0] - origins[1]))
+
+
+def _anchors(index: int, joints: Sequence[Joint]) -> list[Array]:
+    """Where joints are attached to a body, in its frame."""
+    return [
+        joint.frame1.position if joint.body1 == index else joint.frame0.position
+        for joint in joints
+        if index in (joint.body0, joint.body1)
+    ]
+
+
+def _stand_without(body: int, ends: Sequence[int], joints: Sequence[Joint]) -> bool:
+    """Whether all leaves are connected with the world when a body is taken away."""
+    reached = {WORLD}
+    while True:
+        near = [{joint.body0, joint.body1} for joint in joints if body not in (joint.body0, joint.body1)]
+        more = {other for pair in near if pair & reached for other in pair} - reached
+        if not more:
+            return reached.issuperset(ends)
+        reached |= more
+
+
+def outermost_target(body: Body, index: int, joints: Sequence[Joint]) -> Target:
     """The target of a leaf body where none is authored: its point farthest from the joints that carry it.
 
     Args:
@@ -133,8 +190,7 @@ def outermost_target(body: Body, index: int, joints: tuple[Joint, ...]) -> Targe
         index: Its index.
         joints: The joints of the character.
     """
-    attached = [j for j in joints if index in (j.body0, j.body1)]
-    origins = [j.frame1.position if j.body1 == index else j.frame0.position for j in attached]
+    origins = _anchors(index, joints)
     center = np.mean(origins, axis=0) if origins else np.zeros(3)
     points = [s.points for s in body.surfaces if s.visible] or [s.points for s in body.surfaces]
     if body.tets is not None:
