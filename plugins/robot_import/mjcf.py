@@ -87,12 +87,6 @@ def unread(root: xml.Element) -> tuple[str, ...]:
             "joints whose ref is not 0 count from the pose of the file, where their value is 0 and not ref: "
             f"{', '.join(shifted)}; so do their limits; subtract ref from their motion"
         )
-    springs = [node.get("name", "joint") for node in root.iter("joint") if _number(node.get("stiffness")) != 0.0]
-    if springs:
-        found.append(
-            "springs of joints (stiffness, springref) are not read, so that nothing but a motor holds these joints: "
-            f"{', '.join(springs)}"
-        )
     return tuple(found)
 
 

@@ -17,6 +17,7 @@ from calmotion.usd import StageUnits, author_material, is_applied, is_rigid_body
 
 from .frames import refuse_moving_frames
 from .robot_motors import author_motors, named, shift_limits
+from .springs import author_springs
 
 if TYPE_CHECKING:
     from pxr import Sdf, Usd
@@ -239,6 +240,7 @@ class _Author:
         self.notes += author_motors(
             self._stage, self._units, options.motion, self._rate, options.efforts, options.motors
         )
+        self.notes += author_springs(self._stage, self._units)
 
     def links(self) -> None:
         """Flexible links with their materials."""

@@ -92,7 +92,7 @@ def axes_of(prim: Usd.Prim) -> list[Axis]:
 
 
 def shift_limits(stage: Usd.Stage) -> None:
-    """Count the limits of MuJoCo's joints from the pose of the file, where their value is `ref` and becomes 0."""
+    """Count limits and springs of MuJoCo joints from the pose of the file, where their value is `ref` and becomes 0."""
     radians = any(prim.GetAttribute("mjc:compiler:angle").Get() == "radian" for prim in prims_of(stage))
     for prim in joint_prims(stage):
         attribute = prim.GetAttribute("mjc:ref")
@@ -104,6 +104,9 @@ def shift_limits(stage: Usd.Stage) -> None:
             limit = prim.GetAttribute(name)
             if limit and limit.HasAuthoredValue():
                 limit.Set(float(limit.Get() - shift))
+        spring = prim.GetAttribute("mjc:springref")
+        if spring:
+            spring.Set(float((spring.Get() or 0.0) - ref))
         attribute.Set(0.0)
 
 
@@ -145,7 +148,7 @@ def author_motors(
         )  # fmt: skip
     for axis in driven:
         _author(axis, moved.get(axis.path), units, frames_per_second, efforts.get(named(axis.prim)))
-    passive = [axis for axis in _free(axes) if axis not in driven]
+    passive = [axis for axis in _free(axes) if axis not in driven and not axis.prim.GetAttribute("mjc:stiffness").Get()]
     if not passive or patterns or moved:
         return []
     names = ", ".join(axis.name for axis in passive)
@@ -184,7 +187,7 @@ def _by_default(stage: Usd.Stage, axes: Sequence[Axis], moved: Mapping[str, Moto
     """Those that actuators or drives move; all that follow no other joint and close no chain where there are none."""
     free = _free(axes)
     actuated = actuated_joints(stage)
-    driven = [axis for axis in free if _is_driven(axis) or str(axis.prim.GetPath()) in actuated]
+    driven = [axis for axis in free if is_driven(axis) or str(axis.prim.GetPath()) in actuated]
     if driven:
         return driven
     loop = _loop(stage)
@@ -202,7 +205,7 @@ def _by_default(stage: Usd.Stage, axes: Sequence[Axis], moved: Mapping[str, Moto
 
 def _free(axes: Sequence[Axis]) -> list[Axis]:
     """Those that follow no other joint and close no chain."""
-    driven = {str(axis.prim.GetPath()) for axis in axes if _is_driven(axis)}
+    driven = {str(axis.prim.GetPath()) for axis in axes if is_driven(axis)}
     geared = set()
     for prim in coupling_prims(axes[0].prim.GetStage()) if axes else ():
         first, second = (coupled(prim, name) for name in COUPLED[str(prim.GetTypeName())])
@@ -216,7 +219,7 @@ def _free(axes: Sequence[Axis]) -> list[Axis]:
     ]
 
 
-def _is_driven(axis: Axis) -> bool:
+def is_driven(axis: Axis) -> bool:
     """Whether a drive is applied, or CalmMotorAPI to a joint that has no drive."""
     applied = [name for name in axis.prim.GetAppliedSchemas() if name.startswith("PhysicsDriveAPI:")]
     if applied:

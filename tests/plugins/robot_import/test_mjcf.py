@@ -39,11 +39,6 @@ def test_tendons_and_shifted_joints_are_told(read):
     assert "hip" in told and "subtract ref" in told
 
 
-def test_springs_of_joints_are_told(read):
-    (told,) = read(robot("hip").replace("axis", 'stiffness="3" axis')).unread
-    assert "springs of joints" in told and "hip" in told
-
-
 def test_a_joint_that_follows_by_a_curve_is_refused(read):
     follower = '<equality><joint joint1="knee" joint2="hip" polycoef="{}"/></equality>'
     assert read(robot("hip", extra=follower.format("0.1 1 0 0 0"))).unread == ()

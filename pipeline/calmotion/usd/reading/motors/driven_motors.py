@@ -278,9 +278,10 @@ def _drive(
         return Drive(joint, SKELETON, skel_joint=skel_joint)
     if posed:
         return Drive(joint, BODIES)
-    if ours and not still:
-        raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint))
     constant = number_of(prim, name) if has_drive else None
+    holds = constant is not None and schemas.value(prim, _SCHEMA, "calm:motor:optimize") is False  # as a spring
+    if ours and not still and not holds:
+        raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint))
     if constant is not None:
         if not math.isfinite(constant):
             raise ShotError(
