@@ -12,7 +12,6 @@ import numpy as np
 from calmotion.errors import ShotError, raise_all
 from calmotion.model import Body, Character, Joint, MassProperties, RetargetSettings
 from calmotion.model.motor import PRESCRIBED
-from calmotion.model.tolerance import reach
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import scene, targets, topology
 from calmotion.usd.reading.actuators.motor_models import motor_model
@@ -43,15 +42,13 @@ from calmotion.usd.reading.joints import (
 from calmotion.usd.reading.motors import driven_motors as motors
 from calmotion.usd.reading.motors.posed_motors import posed_joints
 from calmotion.usd.reading.motors.undriven_joints import tell_what_swings
+from calmotion.usd.reading.plausibility.bodies import warn_of_units
 from calmotion.usd.transforms import Pose
 
 if TYPE_CHECKING:
     from pxr import Usd
 
-# Other robots are mostly robots in other units.
-LIGHTEST, HEAVIEST = 1e-3, 1e3  # [kg]
 BETWEEN = 1e-6  # mass and inertia of a part between two axes of a joint, over those of the lighter body at the joint
-SMALLEST, LARGEST = 1e-3, 1e2  # [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,40 +202,8 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         retarget=settings,
         scenery=scenery_of(reading, bodies),
     )
-    _warn_of_weight(reading, root, bodies)
-    _warn_of_size(reading, root, reach(character))
+    warn_of_units(reading, root, character, tuple(fixed))
     return replace(character, notes=grouped(reading.notes))
-
-
-def _warn_of_weight(reading: Reading, path: str, bodies: Sequence[Body]) -> None:
-    """Warn of a robot that is lighter than a gram or heavier than a tonne: its units are mostly wrong."""
-    masses = [body.mass.mass for body in bodies if body.mass is not None]
-    total = float(sum(masses))
-    if len(masses) == len(bodies) and not LIGHTEST <= total <= HEAVIEST:
-        reading.warn(
-            ShotError(
-                f"the robot weighs {total:.3g} kg",
-                path=path,
-                attribute="metersPerUnit",
-                found=f"{reading.units.meters:g} m, and kilogramsPerUnit {reading.units.kilograms:g} kg",
-                remedy="If this is not intended, correct these units of the root layer, physics:mass or "
-                "physics:density; simulations and limits depend on it",
-            )
-        )
-
-
-def _warn_of_size(reading: Reading, path: str, far: float) -> None:
-    """Warn of a robot that reaches less than a millimetre or more than a hundred metres: its unit is mostly wrong."""
-    if far > 0.0 and not SMALLEST <= far <= LARGEST:
-        reading.warn(
-            ShotError(
-                f"the robot reaches {far:.3g} m",
-                path=path,
-                attribute="metersPerUnit",
-                found=f"{reading.units.meters:g} m",
-                remedy="If this is not intended, correct the unit; gravity and stiffness depend on it",
-            )
-        )
 
 
 def _body(reading: Reading, path: str, pose: Pose, joints: list[str], fixed: bool) -> Body:

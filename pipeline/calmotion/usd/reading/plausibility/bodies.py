@@ -1,0 +1,190 @@
+"""Robots in other units than their stage says: sizes, weights, densities and inertias that no robot has."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calmotion.arrays import Array
+from calmotion.errors import ShotError
+from calmotion.model import Body, Character
+from calmotion.model.tolerance import reach
+from calmotion.usd.reading.context import Reading
+
+LIGHTEST, HEAVIEST = 1e-3, 1e3  # [kg]
+SMALLEST, LARGEST = 1e-3, 1e2  # [m]
+DENSEST = 22_600.0  # osmium [kg/m^3]
+_LIGHTEST_SOLID = 10.0  # a foam of polystyrene [kg/m^3]
+_EMPTIEST = 0.05  # mass of a robot over the boxes around its links [kg/m^3]; those of robots have 50 to 2000
+_USUAL = 1000.0  # [kg/m^3]
+_FRAME = 1e-5  # of a link that stands for a frame [kg]
+_GYRATION = 2.0  # radius of gyration, of the distance of the farthest point from the centre of mass
+_INERTIAS = {1e-3: "masses in grams", 1e-4: "kg cm^2", 1e-6: "kg mm^2", 1e-7: "g cm^2", 1e-9: "g mm^2"}
+
+
+def warn_of_units(reading: Reading, path: str, character: Character, resting: Sequence[str]) -> None:
+    """Warn of a robot that is too small, large, light, heavy, dense, or has inertias of bodies of another size.
+
+    Args:
+        path: Prim that stands for the robot.
+        character: The robot.
+        resting: Paths of bodies that are fixed to the world, whose masses nothing shows.
+    """
+    far = reach(character)
+    _warn_of_weight(reading, path, character.bodies)
+    _warn_of_size(reading, path, far)
+    _tell_assumed_unit(reading, far)
+    for body in character.bodies:
+        if body.flexible is not None and body.mass is None:
+            _warn_of_material(reading, body)
+    solid = [
+        body for body in character.bodies
+        if body.path not in resting and body.mass is not None and body.mass.mass > _FRAME and _volume(body) > 0.0
+    ]  # fmt: skip
+    _warn_of_density(reading, solid)
+    _warn_of_inertia(reading, solid)
+
+
+def _warn_of_weight(reading: Reading, path: str, bodies: Sequence[Body]) -> None:
+    """Warn of a robot that is lighter than a gram or heavier than a tonne: its units are mostly wrong."""
+    masses = [body.mass.mass for body in bodies if body.mass is not None]
+    total = float(sum(masses))
+    if len(masses) == len(bodies) and not LIGHTEST <= total <= HEAVIEST:
+        reading.warn(
+            ShotError(
+                f"the robot weighs {total:.3g} kg",
+                path=path,
+                attribute="metersPerUnit",
+                found=f"{reading.units.meters:g} m, and kilogramsPerUnit {reading.units.kilograms:g} kg",
+                remedy="If this is not intended, correct these units of the root layer, physics:mass or "
+                "physics:density; simulations and limits depend on it",
+            )
+        )
+
+
+def _warn_of_size(reading: Reading, path: str, far: float) -> None:
+    """Warn of a robot that reaches less than a millimetre or more than a hundred metres: its unit is mostly wrong."""
+    if far > 0.0 and not SMALLEST <= far <= LARGEST:
+        reading.warn(
+            ShotError(
+                f"the robot reaches {far:.3g} m",
+                path=path,
+                attribute="metersPerUnit",
+                found=f"{reading.units.meters:g} m",
+                remedy="If this is not intended, correct the unit; gravity and stiffness depend on it",
+            )
+        )
+
+
+def _tell_assumed_unit(reading: Reading, far: float) -> None:
+    from pxr import UsdGeom
+
+    if not UsdGeom.StageHasAuthoredMetersPerUnit(reading.stage):
+        meters = reading.units.meters
+        reading.note(
+            f"the root layer has no metersPerUnit, for which USD takes {meters:g} m: the robot reaches {far:.3g} m. If "
+            f"it is in metres, author metersPerUnit = 1, a factor of {1.0 / meters:g}"
+        )
+
+
+def _warn_of_material(reading: Reading, body: Body) -> None:
+    """Warn of a density that no solid has, of the material that gives a link its mass."""
+    assert body.flexible is not None
+    material = body.flexible.material
+    if _LIGHTEST_SOLID <= material.density <= DENSEST:
+        return
+    factor = 10.0 ** (-3.0 * round(np.log10(material.density / _USUAL) / 3.0))
+    reading.warn(
+        ShotError(
+            "no solid has this density", path=material.path, attribute="physics:density",
+            found=f"{material.density:.3g} kg/m^3 in the units of the stage, metersPerUnit {reading.units.meters:g} "
+            f"and kilogramsPerUnit {reading.units.kilograms:g}",
+            remedy=f"{factor:g} times that would be {factor * material.density:.4g} kg/m^3",
+        )
+    )  # fmt: skip
+
+
+def _warn_of_density(reading: Reading, bodies: Sequence[Body]) -> None:
+    """Warn of links that weigh more than a solid box around them can, and of a robot that weighs less than air."""
+    dense = sorted((body for body in bodies if _density([body]) > DENSEST), key=lambda body: -_density([body]))
+    if dense:
+        _warn_of_length(reading, dense, f"denser than any solid{_others(dense)}")
+    elif bodies and _density(bodies) < _EMPTIEST:
+        _warn_of_length(reading, bodies, f"lighter than air{_others(bodies)}")
+
+
+def _warn_of_length(reading: Reading, bodies: Sequence[Body], problem: str) -> None:
+    """Warn of links whose masses and sizes do not belong together, with the unit of lengths that would."""
+    first, units, power = bodies[0], reading.units, round(np.log10(_density(bodies) / _USUAL) / 3.0)
+    assert first.mass is not None
+    factor = 10.0 ** (power or 1)
+    grams = f", or masses times 0.001 (kilogramsPerUnit = {1e-3 * units.kilograms:g})" if factor == 10.0 else ""
+    size = " x ".join(f"{length:.3g}" for length in _extent(first))
+    reading.warn(
+        ShotError(
+            f"a link that is {problem}", path=first.path, attribute="physics:mass",
+            found=f"{first.mass.mass:.3g} kg in {size} m, {_density([first]):.3g} kg/m^3",
+            remedy=f"Lengths times {factor:g} would fit (metersPerUnit = {units.meters * factor:g}){grams}, unless the "
+            "geometry is not that of the link",
+        )
+    )  # fmt: skip
+
+
+def _warn_of_inertia(reading: Reading, bodies: Sequence[Body]) -> None:
+    """Warn of links whose radius of gyration is beyond all their points, with a unit that fits within a decade."""
+    beyond = [body for body in bodies if _gyration(body) > _GYRATION * _farthest(body)]
+    if not beyond:
+        return
+    worst = max(beyond, key=lambda body: _gyration(body) / _farthest(body))
+    edges = np.sort(_extent(worst))[1:]
+    usual = float(np.sqrt(edges @ edges / 12.0))  # radius of gyration of a box
+    power = {factor: abs(np.log10(factor * (_gyration(worst) / usual) ** 2)) for factor in _INERTIAS}
+    factor = min(power, key=power.__getitem__)
+    fits = f"Inertias times {factor:g} ({_INERTIAS[factor]}) would fit" if power[factor] < 1.0 else "Correct it"
+    reading.warn(
+        ShotError(
+            f"an inertia of a larger link{_others(beyond)}", path=worst.path, attribute="physics:diagonalInertia",
+            found=f"a radius of gyration of {_gyration(worst):.3g} m, and no point is farther than "
+            f"{_farthest(worst):.3g} m from its centre of mass",
+            remedy=f"{fits}, unless the geometry is not that of the link",
+        )
+    )  # fmt: skip
+
+
+def _others(bodies: Sequence[Body]) -> str:
+    return f", as {len(bodies) - 1} more" if len(bodies) > 1 else ""
+
+
+def _points(body: Body) -> Array:
+    """All points of a link's geometry [m], shape [n, 3], body frame."""
+    parts = [surface.points for surface in body.surfaces] + ([body.tets.points] if body.tets is not None else [])
+    return np.vstack(parts) if parts else np.zeros((0, 3))
+
+
+def _extent(body: Body) -> Array:
+    """Sizes of the box around a link [m], shape [3]; a solid in it is smaller."""
+    points = _points(body)
+    return np.ptp(points, axis=0) if len(points) else np.zeros(3)
+
+
+def _volume(body: Body) -> float:
+    """Of the box around a link whose geometry is in the shot [m^3]; 0 where it is in another file."""
+    return 0.0 if body.flexible is not None and body.flexible.mesh_file else float(np.prod(_extent(body)))
+
+
+def _density(bodies: Sequence[Body]) -> float:
+    """The least mean density of links [kg/m^3]."""
+    return sum(body.mass.mass for body in bodies if body.mass is not None) / sum(map(_volume, bodies))
+
+
+def _gyration(body: Body) -> float:
+    """The largest radius of gyration about the centre of mass [m]."""
+    assert body.mass is not None
+    return float(np.sqrt(np.linalg.eigvalsh(body.mass.inertia)[-1] / body.mass.mass))
+
+
+def _farthest(body: Body) -> float:
+    """The distance of the farthest point of a link from its centre of mass [m]."""
+    assert body.mass is not None
+    return float(np.linalg.norm(_points(body) - body.mass.center, axis=1).max())

@@ -1,0 +1,126 @@
+"""Robots whose sizes, masses and inertias do not belong together, and those that do."""
+
+import dataclasses
+
+import pytest
+from calmotion.model import Character
+from calmotion.usd.reading.context import Reading
+from calmotion.usd.reading.plausibility.bodies import warn_of_units
+from calmotion.usd.reading.shot import read_shot
+from calmotion.usd.units import StageUnits
+from pxr import Usd, UsdGeom
+from small_shots import FORE, UPPER, make_flexible, write_arm
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    return read_shot(str(write_arm(tmp_path_factory.mktemp("arm") / "arm.usda")))[0]
+
+
+def warned(character: Character, meters=1.0, resting=()):
+    """What is said of a robot whose stage has this unit."""
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageMetersPerUnit(stage, meters)
+    reading = Reading(stage, StageUnits(meters, 1.0), 0.0)
+    warn_of_units(reading, "/Arm", character, resting)
+    assert reading.notes == [warning.message() for warning in reading.warnings], "a note in every run"
+    return reading.warnings
+
+
+def scaled(character: Character, length=1.0, mass=1.0, inertia=1.0, only=()):
+    """A robot whose links have other sizes, masses and inertias."""
+    bodies = []
+    for body in character.bodies:
+        if body.mass is not None and (not only or body.path in only):
+            surfaces = tuple(dataclasses.replace(s, points=length * s.points) for s in body.surfaces)
+            properties = dataclasses.replace(
+                body.mass, mass=mass * body.mass.mass, center=length * body.mass.center,
+                inertia=inertia * mass * length**2 * body.mass.inertia,
+            )  # fmt: skip
+            body = dataclasses.replace(body, surfaces=surfaces, mass=properties)
+        bodies.append(body)
+    return dataclasses.replace(character, bodies=tuple(bodies))
+
+
+def test_a_robot_in_its_own_units_is_not_questioned(arm):
+    assert warned(arm) == []
+
+
+@pytest.mark.parametrize("mass", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize(("length", "meters"), [(0.1, 0.1), (0.01, 0.01), (0.001, 0.001)])
+def test_metres_in_a_stage_of_a_smaller_unit_are_denser_than_any_solid(arm, mass, length, meters):
+    (warning,) = warned(scaled(arm, length, mass), meters)
+    assert "denser than any solid" in warning.problem and warning.attribute == "physics:mass"
+    assert f"Lengths times {1.0 / length:g} would fit (metersPerUnit = 1)" in warning.remedy
+
+
+@pytest.mark.parametrize(("length", "factor"), [(100.0, 0.01), (1000.0, 0.001)])
+def test_centimetres_and_millimetres_in_a_stage_in_metres_are_lighter_than_air(arm, length, factor):
+    warnings = warned(scaled(arm, length))
+    (warning,) = (warning for warning in warnings if "lighter than air" in warning.problem)
+    assert f"Lengths times {factor:g} would fit (metersPerUnit = {factor:g})" in warning.remedy
+
+
+def test_grams_that_were_taken_for_kilograms_are_named_too(arm):
+    warnings = warned(scaled(arm, mass=1000.0))
+    (warning,) = (warning for warning in warnings if "denser" in warning.problem)
+    assert "masses times 0.001 (kilogramsPerUnit = 0.001)" in warning.remedy
+
+
+def test_one_link_whose_mesh_is_too_small_is_named(arm):
+    (warning,) = warned(scaled(arm, 0.01, only=(FORE,)))
+    assert warning.path == FORE and "more" not in warning.problem
+
+
+@pytest.mark.parametrize(
+    ("inertia", "factor"), [(1e4, "0.0001 (kg cm^2)"), (1e6, "1e-06 (kg mm^2)"), (1e7, "1e-07 (g cm^2)"),
+                            (1e9, "1e-09 (g mm^2)"), (1e3, "0.001 (masses in grams)")],
+)  # fmt: skip
+def test_inertias_beyond_the_link_are_told_with_their_unit(arm, inertia, factor):
+    (warning,) = warned(scaled(arm, inertia=inertia, only=(UPPER,)))
+    assert warning.path == UPPER and warning.attribute == "physics:diagonalInertia"
+    assert f"Inertias times {factor}" in warning.remedy and "radius of gyration" in warning.found
+
+
+def test_an_inertia_that_no_unit_makes_right_is_told_without_one(arm):
+    (warning,) = warned(scaled(arm, inertia=70.0, only=(UPPER,)))
+    assert "larger link" in warning.problem and warning.remedy.startswith("Correct it, unless")
+
+
+def test_what_rests_stands_for_a_frame_or_has_no_geometry_is_not_questioned(arm):
+    dense = scaled(arm, 0.01, only=(FORE,))
+    assert warned(dense, resting=(FORE,)) == []
+    assert warned(scaled(arm, mass=1e-6, only=(FORE,))) == []
+    bodies = tuple(dataclasses.replace(body, surfaces=()) for body in dense.bodies)
+    assert warned(dataclasses.replace(dense, bodies=bodies)) == []
+
+
+@pytest.mark.parametrize(
+    ("density", "factor", "right"),
+    [
+        (1.05e9, "1e-06", "1050"),
+        (7.85e12, "1e-09", "7850"),
+        (7.85, "1000", "7850"),
+        (1.05, "1000", "1050"),
+        (2.7e6, "0.001", "2700"),
+    ],
+)
+def test_a_density_of_a_material_that_no_solid_has_is_told_with_its_factor(tmp_path, density, factor, right):
+    arm = read_shot(str(write_arm(tmp_path / "arm.usda", make_flexible)))[0]
+    fore = next(body for body in arm.bodies if body.path == FORE)
+    assert fore.flexible is not None
+    material = dataclasses.replace(fore.flexible.material, density=density)
+    fore = dataclasses.replace(fore, mass=None, flexible=dataclasses.replace(fore.flexible, material=material))
+    bodies = tuple(fore if body.path == FORE else body for body in arm.bodies)
+    (warning,) = warned(dataclasses.replace(arm, bodies=bodies))
+    assert warning.attribute == "physics:density" and warning.remedy == f"{factor} times that would be {right} kg/m^3"
+
+
+def test_a_stage_without_metersperunit_is_told_what_usd_takes(tmp_path):
+    path = write_arm(tmp_path / "arm.usda")
+    text = path.read_text()
+    (tmp_path / "none.usda").write_text(text.replace("    metersPerUnit = 1\n", ""))
+    notes = read_shot(str(tmp_path / "none.usda"))[0].notes
+    assert any("USD takes 0.01 m: the robot reaches 0.0" in note and "a factor of 100" in note for note in notes)
+    assert any("denser than any solid" in note and "Lengths times 100" in note for note in notes)
+    assert not any("metersPerUnit" in note for note in read_shot(str(path))[0].notes)
