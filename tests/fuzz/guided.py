@@ -35,7 +35,7 @@ BEGIN, END = "<!-- counts of make fuzz -->", "<!-- end of the counts of make fuz
 MEMORY = "/dev/shm"  # files that are kept in memory, on Linux
 FOUND = "found-"  # what files begin with that have an input on which Atheris stopped
 LONGEST = 60  # processor time of one input [s]
-_PACKAGES = ("calmotion", "fe_mesher", "bvh_reader", "recording_readers", "motion_table")
+_PACKAGES = ("calmotion", "bvh_reader", "recording_readers", "motion_table")
 _DONE, _PULSE = re.compile(r"Done (\d+) runs"), re.compile(r"^#(\d+)", re.MULTILINE)
 
 

@@ -146,14 +146,14 @@ def meshes(data: bytes) -> None:
     import warnings
 
     from calmotion.errors import ShotError
+    from calmotion.mesh.mesh_file import read_mesh_file
 
-    reader = _plugin("fe_mesher", "mesh_file")
     suffixes = (".stl", ".obj", ".msh", ".vtk", ".vtu", ".ply", ".off", ".inp", ".bdf", ".mesh")
     path = _file(f"mesh{suffixes[data[0] % len(suffixes)] if data else '.obj'}", data[1:])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            reader.read_mesh_file(str(path), 1.0, "/Arm/link")
+            read_mesh_file(str(path), 1.0, "/Arm/link")
         except ShotError as error:
             assert error.problem
 
@@ -205,7 +205,11 @@ def motions(data: bytes) -> None:
 
     try:
         tracks = _plugin("motion_table", "tables").read_motion(
-            str(_file(f"motion{'.npz' if data[:1] == b'P' else '.csv'}", data)), angles="auto", rate=60.0, names=()
+            str(_file(f"motion{'.npz' if data[:1] == b'P' else '.csv'}", data)),
+            angles="auto",
+            seconds=1.0,
+            rate=60.0,
+            names=(),
         )
     except ShotError as error:
         assert error.problem
