@@ -5,6 +5,7 @@
 # make docs     the documentation, in build/docs
 # make fuzz     ten minutes of damage to each of shots, meshes, motions, manifests, settings and caches
 # make torture  hours of kills, full disks, damaged caches and other faults (RUNS=20 SEED=1 for a short one)
+# make golden   errors and frequencies of the samples and of robots of others, against the numbers that are kept
 # make audit    known weaknesses of the dependencies; fails where there is no data on them (needs the network)
 # make wheels   wheels with compiled kernels for each Python here, each tested in an empty folder, in dist
 # make samples  build the sample characters again (make pictures optimises and draws them)
@@ -32,11 +33,11 @@ TESTS ?= tests
 # Two processes test at a time; threads of linear algebra that wait for each other would make that several times slower.
 test: export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo wheel wheels test test-lowest test-portable docs fuzz torture audit samples pictures blender blender-test blender-pictures clean
+.PHONY: help demo wheel wheels test test-lowest test-portable docs fuzz torture audit golden samples pictures blender blender-test blender-pictures clean
 .DELETE_ON_ERROR:
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,13p'
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,14p'
 
 demo: $(INSTALLED)
 	@mkdir -p build
@@ -56,6 +57,10 @@ test: $(INSTALLED_DEV)
 	check bandit $(RUN) -m bandit -q -ll -r pipeline plugins; \
 	check pytest $(RUN) -m pytest -n 2 -q; \
 	echo "== summary"; printf "$$summary"; exit $$status
+
+# What optimize promises on the samples and on robots of others, against the numbers that are kept.
+golden: $(INSTALLED_DEV)
+	$(RUN) tests/golden/golden.py compare tests/golden/golden.json
 
 PYTHONS ?= 3.11 3.12 3.13 3.14
 # The processors of the last ten years; others compile the kernels as they do without this wheel.

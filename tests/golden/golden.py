@@ -66,7 +66,8 @@ def measured(name: str) -> dict[str, Any] | None:
         found = json.loads(
             run([sys.executable, "-m", "calmotion", "optimize", str(shot), "-o", f"{folder}/calm.usda", "--json"])
         )
-        return numbers(found) | {"wall_s": time.perf_counter() - began}
+        print(f"{name}: {time.perf_counter() - began:.1f} s", flush=True)
+        return numbers(found)
 
 
 def numbers(found: dict[str, Any]) -> dict[str, Any]:
@@ -116,12 +117,14 @@ def main() -> int:
         if new is None:
             print(f"{name}: left out, its files are not on this machine", flush=True)
             continue
-        lines = [] if arguments.what == "write" else differences(name, kept[name], new)
-        print(
-            *lines or [f"{name}: {'kept' if arguments.what == 'write' else 'agrees'}, {new['wall_s']:.1f} s"],
-            sep="\n",
-            flush=True,
-        )
+        if arguments.what == "write":
+            lines = []
+        elif name in kept:
+            lines = differences(name, kept[name], new)
+        else:
+            lines = [f"{name}: no numbers are kept of it"]
+        done = "kept" if arguments.what == "write" else "agrees"
+        print(*lines or [f"{name}: {done}"], sep="\n", flush=True)
         differ += lines
         if arguments.what == "write":
             kept[name] = new
