@@ -67,6 +67,8 @@ def test_position_actuators_of_mujoco_give_gains_in_radians_with_their_gear(tmp_
     assert (elbow.position_gain, elbow.velocity_gain) == (100.0, 7.0) and "/Act (MuJoCo)" in elbow.gains_from
     elbow = read(tmp_path, lambda stage: actuator(stage, gear=3.0))[1]
     assert (elbow.position_gain, elbow.velocity_gain) == (900.0, 63.0)
+    elbow = read(tmp_path, lambda stage: actuator(stage, bias=(0.0, -100.0, 0.0)))[1]
+    assert f"{elbow.velocity_gain:g}" == "0", "reports print no -0"
     motor = read(tmp_path, lambda stage: actuator(stage, bias=(0.0, 0.0, 0.0)))[1]
     assert motor.position_gain == 0.0, "a torque motor holds no position"
 

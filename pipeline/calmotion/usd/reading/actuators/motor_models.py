@@ -174,7 +174,7 @@ def _actuator_gains(joint: JointPrim, prim: Usd.Prim | None, units: StageUnits) 
         return None  # not one that holds positions
     to_si = _per_length(units) if joint.kind == "prismatic" else units.torque
     names = f"{POSITION_ACTUATOR[0]} and {POSITION_ACTUATOR[1]} of {prim.GetPath()} (MuJoCo)"
-    return Gains(to_si(ratio**2 * kp), to_si(ratio**2 * max(-bias[2], 0.0)), names, ON_JOINT)
+    return Gains(to_si(ratio**2 * kp), to_si(ratio**2 * max(0.0, -bias[2])), names, ON_JOINT)
 
 
 def _per_degree(units: StageUnits) -> Callable[[float], float]:
