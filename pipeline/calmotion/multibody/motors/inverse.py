@@ -12,7 +12,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model.motor import ON_JOINT, PRESCRIBED, SERVO, Motor, Rotor
 
-_MOST = 0.95  # share of its largest torque that a command asks of a motor
+_TORQUE_SHARE = 0.95  # of its largest torque, that a command asks of a motor at most
 
 
 def inverse_commands(motors: Sequence[Motor], times: Array, values: Array, efforts: Array) -> Array:
@@ -41,7 +41,7 @@ def _command(motor: Motor, times: Array, value: Array, effort: Array) -> Array:
     friction = own.viscous_friction * speed + own.friction * np.tanh(speed / own.friction_speed)
     wanted = effort + own.armature * np.gradient(speed, h) + friction
     if motor.model == SERVO:
-        wanted = np.clip(wanted, -_MOST * motor.max_torque, _MOST * motor.max_torque)
+        wanted = np.clip(wanted, -_TORQUE_SHARE * motor.max_torque, _TORQUE_SHARE * motor.max_torque)
     lag = motor.velocity_gain / motor.position_gain
     ahead = wanted / motor.position_gain
     ahead = ahead + lag * speed if motor.damping_on == ON_JOINT else _relaxed(ahead, h / max(lag, 1e-9 * h))

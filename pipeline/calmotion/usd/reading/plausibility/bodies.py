@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,6 +24,35 @@ _GYRATION = 2.0  # radius of gyration, of the distance of the farthest point fro
 _INERTIAS = {1e-3: "masses in grams", 1e-4: "kg cm^2", 1e-6: "kg mm^2", 1e-7: "g cm^2", 1e-9: "g mm^2"}
 
 
+@dataclass(frozen=True)
+class _Link:
+    """A link with a mass and geometry.
+
+    Attributes:
+        path: Prim path.
+        mass: [kg].
+        size: Of the box around it, in which a solid is smaller [m], shape [3].
+        farthest: Distance of its farthest point from its centre of mass [m].
+        gyration: Its largest radius of gyration about the centre of mass [m].
+    """
+
+    path: str
+    mass: float
+    size: Array
+    farthest: float
+    gyration: float
+
+    @property
+    def volume(self) -> float:
+        """Of the box around it [m^3]."""
+        return float(np.prod(self.size))
+
+    @property
+    def density(self) -> float:
+        """The least that its mean density can be [kg/m^3]."""
+        return self.mass / self.volume
+
+
 def warn_of_units(reading: Reading, path: str, character: Character, resting: Sequence[str]) -> None:
     """Warn of a robot that is too small, large, light, heavy, dense, or has inertias of bodies of another size.
 
@@ -38,12 +68,9 @@ def warn_of_units(reading: Reading, path: str, character: Character, resting: Se
     for body in character.bodies:
         if body.flexible is not None and body.mass is None:
             _warn_of_material(reading, body)
-    solid = [
-        body for body in character.bodies
-        if body.path not in resting and body.mass is not None and body.mass.mass > _FRAME and _volume(body) > 0.0
-    ]  # fmt: skip
-    _warn_of_density(reading, solid)
-    _warn_of_inertia(reading, solid)
+    links = [link for body in character.bodies if body.path not in resting and (link := _link(body))]
+    _warn_of_density(reading, links)
+    _warn_of_inertia(reading, links)
 
 
 def _warn_of_weight(reading: Reading, path: str, bodies: Sequence[Body]) -> None:
@@ -105,86 +132,71 @@ def _warn_of_material(reading: Reading, body: Body) -> None:
     )  # fmt: skip
 
 
-def _warn_of_density(reading: Reading, bodies: Sequence[Body]) -> None:
+def _warn_of_density(reading: Reading, links: Sequence[_Link]) -> None:
     """Warn of links that weigh more than a solid box around them can, and of a robot that weighs less than air."""
-    dense = sorted((body for body in bodies if _density([body]) > DENSEST), key=lambda body: -_density([body]))
+    dense = sorted((link for link in links if link.density > DENSEST), key=lambda link: -link.density)
     if dense:
         _warn_of_length(reading, dense, f"denser than any solid{_others(dense)}")
-    elif bodies and _density(bodies) < _EMPTIEST:
-        _warn_of_length(reading, bodies, f"lighter than air{_others(bodies)}")
+    elif links and _density(links) < _EMPTIEST:
+        _warn_of_length(reading, links, f"lighter than air{_others(links)}")
 
 
-def _warn_of_length(reading: Reading, bodies: Sequence[Body], problem: str) -> None:
+def _warn_of_length(reading: Reading, links: Sequence[_Link], problem: str) -> None:
     """Warn of links whose masses and sizes do not belong together, with the unit of lengths that would."""
-    first, units, power = bodies[0], reading.units, round(np.log10(_density(bodies) / _USUAL) / 3.0)
-    assert first.mass is not None
+    first, units, power = links[0], reading.units, round(np.log10(_density(links) / _USUAL) / 3.0)
     factor = 10.0 ** (power or 1)
     grams = f", or masses times 0.001 (kilogramsPerUnit = {1e-3 * units.kilograms:g})" if factor == 10.0 else ""
-    size = " x ".join(f"{length:.3g}" for length in _extent(first))
+    size = " x ".join(f"{length:.3g}" for length in first.size)
     reading.warn(
         ShotError(
             f"a link that is {problem}", path=first.path, attribute="physics:mass",
-            found=f"{first.mass.mass:.3g} kg in {size} m, {_density([first]):.3g} kg/m^3",
+            found=f"{first.mass:.3g} kg in {size} m, {first.density:.3g} kg/m^3",
             remedy=f"Lengths times {factor:g} would fit (metersPerUnit = {units.meters * factor:g}){grams}, unless the "
             "geometry is not that of the link",
         )
     )  # fmt: skip
 
 
-def _warn_of_inertia(reading: Reading, bodies: Sequence[Body]) -> None:
+def _warn_of_inertia(reading: Reading, links: Sequence[_Link]) -> None:
     """Warn of links whose radius of gyration is beyond all their points, with a unit that fits within a decade."""
-    beyond = [body for body in bodies if _gyration(body) > _GYRATION * _farthest(body)]
+    beyond = [link for link in links if link.gyration > _GYRATION * link.farthest]
     if not beyond:
         return
-    worst = max(beyond, key=lambda body: _gyration(body) / _farthest(body))
-    edges = np.sort(_extent(worst))[1:]
+    worst = max(beyond, key=lambda link: link.gyration / link.farthest)
+    edges = np.sort(worst.size)[1:]
     usual = float(np.sqrt(edges @ edges / 12.0))  # radius of gyration of a box
-    power = {factor: abs(np.log10(factor * (_gyration(worst) / usual) ** 2)) for factor in _INERTIAS}
+    power = {factor: abs(np.log10(factor * (worst.gyration / usual) ** 2)) for factor in _INERTIAS}
     factor = min(power, key=power.__getitem__)
     fits = f"Inertias times {factor:g} ({_INERTIAS[factor]}) would fit" if power[factor] < 1.0 else "Correct it"
     reading.warn(
         ShotError(
             f"an inertia of a larger link{_others(beyond)}", path=worst.path, attribute="physics:diagonalInertia",
-            found=f"a radius of gyration of {_gyration(worst):.3g} m, and no point is farther than "
-            f"{_farthest(worst):.3g} m from its centre of mass",
+            found=f"a radius of gyration of {worst.gyration:.3g} m, and no point is farther than "
+            f"{worst.farthest:.3g} m from its centre of mass",
             remedy=f"{fits}, unless the geometry is not that of the link",
         )
     )  # fmt: skip
 
 
-def _others(bodies: Sequence[Body]) -> str:
-    return f", as {len(bodies) - 1} more" if len(bodies) > 1 else ""
+def _others(links: Sequence[_Link]) -> str:
+    return f", as {len(links) - 1} more" if len(links) > 1 else ""
 
 
-def _points(body: Body) -> Array:
-    """All points of a link's geometry [m], shape [n, 3], body frame."""
+def _density(links: Sequence[_Link]) -> float:
+    """The least that the mean density of links can be [kg/m^3]."""
+    return sum(link.mass for link in links) / sum(link.volume for link in links)
+
+
+def _link(body: Body) -> _Link | None:
+    """A body that has mass and geometry in the shot; None where one is missing, it is flat, or stands for a frame."""
     parts = [surface.points for surface in body.surfaces] + ([body.tets.points] if body.tets is not None else [])
-    return np.vstack(parts) if parts else np.zeros((0, 3))
-
-
-def _extent(body: Body) -> Array:
-    """Sizes of the box around a link [m], shape [3]; a solid in it is smaller."""
-    points = _points(body)
-    return np.ptp(points, axis=0) if len(points) else np.zeros(3)
-
-
-def _volume(body: Body) -> float:
-    """Of the box around a link whose geometry is in the shot [m^3]; 0 where it is in another file."""
-    return 0.0 if body.flexible is not None and body.flexible.mesh_file else float(np.prod(_extent(body)))
-
-
-def _density(bodies: Sequence[Body]) -> float:
-    """The least mean density of links [kg/m^3]."""
-    return sum(body.mass.mass for body in bodies if body.mass is not None) / sum(map(_volume, bodies))
-
-
-def _gyration(body: Body) -> float:
-    """The largest radius of gyration about the centre of mass [m]."""
-    assert body.mass is not None
-    return float(np.sqrt(np.linalg.eigvalsh(body.mass.inertia)[-1] / body.mass.mass))
-
-
-def _farthest(body: Body) -> float:
-    """The distance of the farthest point of a link from its centre of mass [m]."""
-    assert body.mass is not None
-    return float(np.linalg.norm(_points(body) - body.mass.center, axis=1).max())
+    elsewhere = body.flexible is not None and body.flexible.mesh_file
+    if body.mass is None or body.mass.mass <= _FRAME or elsewhere or not parts:
+        return None
+    points = np.vstack(parts)
+    size = np.ptp(points, axis=0) if len(points) else np.zeros(3)
+    if not np.prod(size) > 0.0:
+        return None
+    farthest = float(np.linalg.norm(points - body.mass.center, axis=1).max())
+    gyration = float(np.sqrt(np.linalg.eigvalsh(body.mass.inertia)[-1] / body.mass.mass))
+    return _Link(body.path, body.mass.mass, size, farthest, gyration)
