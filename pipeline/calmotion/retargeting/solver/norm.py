@@ -90,8 +90,7 @@ class PowerMean:
 
     def value(self, residuals: Array) -> float:
         """F_p and the squares."""
-        further = residuals[:, 3 * self.factors.shape[1] :]
-        return self._of_errors(residuals) + 0.5 * float(np.sum(further**2))
+        return 0.5 * float(np.sum(self.gradient(residuals) * residuals))
 
     def gradient(self, residuals: Array) -> Array:
         """Its derivative, shape [T, R]."""
@@ -118,7 +117,7 @@ class PowerMean:
         """Of the errors, w r; the square of a mean grows as the square of the errors, not as their power."""
         pulls = np.zeros_like(residuals)
         self._errors(pulls)[:] = self.weights(residuals)[..., None] * self._errors(residuals)
-        return pulls, (self.order - 2.0) / max(2.0 * self._of_errors(residuals), 1e-300)
+        return pulls, (self.order - 2.0) / max(float(np.sum(pulls * residuals)), 1e-300)  # that sum is 2 F_p
 
     def _errors(self, residuals: Array) -> Array:
         """The residuals of errors, a view of shape [T, G, 3]."""
@@ -135,8 +134,3 @@ class PowerMean:
         largest = float(m.max(initial=0.0))
         mean = np.sum(self.shares * (m / max(largest, 1e-300)) ** self.order)
         return largest * float(mean ** (1.0 / self.order))
-
-    def _of_errors(self, residuals: Array) -> float:
-        """F_p."""
-        errors = self._errors(residuals)
-        return 0.5 * float(np.sum(self.weights(residuals)[..., None] * errors**2))
