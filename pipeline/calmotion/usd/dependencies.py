@@ -8,7 +8,6 @@ from calmotion.errors import ShotError
 from calmotion.support.files import is_special
 from calmotion.support.foreign_files import forbidden_place, refuse_lfs_pointers
 from calmotion.usd.clips import clip_assets
-from calmotion.usd.diagnostics import quiet
 
 if TYPE_CHECKING:
     from pxr import Sdf
@@ -73,18 +72,6 @@ def open_dependencies(root: Sdf.Layer) -> list[Sdf.Layer]:
             if named is not None:
                 opened.append(named)
     return opened
-
-
-def files_named_by(path: str) -> tuple[str, ...]:
-    """The files that a layer names as sublayers, references and payloads; none for one that cannot be opened."""
-    from pxr import Sdf, Tf
-
-    try:
-        with quiet():
-            layer = Sdf.Layer.FindOrOpen(path)
-            return () if layer is None else tuple(_named_by(layer))
-    except (Tf.ErrorException, ShotError):
-        return ()
 
 
 def _named_by(layer: Sdf.Layer) -> list[str]:

@@ -12,7 +12,8 @@ from calmotion.host import open_host
 from calmotion.model import Character
 from calmotion.model.outputs import Rig
 from calmotion.model.run import OutputPaths, Source
-from calmotion.usd import dependencies
+from calmotion.usd.dependencies import open_dependencies
+from calmotion.usd.diagnostics import quiet
 
 LOADS, RIGGED, REFUSED = "loads", "loads as a robot", "refused"
 
@@ -32,9 +33,20 @@ def shots_in(folder: Path) -> list[Path]:
     files = sorted(path for path in folder.rglob("*") if path.suffix in (".usd", ".usda", ".usdc", ".usdz"))
     parts: set[Path] = set()
     for path in files:
-        named = (Path(name).resolve() for name in dependencies.files_named_by(str(path)))
-        parts |= {file for file in named if file.is_relative_to(path.resolve().parent)}
+        parts |= {file for file in files_named_by(path) if file.is_relative_to(path.resolve().parent)}
     return [path for path in files if path.resolve() not in parts]
+
+
+def files_named_by(path: Path) -> list[Path]:
+    """The files of the layers that a layer names, directly or not; none for one that cannot be opened."""
+    from pxr import Sdf, Tf
+
+    try:
+        with quiet():
+            layer = Sdf.Layer.FindOrOpen(str(path))
+            return [] if layer is None else [Path(named.realPath).resolve() for named in open_dependencies(layer)[1:]]
+    except (Tf.ErrorException, ShotError):
+        return []
 
 
 def tried(folder: Path) -> Iterator[Tried]:
