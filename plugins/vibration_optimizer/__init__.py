@@ -256,8 +256,7 @@ class OptimizeShot(Operator):
             context.report(
                 "warning", "interrupted: these are the best curves so far; the same command resumes from them"
             )
-        before, after = result.objective_before, result.objective_after
-        if after is None or not after <= before:
+        if not result.improved:
             reason = f"the search ended: {result.stopped}"
             if any(map(is_exceeded, result.limits)):
                 reason = "limits of motors are still exceeded. Slow the animation down there, or raise the limits"

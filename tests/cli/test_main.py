@@ -158,6 +158,31 @@ def test_with_strict_a_tolerance_that_is_not_kept_is_a_failure_with_all_outputs(
     assert run(command[0], "shot.usda", *command[1:], "--json", solve=solve)[0] == 0
 
 
+@pytest.mark.parametrize(
+    ("largest_m", "objective", "improved"),
+    [
+        (2e-3, 1e-5, True),
+        (0.0301, 9e-3, False),
+        (0.030005, 9e-3, True),
+        (2e-3, 2e-2, False),
+        (2e-3, float("nan"), False),
+    ],
+)
+def test_with_strict_curves_that_leave_a_larger_error_are_a_failure(run, largest_m, objective, improved):
+    def solve(context):
+        made = synthetic.result()
+        errors = (made.before.position_errors / made.before.position_errors.max() * size for size in (0.03, largest_m))
+        before, after = (replace(made.before, position_errors=values) for values in errors)
+        entry = BudgetEntry(MESH, 1e-3, 1e-4, "", "")
+        changes = {"tolerance_m": 1e-3, "budget": (entry,), "objective_after": objective}
+        return (replace(made, before=before, after=after, **changes),)
+
+    words = ("optimize", "shot.usda", "-o", "calm.usda", "--json")
+    status, out, _ = run(*words, "--strict", solve=solve)
+    assert status == (0 if improved else 1) and json.loads(out)["improved"] is improved
+    assert run(*words, solve=solve)[0] == 0
+
+
 def test_errors_of_the_pre_roll_are_not_judged(run):
     def solve(context):
         result = synthetic.result(False)

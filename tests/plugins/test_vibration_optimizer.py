@@ -6,8 +6,8 @@ import synthetic
 from calmotion import ShotError
 from calmotion.host import NotAsked
 from calmotion.model import Character, Result
+from calmotion.model.motor import LimitUse
 from calmotion.model.outputs import ShapedTracks, SystemModes, Verification
-from calmotion.model.result import LimitUse
 from calmotion.model.run import OutputPaths, RunSettings, Source
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.testing import host_with, run_operator, small_shot

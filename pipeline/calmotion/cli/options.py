@@ -114,8 +114,8 @@ def run_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--strict",
         action="store_true",
-        help="exit with status 1 if the simulation does not keep the tolerance, or a foot would be pulled, tip or "
-        "slip; the outputs are written all the same",
+        help="exit with status 1 if the simulation does not keep the tolerance, curves leave a larger error than the "
+        "animation, or a foot would be pulled, tip or slip; the outputs are written all the same",
     )
 
 

@@ -92,7 +92,8 @@ def status_of(result: SimulationResult, report: dict[str, Any], args: argparse.N
     if result.interrupted:
         return INTERRUPTED
     unlike = any(row["unlike_ground"] for row in report["contacts"])
-    return FAILED if result.problems or (args.strict and (unlike or not report["tolerance_kept"])) else 0
+    missed = unlike or not report["tolerance_kept"] or report.get("improved") is False
+    return FAILED if result.problems or (args.strict and missed) else 0
 
 
 def _paths(args: argparse.Namespace) -> OutputPaths:

@@ -44,7 +44,10 @@ from calmotion.model.motor import DRIVE as DRIVE
 from calmotion.model.motor import PRESCRIBED as PRESCRIBED
 from calmotion.model.motor import SERVO as SERVO
 from calmotion.model.motor import Follows as Follows
+from calmotion.model.motor import LimitUse as LimitUse
 from calmotion.model.motor import Motor as Motor
+from calmotion.model.motor import is_exceeded as is_exceeded
+from calmotion.model.motor import is_reached as is_reached
 from calmotion.model.motor import measure_of as measure_of
 from calmotion.model.outputs import CsvFile as CsvFile
 from calmotion.model.outputs import Figures as Figures
@@ -61,7 +64,6 @@ from calmotion.model.outputs import Verification as Verification
 from calmotion.model.outputs import Video as Video
 from calmotion.model.outputs import WrittenLayer as WrittenLayer
 from calmotion.model.result import Accuracy as Accuracy
-from calmotion.model.result import LimitUse as LimitUse
 from calmotion.model.result import ModeTable as ModeTable
 from calmotion.model.result import Motion as Motion
 from calmotion.model.result import MotorCurve as MotorCurve
@@ -71,8 +73,6 @@ from calmotion.model.result import Simplification as Simplification
 from calmotion.model.result import Simulation as Simulation
 from calmotion.model.result import Skin as Skin
 from calmotion.model.result import WindowRow as WindowRow
-from calmotion.model.result import is_exceeded as is_exceeded
-from calmotion.model.result import is_reached as is_reached
 from calmotion.model.robust.robots import Robustness as Robustness
 from calmotion.model.robust.settings import RobustSettings as RobustSettings
 from calmotion.model.run import LONG_SHOT as LONG_SHOT

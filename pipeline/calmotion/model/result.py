@@ -8,6 +8,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model.budget import BudgetEntry
+from calmotion.model.motor import LimitUse
 from calmotion.model.robust.robots import Robustness
 
 
@@ -132,42 +133,7 @@ class Simplification:
     skipped: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class LimitUse:
-    """How far a motor goes within one of its limits, and what the limit costs.
-
-    Attributes:
-        motor: Motor index.
-        quantity: `position`, `velocity`, `acceleration` or `effort`.
-        limit: [rad], [rad/s], [rad/s^2] or [N m]; [m], ... of a length motor.
-        before, after: The value of the input and of the result that comes closest to the limit or exceeds it most.
-        time_s: When, in the result [s].
-        excess: (after - limit) over the size of the limit: positive where it is exceeded.
-        cost_m: By how much the root-mean-square error would fall without the limit; None where it does not bind.
-    """
-
-    motor: int
-    quantity: str
-    limit: float
-    before: float
-    after: float
-    time_s: float
-    excess: float
-    cost_m: float | None = None
-
-
-_REACHED = 1e-3  # of the size of a limit: what is nearer touches it
-_ROUNDING = 1e-6  # of the size of a limit
-
-
-def is_reached(limit: LimitUse) -> bool:
-    """Whether a motor goes up to a limit, or the limit costs something; not whether it merely has one."""
-    return limit.cost_m is not None or limit.excess > -_REACHED
-
-
-def is_exceeded(limit: LimitUse) -> bool:
-    """Whether a motor goes beyond a limit, by more than rounding."""
-    return limit.excess > _ROUNDING
+_NOTICED_RISE = 0.01  # of the tolerance
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,3 +307,22 @@ class Result:
     robustness: Robustness | None = None
     windows: tuple[WindowRow, ...] = ()
     processor_s: float | None = None
+
+    @property
+    def improved(self) -> bool | None:
+        """Whether the curves found leave no larger error than the animation, None where there are none.
+
+        Robust curves are judged on the random robots, others on the robot of the model. A rise of the largest error of
+        all targets by less than a hundredth of the tolerance does not count, since the simulation is no better.
+        """
+        if self.after is None:
+            return None
+        if self.robustness is not None:
+            over = np.max if self.robustness.kind == "worst" else np.mean
+            before, after = (float(over(self.robustness.drawn[name])) for name in ("before", "robust"))
+            return after <= before
+        before, after = (
+            float(np.max(run.position_errors[run.motion.judged], initial=0.0)) for run in (self.before, self.after)
+        )
+        falls = self.objective_after is not None and self.objective_after <= self.objective_before
+        return falls and after <= before + _NOTICED_RISE * self.tolerance_m

@@ -13,9 +13,8 @@ from calmotion.host import OperatorResult, Run
 from calmotion.model import Character, LimitUse, Result, Simplification, Simulation
 from calmotion.model.budget import Verdict, verdict_on
 from calmotion.model.character import motors_give
-from calmotion.model.motor import measure_of
+from calmotion.model.motor import is_exceeded, measure_of
 from calmotion.model.outputs import CsvFile, Figures, Recording, Rig, Verification, Video, WrittenLayer
-from calmotion.model.result import is_exceeded
 from calmotion.model.run import Source
 from calmotion.support.memory import peak_memory
 from calmotion.version import __version__
@@ -258,6 +257,7 @@ def _optimized(character: Character, result: Result) -> dict[str, Any]:
         **robustness_report(result),
         **_overall(before, "_before"),
         **_overall(after, "_after"),
+        "improved": result.improved,
         "objective_before": result.objective_before,
         "objective_after": result.objective_after,
         "forward_simulations": result.forward_simulations,

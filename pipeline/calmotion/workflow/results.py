@@ -312,6 +312,11 @@ class OptimizationResult(SimulationResult):
         return self._motion_of(self.result.before)
 
     @property
+    def improved(self) -> bool:
+        """Whether the curves leave no larger error than the animation."""
+        return bool(self.result.improved)
+
+    @property
     def stopped(self) -> str:
         """Why the optimiser stopped: `converged`, `interrupted`, ..."""
         return self.result.stopped

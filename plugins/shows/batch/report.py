@@ -67,6 +67,7 @@ class JobResult:
             "host": self.host,
             "worker": self.worker,
             "tolerance_kept": report.get("tolerance_kept"),
+            "improved": report.get("improved"),
             **{key: value for key, value in errors.items() if value is not None},
             "problem": self.problem,
         }
@@ -146,6 +147,7 @@ class BatchResult:
     def _row(job: dict[str, Any]) -> list[str]:
         before, after = job.get("max_error_before_m", job.get("max_error_m")), job.get("max_error_after_m")
         errors = [f"{1e3 * error:.2f} mm" for error in (before, after) if error is not None]
+        errors[-1:] = [f"{error} (worse)" if job["improved"] is False else error for error in errors[-1:]]
         kept = {True: "kept", False: "missed", None: ""}[job["tolerance_kept"]]
         return [
             job["name"], job["outcome"], str(job["attempts"]), f"{job['wall_s']:.1f} s", " to ".join(errors), kept,

@@ -38,7 +38,11 @@ def forwarded_options(command: argparse.ArgumentParser) -> None:
     for name, text in EXTRAS.items():
         group.add_argument(f"--{name}", action="store_true", help=text)
     group.add_argument("--verify", action="store_true", help="measure the error of each result by a finer simulation")
-    group.add_argument("--strict", action="store_true", help="a shot whose simulation misses its tolerance has failed")
+    group.add_argument(
+        "--strict",
+        action="store_true",
+        help="a shot has failed whose simulation misses its tolerance, or whose curves leave a larger error",
+    )
     group.add_argument("--robust", nargs="?", const="worst", choices=("worst", "mean"), help="robust curves")
     group.add_argument("--scenarios", metavar="N", help="robots of --robust")
     group.add_argument("--window", metavar="TIME", help="length of the windows of long shots")

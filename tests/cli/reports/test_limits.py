@@ -14,7 +14,7 @@ def row(path, limit, before, after, quantity="effort", cost=None, time=0.5):
 
 def told(limits, before=1.0, after=2.0, interrupted=False):
     stream = io.StringIO()
-    report = {"limits": limits, "objective_before": before, "objective_after": after, "interrupted": interrupted}
+    report = {"limits": limits, "improved": after <= before, "interrupted": interrupted}
     print_reason(console_on(stream), report)
     return " ".join(stream.getvalue().split())
 

@@ -19,7 +19,7 @@ def report(**values):
     budget = [{"source": "mesh", "allowed_m": 4e-4, "estimated_m": None}]
     budget = [{"source": "time step", "allowed_m": 5e-4, "estimated_m": 3e-4}, *budget]
     known = {"error_budget": budget, "tolerance_m": 1e-3, "tolerance_kept": True, "tolerance_missed_by": None}
-    known |= {"shot": "shot.usda", "limits": [], "objective_before": 2.0, "interrupted": False}
+    known |= {"shot": "shot.usda", "limits": [], "objective_before": 2.0, "improved": True, "interrupted": False}
     return known | {"simulation_error_m": 3e-4, "verified_error_m": None, "targets": []} | values
 
 

@@ -45,7 +45,7 @@ def test_a_good_result_may_be_published_also_from_another_folder(result):
         ({"tolerance_kept": False}, "does not keep the tolerance"),
         ({"tolerance_kept": None}, "does not keep the tolerance"),
         ({"interrupted": True}, "interrupted"),
-        ({"objective_before": 1.0, "objective_after": 2.0}, "worse than the animated"),
+        ({"improved": False}, "worse than the animated"),
         ({"exceeded_limits": [{"path": "/Robot/Hinge", "quantity": "velocity"}]}, "limits of motors are exceeded"),
     ],
 )

@@ -35,7 +35,7 @@ def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: 
 
 def print_reason(console: Console, report: dict[str, Any]) -> None:
     """Why the curves of `optimize` exceed limits or are worse than the animation, and what to do; else nothing."""
-    limits, worse = report["limits"], not report["objective_after"] <= report["objective_before"]
+    limits, worse = report["limits"], not report["improved"]
     exceeded = sorted((row for row in limits if row["exceeded"]), key=_excess, reverse=True)
     if exceeded:
         row = exceeded[0]

@@ -49,9 +49,8 @@ def _of_verdict(verdict: dict[str, Any], manifest: dict[str, Any], path: str) ->
         )  # fmt: skip
     if verdict.get("interrupted"):
         refuse("the search was interrupted", "interrupted", "Run the same command again: it resumes")
-    before, after = verdict.get("objective_before"), verdict.get("objective_after")
-    if before is not None and after is not None and not after <= before:
-        refuse("the curves are worse than the animated ones", "objective_after", "Look at the limits of the motors")
+    if verdict.get("improved") is False:
+        refuse("the curves are worse than the animated ones", "improved", "Look at the limits of the motors")
     if verdict.get("exceeded_limits"):
         refuse("limits of motors are exceeded", "exceeded_limits", "Slow the motion down, or correct the limits")
     return problems

@@ -204,7 +204,10 @@ def _versions() -> dict[str, str]:
 
 def _verdict(result: SimulationResult) -> dict[str, Any]:
     report = result.report()
-    keys = ("tolerance_m", "tolerance_kept", "objective_before", "objective_after", "stopped", "interrupted", "targets")
+    keys = (
+        "tolerance_m", "tolerance_kept", "improved", "objective_before", "objective_after", "stopped", "interrupted",
+        "targets",
+    )  # fmt: skip
     limits = [row for row in report["limits"] if row["exceeded"]]
     return {
         **{key: report[key] for key in keys if key in report},

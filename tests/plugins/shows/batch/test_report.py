@@ -10,10 +10,10 @@ def results():
         {"max_error_before_m": 0.06, "max_error_after_m": 0.001},
         {"max_error_before_m": 0.01, "max_error_after_m": 0.004},
     ]
-    report = {"targets": targets, "tolerance_kept": True, "root_layer": "r.usda"}
+    report = {"targets": targets, "tolerance_kept": True, "improved": True, "root_layer": "r.usda"}
     problem = {"problem": "no bodies", "path": "/Robot", "attribute": "a", "found": "none", "remedy": "Add one"}
     return [
-        JobResult(jobs[0], DONE, 1, 10.0, report=report), JobResult(jobs[1], KEPT, report=report),
+        JobResult(jobs[0], DONE, 1, 10.0, report=report), JobResult(jobs[1], KEPT, report=report | {"improved": False}),
         JobResult(jobs[2], FAILED, 1, 2.0, problem), JobResult(jobs[3], DIED, 3, 2.0, {"problem": "signal 9"}),
     ]  # fmt: skip
 
@@ -30,6 +30,13 @@ def test_the_object_has_the_keys_of_the_contract_and_the_largest_errors():
 def test_the_page_names_each_problem_with_place_value_and_remedy():
     page = BatchResult("out", "optimize", "local", results(), 9.0, interrupted=True).page()
     assert "| a | done | 1 | 10.0 s | 60.00 mm to 4.00 mm | kept |" in page
-    for text in ("/Robot.a: no bodies.", "Found: none.", "Add one", "signal 9", "the same command goes on"):
+    for text in (
+        "4.00 mm (worse) | kept |",
+        "/Robot.a: no bodies.",
+        "Found: none.",
+        "Add one",
+        "signal 9",
+        "the same command goes on",
+    ):
         assert text in page
     assert not BatchResult("out", "optimize", "local", results(), 9.0).successful
