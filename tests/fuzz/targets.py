@@ -47,8 +47,12 @@ def _file(name: str, data: bytes) -> Path:
     return path
 
 
+SHOTS = ("drives", "flexible", "posed", "skeletal")
+
+
 @cache
-def _shot(kind: str) -> str:
+def shot_text(kind: str) -> str:
+    """A valid shot as text, one of `SHOTS`."""
     import posed_shots
     import small_shots
 
@@ -60,7 +64,8 @@ def _shot(kind: str) -> str:
     return small_shots.write_arm(FOLDER / f"{kind}-base.usda", edits[kind]).read_text()
 
 
-def _read(path: Path) -> None:
+def is_read(path: Path) -> bool:
+    """Whether a shot is read, then in numbers that make sense; False where it is refused."""
     import numpy as np
     from calmotion.errors import ShotError
     from calmotion.usd.reading import read_shot
@@ -69,21 +74,26 @@ def _read(path: Path) -> None:
         character, animation, _ = read_shot(str(path))
     except ShotError as error:
         assert error.problem
-        return
-    values = [t.values for t in (*animation.tracks, *animation.current)] + [character.gravity, animation.frame_times]
-    assert all(np.all(np.isfinite(value)) for value in values)
-    assert all(np.all(np.diff(track.times) > 0.0) for track in animation.tracks)
+        return False
+    except Exception as error:
+        raise AssertionError(f"{error!r}\n{path.read_bytes()[:2000]!r}") from error
+    numbers = [animation.frame_times, character.gravity, *(t.values for t in (*animation.tracks, *animation.current))]
+    numbers += [t.times for t in animation.tracks] + [j.frame0.position for j in character.joints]
+    numbers += [b.mass.inertia for b in character.bodies if b.mass] + [b.rest.position for b in character.bodies]
+    assert all(np.all(np.isfinite(values)) for values in numbers)
     assert all(body.mass is None or body.mass.mass > 0.0 for body in character.bodies)
+    assert len(character.motors) == len(animation.tracks) and len(animation.frame_times) >= 1
+    assert all(np.all(np.diff(track.times) > 0.0) for track in animation.tracks)
+    return True
 
 
-def shot(data: bytes) -> None:
-    """A shot with edits of its prims, attributes and relationships."""
+def edited_shot(kind: str, rng: random.Random) -> Path:
+    """A shot with random edits of its prims, attributes and relationships; its file, which the next one replaces."""
     import mutations
     from pxr import Sdf
 
-    rng = Bytes(data)
     layer = Sdf.Layer.CreateAnonymous(".usda")
-    layer.ImportFromString(_shot(rng.choice(("drives", "flexible", "posed", "skeletal"))))
+    layer.ImportFromString(shot_text(kind))
     for _ in range(1 + rng.randrange(6)):
         try:
             rng.choice(mutations.MUTATIONS)(layer, rng)
@@ -91,18 +101,41 @@ def shot(data: bytes) -> None:
             continue
     path = FOLDER / "shot.usda"
     layer.Export(str(path))
-    _read(path)
+    return path
+
+
+def mutated(data: bytes, rng: random.Random) -> bytes:
+    """Bytes with some changed, lost, doubled or new."""
+    values = bytearray(data)
+    for _ in range(rng.choice((1, 2, 5, 20))):
+        at, size = rng.randrange(len(values) + 1), rng.choice((1, 1, 4, 16))
+        what = rng.randrange(4)
+        if what == 0:
+            del values[at : at + size]
+        elif what == 1:
+            values[at:at] = values[at : at + size]
+        elif what == 2:
+            values[at : at + size] = rng.randbytes(size)
+        else:
+            values[at:at] = rng.choice((b"\0", b"-1", b"nan", b"1e999", b"9" * 20, b"\xff", b"\n", b"{", b'"'))
+    return bytes(values)
+
+
+def shot(data: bytes) -> None:
+    """A shot that the bytes edit."""
+    rng = Bytes(data)
+    is_read(edited_shot(rng.choice(SHOTS), rng))
 
 
 def splines(data: bytes) -> None:
     """A motor with a spline of any knots, loops and extrapolation."""
     import mutations
     import small_shots
-    from pxr import Gf, Sdf, Ts, Usd
+    from pxr import Sdf, Ts, Usd
 
     rng = Bytes(data)
     layer = Sdf.Layer.CreateAnonymous(".usda")
-    layer.ImportFromString(_shot("drives"))
+    layer.ImportFromString(shot_text("drives"))
     spline = Ts.Spline("float")
     try:
         for _ in range(rng.randrange(12)):
@@ -125,9 +158,8 @@ def splines(data: bytes) -> None:
         stage.GetPrimAtPath(small_shots.ELBOW).GetAttribute(small_shots.TARGET_POSITION).SetSpline(spline)
     except Exception:  # USD refuses some by itself
         return
-    assert Gf is not None
     layer.Export(str(FOLDER / "spline.usda"))
-    _read(FOLDER / "spline.usda")
+    is_read(FOLDER / "spline.usda")
 
 
 def _plugin(name: str, module: str) -> ModuleType:
@@ -324,6 +356,10 @@ def _bag() -> bytes:
 
 
 _TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+_MANIFEST = (
+    'id = "anvil"\nversion = "0.1.0"\nname = "Anvil"\ntagline = "Hits"\nmaintainer = "Smith"\nlicense = "MIT"\n'
+    'tags = ["iron"]\ncalmotion = ">=0.1"\nrequires = ["numpy>=2", "scipy ; python_version < \'3\'"]\n'
+)
 SEEDS: dict[str, tuple[bytes, ...]] = {
     "shot": (b"\0" * 40, bytes(range(80))),
     "splines": (bytes(range(1, 120)), b"\5" * 90),
@@ -351,10 +387,7 @@ SEEDS: dict[str, tuple[bytes, ...]] = {
         b"time_s,/Arm/joints/elbow\n0,1\n0.1,2\n0.2,3\n",
         b"/Arm/joints/elbow;/Arm/joints/shoulder\n1;2\n3;4\n",
     ),
-    "manifests": (
-        b'id = "anvil"\nversion = "0.1.0"\nname = "Anvil"\ntagline = "Hits"\nmaintainer = "Smith"\nlicense = "MIT"\n'
-        b'tags = ["iron"]\ncalmotion = ">=0.1"\nrequires = ["numpy>=2"]\n',
-    ),
+    "manifests": (_MANIFEST.encode(), _MANIFEST.encode("utf-16")),
     "settings": (b'[fe.mesh]\nelement_size = "5mm"\n', b"a.b=5mm", b"5mm"),
     "caches": (b"PK\5\6" + bytes(18),),
     "checkpoints": (bytes(range(100)), b"\1" * 60),

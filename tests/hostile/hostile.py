@@ -140,7 +140,7 @@ def run(case: Case, folder: Path) -> tuple[Ending, list[str]]:
     with _inside(folder) as (out, err):
         status = main(words)
     ending = Ending(status, out.getvalue(), err.getvalue(), time.process_time() - begin)
-    return ending, faults_of(case, ending, before, state(folder))
+    return ending, faults_of(case, ending, before, state(folder)) + faults_of_time(case, ending)
 
 
 def faults_of(case: Case, ending: Ending, before: dict[str, str], after: dict[str, str]) -> list[str]:

@@ -56,8 +56,15 @@ def test_repairable_shots_are_processed_and_the_repair_is_reported(capfd, tmp_pa
     assert set(after) - set(before) == {"moved.usda", "moved_root.usda"}
 
 
-def test_there_are_many():
-    assert len(CASES) >= 40
+def test_a_file_that_is_not_there_is_refused(capfd, tmp_path):
+    refused(capfd, tmp_path / "nothing.usda", "nothing.usda")
+
+
+def test_the_message_on_the_terminal_says_the_same(calmotion, tmp_path):
+    shot = CASES["a negative mass"].make(tmp_path)
+    done = calmotion("optimize", shot, "-o", tmp_path / "calm.usda")
+    assert done.returncode == 1
+    assert all(text in done.stderr for text in ("/Arm/fore", "physics:mass", "-1"))
 
 
 @pytest.mark.long

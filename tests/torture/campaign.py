@@ -3,9 +3,6 @@
 Every run of the program on a tiny shot is disturbed: killed, short of disk, with damaged caches, among others
 or with a clock that jumps. It must end with the same result as an undisturbed run, with a clear refusal, or with exit
 status 130, and the next run must end with the result and leave no file that nothing uses.
-
-With --write, each piece of the campaign is kept in tests/torture/counts.json as soon as it has ended, and what is there
-counts as done: a campaign that was stopped goes on, and the page tells all of it.
 """
 
 from __future__ import annotations
@@ -17,24 +14,21 @@ import shutil
 import signal
 import sys
 import tempfile
-import time
 from collections import Counter
 from pathlib import Path
 
 import kills
 import machine
-import report
 import runs
 import storage
 import verdicts
-from record import PATH, Record
-from workspace import REPOSITORY, Workspace
+from workspace import Workspace
 
 # Kinds of fault, and their share of the runs.
 KINDS = {
     "kills": 1.0, "full disks": 0.15, "folders": 0.1, "damaged files": 0.3, "together": 0.01, "clocks": 0.05,
 }  # fmt: skip
-PIECE = 20  # runs after which the counts are kept
+PIECE = 20  # runs of one kind in a row, so that a campaign that is stopped has something of each
 _CAMPAIGNS = {
     "full disks": storage.full_disks, "folders": storage.folders, "damaged files": storage.damaged_files,
     "together": machine.together, "clocks": machine.clocks,
@@ -49,56 +43,44 @@ def main() -> int:
     parser.add_argument("--only", choices=tuple(KINDS), action="append", help="kinds of fault (default: all)")
     parser.add_argument("--before", default="", help="kill only before writes of this kind, such as kernels")
     parser.add_argument("--folder", type=Path, help="where to run (default: a temporary folder)")
-    parser.add_argument("--write", action="store_true", help="keep the counts, and write them into docs/reliability.md")
-    parser.add_argument("--anew", action="store_true", help="with --write: forget the counts of earlier campaigns")
     options = parser.parse_args()
-    record = Record.read(PATH if options.write and not options.anew else None)
-    record.path = PATH if options.write else None
     # no TemporaryDirectory: the exit of a forked run would remove it
     folder = options.folder or Path(tempfile.mkdtemp(prefix="torture-"))
-    found = 0
     try:
-        found = disturbed(Workspace(folder.resolve()), options, record)
+        tallies, where = disturbed(Workspace(folder.resolve()), options)
     finally:
         if options.folder is None:
             shutil.rmtree(folder, ignore_errors=True)
-    print(report.text(*record.sums(), record.about()))
-    return int(found > 0)
+    print(*(f"{name.replace(chr(9), ', ')}: {count}" for name, count in sorted(where.items())), sep="\n")
+    for kind, tally in tallies.items():
+        print(f"{kind}: {tally.runs} runs, {tally.counts}, {len(tally.faults)} faults", *tally.faults, sep="\n- ")
+    return int(any(tally.faults for tally in tallies.values()))
 
 
-def disturbed(space: Workspace, options: argparse.Namespace, record: Record) -> int:
-    """Run what is missing of the campaign, and add its counts to a record; the number of faults that it found."""
+def disturbed(space: Workspace, options: argparse.Namespace) -> tuple[dict[str, verdicts.Tally], Counter[str]]:
+    """Run a campaign; counts by the kind of fault, and the kills by where they were."""
     wanted = {kind: max(1, round(KINDS[kind] * options.runs)) for kind in options.only or KINDS}
+    tallies, where = {kind: verdicts.Tally() for kind in wanted}, Counter[str]()
     os.environ.update(space.environment())  # before the program is loaded, which reads them
     runs.load_program()
     space.prepare(keep_caches=options.folder is not None)
     seconds = undisturbed(space)
     print(f"an undisturbed run takes {seconds:.1f} s of processor time", flush=True)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the campaign with the counts so far
-    found, stopped = 0, False
-    while not stopped:
-        # the kind that is furthest behind, so that a campaign that is stopped has something of each
-        kind = min(wanted, key=lambda kind: record.runs(kind) / wanted[kind])
-        first = record.runs(kind)
-        count = min(max(1, round(PIECE * KINDS[kind])), wanted[kind] - first)
-        if count <= 0:
-            break
-        begin, tally, where = time.monotonic(), verdicts.Tally(), Counter[str]()
-        rng = random.Random(f"{options.seed} {kind} {first}")
-        try:
+    try:
+        while any(tallies[kind].runs < wanted[kind] for kind in wanted):
+            kind = min(wanted, key=lambda kind: tallies[kind].runs / wanted[kind])  # that is furthest behind
+            tally, before = tallies[kind], tallies[kind].runs
+            count = min(max(1, round(PIECE * KINDS[kind])), wanted[kind] - before)
+            rng = random.Random(f"{options.seed} {kind} {before}")
             if kind == "kills":
-                kills.campaign(space, rng, count, tally, seconds, where, first, options.before)
+                kills.campaign(space, rng, count, tally, seconds, where, options.before)
             else:
                 _CAMPAIGNS[kind](space, rng, count, tally)
-        except KeyboardInterrupt:
-            stopped = True
-        record.add(kind, tally, where)
-        if options.write:
-            report.insert(REPOSITORY / "docs" / "reliability.md", report.text(*record.sums(), record.about()))
-        found += len(tally.faults)
-        done = f"{kind}: {record.runs(kind)} of {wanted[kind]}"
-        print(f"{done}, {tally.counts}, {len(tally.faults)} faults, {time.monotonic() - begin:.0f} s", flush=True)
-    return found
+            print(f"{kind}: {tally.runs} of {wanted[kind]}, {len(tally.faults)} faults", flush=True)
+    except KeyboardInterrupt:
+        pass
+    return tallies, where
 
 
 def undisturbed(space: Workspace) -> float:

@@ -89,23 +89,23 @@ def draw_signal(rng: random.Random) -> int:
 
 def campaign(
     space: Workspace, rng: random.Random, kills: int, tally: verdicts.Tally, seconds: float, where: Counter[str],
-    first: int = 0, before: str = "",
+    before: str = "",
 ) -> None:  # fmt: skip
     """Kill runs.
 
     Args:
-        kills: How many; the last series goes on to its end.
+        kills: How many more; the last series goes on to its end.
         tally: Takes the outcomes.
         seconds: Processor time of an undisturbed run [s].
         where: Takes the numbers of kills by stage and signal, and by write.
-        first: Number of the first kill in the descriptions of faults.
         before: Kind of the writes before which all kills are, such as `kernels`; empty: any moment.
     """
     writes = writes_of(space)
-    while tally.runs < kills:
+    enough = tally.runs + kills
+    while tally.runs < enough:
         space.reset(old_outputs=rng.random() < 0.3)
         figures = before == "figures" or rng.random() < 0.15
-        about = f"series at kill {first + tally.runs}"
+        about = f"series at kill {tally.runs}"
         for _ in range(rng.randint(1, 4)):
             cooled = space.cool(rng, before if before in CACHED else "")
             parts = {cooled, "layer", "root layer", "table", "recording", "checkpoint", "temporary files"}
@@ -139,8 +139,6 @@ def campaign(
         if ending.status == 0:
             faults = [*verdicts.result_faults(space, figures), *verdicts.leftovers(space)]
         tally.add("finished by the next run", f"{about}, {text}", faults)
-        if faults:
-            print(*faults, sep="\n", flush=True)
 
 
 def _judge(space: Workspace, ending: runs.Ending, number: int, cold: bool, text: str, tally: verdicts.Tally) -> None:
@@ -155,5 +153,3 @@ def _judge(space: Workspace, ending: runs.Ending, number: int, cold: bool, text:
     else:
         faults += verdicts.refusal_faults(ending)
         tally.add("other", text, faults or [f"exit status {ending.status}"])
-    if faults:
-        print(text, *faults, sep="\n", flush=True)

@@ -25,13 +25,9 @@ def together(space: Workspace, rng: random.Random, count: int, tally: verdicts.T
         for ending in endings:
             faults = [] if ending.status == 0 else [f"exit status {ending.status}", *verdicts.refusal_faults(ending)]
             tally.add("same result" if ending.status == 0 else "other", about, faults)
-            if faults:
-                print(about, *faults, sep="\n  ", flush=True)
         faults = [*verdicts.result_faults(space, False), *verdicts.leftovers(space)]
         tally.runs += 1
         tally.add("sets of files compared", about, faults)
-        if faults:
-            print(about, *faults, sep="\n  ", flush=True)
 
 
 def clocks(space: Workspace, rng: random.Random, count: int, tally: verdicts.Tally) -> None:
@@ -49,8 +45,6 @@ def clocks(space: Workspace, rng: random.Random, count: int, tally: verdicts.Tal
             faults = [*verdicts.result_faults(space, False), *verdicts.leftovers(space)]
         tally.runs += 1
         tally.add("same result" if ending.status == 0 else "other", about, faults)
-        if faults:
-            print(about, *faults, sep="\n  ", flush=True)
 
 
 def jumps(seed: int) -> Callable[[], None]:

@@ -208,5 +208,3 @@ def _judge(
         after = [*verdicts.result_faults(space, figures), *left]
     tally.runs += 1
     tally.add("same result by the next run" if not after else "no result by the next run", about, after)
-    if faults or after:
-        print(about, *faults, *after, sep="\n  ", flush=True)

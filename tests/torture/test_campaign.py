@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -14,8 +13,6 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 import events  # noqa: E402
-import record  # noqa: E402
-import report  # noqa: E402
 import runs  # noqa: E402
 import verdicts  # noqa: E402
 from runs import Ending  # noqa: E402
@@ -81,36 +78,6 @@ def test_writes_have_labels_by_file_and_kind(space):
     assert events.label(space, "os.rename", ("x", str(space.out / "calm_root.usda"))) == "root layer: rename"
     assert events.label(space, "os.link", ("x", str(space.cache / "meshes" / "k.npz"))) == "meshes: link"
     assert events.label(space, "os.remove", (str(space.root / "elsewhere"),)) is None
-
-
-def test_counts_are_written_between_the_marks(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text(f"before\n{report.BEGIN}\nold\n{report.END}\nafter\n")
-    tally = verdicts.Tally(runs=1)
-    tally.add("killed", "kill 1", ["calm.csv is lost"])
-    table = report.text({"kills": tally}, Counter({"stage\tMesh\tSIGKILL": 2, "write\ttable: open": 1}), "At a commit.")
-    report.insert(page, table)
-    report.insert(page, table)
-    text = page.read_text()
-    assert (
-        text.startswith("before") and text.endswith("after\n") and "old" not in text and text.count("At a commit.") == 1
-    )
-    assert "| kills | 1 | killed 1 | 1 |" in text and "calm.csv is lost" in text and "| Mesh | 2 |" in text
-
-
-def test_campaigns_add_up_by_commit(tmp_path, monkeypatch):
-    where = Counter({"stage\tMesh\tSIGKILL": 2})
-    for commit, count in (("one", 3), ("one", 4), ("two", 5)):
-        monkeypatch.setattr(record, "_commit", lambda commit=commit: commit)
-        kept = record.Record.read(tmp_path / "counts.json")
-        tally = verdicts.Tally(runs=count)
-        tally.add("killed", "kill", ["lost"] if commit == "two" else [])
-        kept.add("kills", tally, where)
-    kept = record.Record.read(tmp_path / "counts.json")
-    tallies, where = kept.sums()
-    assert kept.runs("kills") == tallies["kills"].runs == 12 and kept.runs("clocks") == 0 and len(kept.entries) == 2
-    assert tallies["kills"].counts == {"killed": 3} and where["stage\tMesh\tSIGKILL"] == 6
-    assert tallies["kills"].faults == ["kill: lost (at two)"] and "commits one, two" in kept.about()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are looked at in /proc")

@@ -30,9 +30,12 @@ class Tally:
     runs: int = 0
 
     def add(self, outcome: str, about: str = "", faults: Iterable[str] = ()) -> None:
-        """Count an outcome, and the faults that were found with it."""
+        """Count an outcome, and tell the faults that were found with it."""
         self.counts[outcome] = self.counts.get(outcome, 0) + 1
-        self.faults += [f"{about}: {fault}" for fault in faults]
+        found = [f"{about}: {fault}" for fault in faults]
+        self.faults += found
+        if found:
+            print(*found, sep="\n", flush=True)
 
 
 def refusal_faults(ending: Ending) -> list[str]:

@@ -48,7 +48,7 @@ def refused_by_usd(stage: Usd.Stage) -> Iterator[None]:
     try:
         yield
     except Tf.ErrorException as error:
-        lines = [line for line in str(error).splitlines() if line.strip()]
+        lines = [line for line in _text(error).splitlines() if line.strip()]
         text = lines[0].rpartition(" : ")[2].strip().strip("'") if lines else "an error without a message"
         site = re.search(r"<(/[^>.]*)\.?([^>]*)>", text)
         raise ShotError(
@@ -114,7 +114,7 @@ def open_layer(path: str) -> Sdf.Layer:
         with quiet():
             layer = Sdf.Layer.FindOrOpen(str(path))
     except Tf.ErrorException as error:
-        reason = one_line(_message(str(error)))
+        reason = one_line(_message(error))
     if layer is None:
         raise ShotError(
             "this is not a USD file, or it is damaged",
@@ -145,7 +145,7 @@ def open_stage(path: str, *, muted: tuple[str, ...] = ()) -> Usd.Stage:
             stage = Usd.Stage.Open(layer, Usd.Stage.LoadAll)
         except Tf.ErrorException as error:
             raise ShotError(
-                "USD cannot compose the shot", path=path, found=one_line(_message(str(error))) or None,
+                "USD cannot compose the shot", path=path, found=one_line(_message(error)) or None,
                 remedy="Correct the file that it names; usdview shows where",
             ) from error  # fmt: skip
         del kept  # the stage has them now
@@ -173,7 +173,7 @@ def _reload(layer: Sdf.Layer) -> None:
     except Tf.ErrorException as error:
         raise ShotError(
             "this is not a USD file any more, or it is damaged", path=layer.realPath,
-            found=one_line(_message(str(error))) or None, remedy="Correct the file, or write it again",
+            found=one_line(_message(error)) or None, remedy="Correct the file, or write it again",
         ) from error  # fmt: skip
 
 
@@ -192,9 +192,17 @@ def _merged(errors: list[ShotError]) -> list[ShotError]:
     return merged
 
 
-def _message(text: str) -> str:
+def _text(error: object) -> str:
+    """What an error of USD says; it may quote bytes of a file that are no UTF-8."""
+    try:
+        return str(error)
+    except UnicodeDecodeError as undecodable:
+        return undecodable.object.decode(errors="replace")
+
+
+def _message(error: Exception) -> str:
     """What USD says, without where in its sources: the last of several errors, whose text may hold quotes itself."""
-    messages = re.findall(r" at line \d+ in file \S+ : '(.*?)'\s*(?=\n\tError|$)", text, re.DOTALL)
+    messages = re.findall(r" at line \d+ in file \S+ : '(.*?)'\s*(?=\n\tError|$)", _text(error), re.DOTALL)
     return messages[-1].strip() if messages else ""
 
 
@@ -202,7 +210,7 @@ def _refusal(error: Pcp.ErrorBase, shot: str) -> ShotError | None:
     """The ShotError for a composition error that leaves out a part of the shot; None for any other."""
     if type(error).__name__ not in _REFUSED:
         return None
-    text = one_line(str(error))
+    text = one_line(_text(error))
     site = re.search(r"<(/[^>]*)>\.?\s*$", text)
     prim = site.group(1) if site else str(error.rootSite.path)
     assets = re.findall(r"@([^@]*)@", text)

@@ -143,6 +143,7 @@ def unicode_names(text: str) -> str:
 
 NAN, INF = math.nan, math.inf
 SHEAR = Gf.Matrix4d(1, 0.5, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.4, 0, 1, 1)
+TWISTED = Vt.Vec3fArray([Gf.Vec3f(x, y if x else -y, 0) for x in (0, 0.4) for y in (-0.02, 0.02) for _ in range(2)])
 SQUARE = [Gf.Vec3f(*p) for p in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))]
 
 CASES: dict[str, Case] = {
@@ -164,7 +165,7 @@ CASES: dict[str, Case] = {
     ),
     "a missing sublayer": of_layer(lambda layer: layer.subLayerPaths.append("./gone.usda"), "gone.usda"),
     "a missing reference": of_layer(
-        lambda layer: layer.GetPrimAtPath(FORE).referenceList.Prepend(Sdf.Reference("./gone.usda")), FORE
+        lambda layer: layer.GetPrimAtPath(FORE).referenceList.Prepend(Sdf.Reference("./gone.usda")), FORE, "gone.usda"
     ),
     "a missing payload": of_layer(
         lambda layer: layer.GetPrimAtPath(FORE).payloadList.Prepend(Sdf.Payload("./gone.usda")), FORE, "payload"
@@ -278,6 +279,9 @@ CASES: dict[str, Case] = {
     "negative corners": edited(mesh("faceVertexIndices", Vt.IntArray([-1] * 24)), SKIN, "faceVertexIndices"),
     "faces of another number of corners": edited(
         mesh("faceVertexCounts", Vt.IntArray([3] * 6)), SKIN, "faceVertexCounts"
+    ),
+    "a box twisted by half a turn, which encloses nothing": edited(
+        mesh("points", TWISTED), SKIN
     ),
     "a mesh without points": edited(mesh("points", Vt.Vec3fArray()), SKIN),
     "tetrahedra of points that are not there": edited(tet_mesh(SQUARE, [(0, 1, 2, 9)]), f"{FORE}/tets"),

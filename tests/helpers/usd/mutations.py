@@ -1,4 +1,4 @@
-"""Random damage to shots and manifests; a seed gives the same damage every time."""
+"""Random edits of a shot's layer; the same random numbers make the same edit."""
 
 from __future__ import annotations
 
@@ -163,40 +163,3 @@ MUTATIONS = (
     change_prim,
     change_stage,
 )
-
-
-def damaged(text: str, seed: int) -> tuple[str, list[str]]:
-    """A shot's text with a few random edits, and their names."""
-    rng = random.Random(seed)
-    layer = Sdf.Layer.CreateAnonymous(".usda")
-    layer.ImportFromString(text)
-    done = []
-    for _ in range(rng.choice((1, 1, 2, 3, 6))):
-        mutation = rng.choice(MUTATIONS)
-        try:
-            mutation(layer, rng)
-        except Exception as error:  # USD refuses some edits by itself
-            done.append(f"{mutation.__name__} was refused: {type(error).__name__}")
-        else:
-            done.append(mutation.__name__)
-    return layer.ExportToString(), done
-
-
-def scrambled(text: str, seed: int) -> str:
-    """A text with characters lost, doubled and changed."""
-    rng = random.Random(seed)
-    for _ in range(rng.choice((1, 2, 5, 20))):
-        at = rng.randrange(len(text) + 1)
-        size = rng.choice((1, 1, 3, 20))
-        what = rng.randrange(4)
-        if what == 0:
-            text = text[:at] + text[at + size :]
-        elif what == 1:
-            text = text[:at] + text[at : at + size] * 2 + text[at + size :]
-        elif what == 2:
-            text = text[:at] + rng.choice("{}[]()<>\"'@#=:.,/\\\n\t\x00é0-9") + text[at + 1 :]
-        else:
-            other = rng.randrange(len(text) + 1)
-            text = text[:at] + text[other : other + size] + text[at:]
-        text = text or " "
-    return text
