@@ -6,7 +6,7 @@ import synthetic
 from calmotion import ShotError
 from calmotion.host import NotAsked
 from calmotion.model import Character, Result
-from calmotion.model.motor import LimitUse
+from calmotion.model.limits.use import LimitUse
 from calmotion.model.outputs import ShapedTracks, SystemModes, Verification
 from calmotion.model.run import OutputPaths, RunSettings, Source
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot

@@ -32,7 +32,8 @@ expected = {
     "calm:flexible:geometry": "auto", "calm:flexible:wallThickness": -1.0,
     "calm:flexible:infill": -1.0, "calm:flexible:perimeters": -1, "calm:flexible:section": "auto",
     "calm:flexible:meshFile": None, "calm:damping:rayleighMass": None, "calm:damping:rayleighStiffness": None,
-    "calm:motor:maxVelocity": float("inf"), "calm:motor:maxAcceleration": float("inf"), "calm:motor:skelJoint": None,
+    "calm:motor:maxVelocity": float("inf"), "calm:motor:maxAcceleration": float("inf"),
+    "calm:motor:maxJerk": float("inf"), "calm:motor:skelJoint": None,
     "calm:target:positionWeight": 1.0, "calm:target:rotationWeight": 0.0, "calm:retarget:reference": "rigid",
     "calm:retarget:endpoints": "free", "calm:retarget:cyclic": False, "calm:retarget:tolerance": -1.0,
 }

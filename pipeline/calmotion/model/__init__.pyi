@@ -27,6 +27,9 @@ from calmotion.model.curves import Sample as Sample
 from calmotion.model.curves import commanded_curves as commanded_curves
 from calmotion.model.curves import curve_of as curve_of
 from calmotion.model.curves import held_curve as held_curve
+from calmotion.model.limits.use import LimitUse as LimitUse
+from calmotion.model.limits.use import is_exceeded as is_exceeded
+from calmotion.model.limits.use import is_reached as is_reached
 from calmotion.model.meshes import FEMesh as FEMesh
 from calmotion.model.meshes import FEMeshes as FEMeshes
 from calmotion.model.meshes import MeshQuality as MeshQuality
@@ -44,10 +47,7 @@ from calmotion.model.motor import DRIVE as DRIVE
 from calmotion.model.motor import PRESCRIBED as PRESCRIBED
 from calmotion.model.motor import SERVO as SERVO
 from calmotion.model.motor import Follows as Follows
-from calmotion.model.motor import LimitUse as LimitUse
 from calmotion.model.motor import Motor as Motor
-from calmotion.model.motor import is_exceeded as is_exceeded
-from calmotion.model.motor import is_reached as is_reached
 from calmotion.model.motor import measure_of as measure_of
 from calmotion.model.outputs import CsvFile as CsvFile
 from calmotion.model.outputs import Figures as Figures

@@ -62,7 +62,8 @@ class Motor:
         source: Where the track is: `drive` (the target position of its drive), `bodies` (the transforms of the bodies
             that it joins), or `skeleton` (a joint of a UsdSkel animation).
         optimize: Whether its curve may be changed.
-        max_velocity, max_acceleration, max_torque: [rad/s], [rad/s^2], [N m]; infinite when there are none.
+        max_velocity, max_acceleration, max_jerk: [rad/s], [rad/s^2], [rad/s^3]; infinite when there are none.
+        max_torque: [N m]; likewise.
         linear: Whether it sets a length along the joint's axis instead of an angle: metres then stand for radians,
             and newtons for newton metres.
         follows: The motor that it is geared to, or None; it then has no curve of its own.
@@ -87,6 +88,7 @@ class Motor:
     optimize: bool = True
     max_velocity: float = np.inf
     max_acceleration: float = np.inf
+    max_jerk: float = np.inf
     max_torque: float = np.inf
     linear: bool = False
     follows: Follows | None = None
@@ -130,18 +132,6 @@ class Measure(NamedTuple):
     si: str
     factor: float
 
-    def unit_of(self, quantity: str) -> str:
-        """SI unit of a limited quantity: `position`, `velocity`, `acceleration` or `effort`."""
-        return {"velocity": f"{self.si}/s", "acceleration": f"{self.si}/s^2", "effort": self.effort_unit}.get(
-            quantity, self.si
-        )
-
-    def shown(self, quantity: str, value: float) -> str:
-        """A value of such a quantity, in SI, as text with the unit that is shown."""
-        if quantity == "effort":
-            return f"{value:.4g} {self.effort_unit}"
-        return f"{self.factor * value:.4g} {self.unit_of(quantity).replace(self.si, self.unit, 1)}"
-
 
 ANGLE = Measure("angle", "torque", "deg", "N m", "rad", float(np.degrees(1.0)))
 LENGTH = Measure("length", "force", "mm", "N", "m", 1e3)
@@ -150,41 +140,3 @@ LENGTH = Measure("length", "force", "mm", "N", "m", 1e3)
 def measure_of(motor: Motor) -> Measure:
     """The measure of a motor."""
     return LENGTH if motor.linear else ANGLE
-
-
-@dataclass(frozen=True, eq=False)
-class LimitUse:
-    """How far a motor goes within one of its limits, and what the limit costs.
-
-    Attributes:
-        motor: Motor index.
-        quantity: `position`, `velocity`, `acceleration` or `effort`.
-        limit: [rad], [rad/s], [rad/s^2] or [N m]; [m], ... of a length motor.
-        before, after: The value of the input and of the result that comes closest to the limit or exceeds it most.
-        time_s: When, in the result [s].
-        excess: (after - limit) over the size of the limit: positive where it is exceeded.
-        cost_m: By how much the root-mean-square error would fall without the limit; None where it does not bind.
-    """
-
-    motor: int
-    quantity: str
-    limit: float
-    before: float
-    after: float
-    time_s: float
-    excess: float
-    cost_m: float | None = None
-
-
-_REACHED = 1e-3  # of the size of a limit: what is nearer touches it
-_ROUNDING = 1e-6  # of the size of a limit
-
-
-def is_reached(limit: LimitUse) -> bool:
-    """Whether a motor goes up to a limit, or the limit costs something; not whether it merely has one."""
-    return limit.cost_m is not None or limit.excess > -_REACHED
-
-
-def is_exceeded(limit: LimitUse) -> bool:
-    """Whether a motor goes beyond a limit, by more than rounding."""
-    return limit.excess > _ROUNDING

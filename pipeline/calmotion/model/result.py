@@ -8,7 +8,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model.budget import BudgetEntry
-from calmotion.model.motor import LimitUse
+from calmotion.model.limits.use import LimitUse
 from calmotion.model.robust.robots import Robustness
 
 

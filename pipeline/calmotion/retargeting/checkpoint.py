@@ -45,7 +45,7 @@ def problem_key(problem: RetargetProblem, fixed: BoolArray, settings: object) ->
     space, curves, objective = problem.space, problem.curves, problem.objective
     intended = objective.intended
     arrays: list[Any] = [np.asarray(part) for robot in problem.robots for part in (*robot.model.system, robot.weight)]
-    arrays += [curves.angles, curves.rates, curves.accelerations]
+    arrays += curves.derivatives
     arrays += [space.basis.values.data, space.basis.knots, space.coupling, fixed, space.smoothness, space.closeness]
     arrays += [objective.weights, intended.target_positions, intended.target_rotations]
     if problem.world is not None:

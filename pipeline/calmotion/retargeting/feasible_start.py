@@ -1,4 +1,4 @@
-"""Curves within the limits of position, velocity and acceleration, close to others: where a search under limits begins.
+"""Curves within the limits of the curves themselves, close to others: where a search under limits begins.
 
 These limits are linear in the coefficients of the offsets, and so is the rigid robot's error at its targets at first
 order: the nearest curves within the limits are the minimum of a quadratic program. Where locked intervals or kept ends
@@ -7,15 +7,18 @@ leave no such curves, the limits are widened to what is exceeded least, so that 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags, eye, kron, vstack
 
 from calmotion.arrays import Array, BoolArray
-from calmotion.retargeting.problem.adaptive_knots import converted
+from calmotion.model.limits.base import CurveLimit
+from calmotion.model.limits.kinds import kinds_of_limits
+from calmotion.retargeting.problem.adaptive_knots import converted, halved
 from calmotion.retargeting.problem.limits import FIRST_PENALTY, MARGIN
-from calmotion.retargeting.problem.offset_basis import basis_on
+from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.elastic_program import elastic_minimum
 from calmotion.simulation.inputs.curves import Curves
@@ -41,6 +44,25 @@ def with_moving_end(problem: RetargetProblem, start: Array) -> tuple[RetargetPro
     return problem.on_basis(moving, x), x
 
 
+def on_sufficient_knots(
+    problem: RetargetProblem, start: Array, fixed_on: Callable[[OffsetBasis], BoolArray]
+) -> tuple[RetargetProblem, Array]:
+    """The problem and its start on knots close enough for offsets that keep the limits of the curves, where there are
+    such offsets at all: corners of higher derivatives stand where knots are.
+
+    Args:
+        fixed_on: Maps a basis to its coefficients that stay zero, shape [n], bool.
+    """
+    while _unavoidable(problem, fixed_on(problem.space.basis)):
+        space, grid = problem.space, problem.grid
+        finer = space.basis.on(grid, halved(grid, space.basis.breaks))
+        if finer.count == space.basis.count:
+            break
+        start = converted(space.basis, finer, start, len(space.motors))
+        problem = problem.on_basis(finer, start)
+    return problem, start
+
+
 def widen_unavoidable(problem: RetargetProblem, fixed: BoolArray) -> None:
     """Widen the limits of a problem that no offsets can keep, to what is exceeded least.
 
@@ -48,15 +70,19 @@ def widen_unavoidable(problem: RetargetProblem, fixed: BoolArray) -> None:
         fixed: Coefficients that stay zero, shape [n], bool.
     """
     limits = problem.limits
+    if limits is not None and (excess := _unavoidable(problem, fixed)):
+        limits.bounds = limits.bounds | {name: _widened(limits.bounds[name], by) for name, by in excess.items()}
+
+
+def _unavoidable(problem: RetargetProblem, fixed: BoolArray) -> dict[str, Array]:
+    """What the nearest curves exceed limits by that these exceed, as shares of the scale, shape [M] each."""
+    limits = problem.limits
     if limits is None or not np.any(_exceeding(problem, problem.curves)):
-        return
+        return {}
     x = _nearest(problem, np.zeros(problem.size), fixed)[0]
     nearest = problem.space.changed(problem.curves, x)
-    wider = {
-        name: _widened(bound, _excess(bound, _values(nearest, name)[limits.judged]))
-        for name, bound in _bounds(problem).items()
-    }
-    limits.bounds = limits.bounds | wider
+    found = {name: _excess(b, _values(nearest, name)[limits.judged]) for name, b in _bounds(problem).items()}
+    return {name: excess for name, excess in found.items() if np.any(excess > WIDENED)}
 
 
 def onto_limits(problem: RetargetProblem, x: Array, fixed: BoolArray) -> Array:
@@ -125,7 +151,9 @@ def _nearest(
 
 
 def _values(curves: Curves, name: str) -> Array:
-    return {"position": curves.angles, "velocity": curves.rates, "acceleration": curves.accelerations}[name]
+    kind = kinds_of_limits()[name]
+    assert isinstance(kind, CurveLimit)
+    return curves.derivatives[kind.order]
 
 
 def _excess(bound: Bounds, values: Array) -> Array:

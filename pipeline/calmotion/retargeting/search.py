@@ -12,7 +12,7 @@ from calmotion.model import Animation, Character
 from calmotion.model.model_choice import OFF
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.checkpoint import Checkpoint
-from calmotion.retargeting.feasible_start import onto_limits, widen_unavoidable, with_moving_end
+from calmotion.retargeting.feasible_start import on_sufficient_knots, onto_limits, widen_unavoidable, with_moving_end
 from calmotion.retargeting.problem.adaptive_knots import converted, refined_breaks
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.posing import locked_coefficients
@@ -92,6 +92,8 @@ class RetargetSearch:
         """
         self.problem, start = with_moving_end(self.problem, start)
         self.inactive = inactive_intervals(self.problem, start, self.frequency, self.tolerance, self.options.ranges)
+        if self.adaptive:
+            self.problem, start = on_sufficient_knots(self.problem, start, self._fixed_on)
         fixed = self._fixed_on(self.problem.space.basis)
         widen_unavoidable(self.problem, fixed)
         self.search = Search.start(np.where(fixed, 0.0, start))

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from calmotion.arrays import Array, IntArray
+from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
 from calmotion.multibody.analysis.reactions import Reactions, reactions
 from calmotion.multibody.integrators.integrate import integrate
@@ -106,16 +108,33 @@ def followed(model: Model, angles: Array, rates: Array, h: float, cyclic: bool) 
     return model.joint_angles(late[0]), model.joint_angles(late[1])
 
 
+@dataclass(frozen=True, eq=False)
+class PerformedCurves:
+    """Curves of the motors and the run in which they are performed, as `model.limits` takes them."""
+
+    model: Model
+    curves: Curves
+    run: ForwardRun
+
+    @property
+    def derivatives(self) -> tuple[Array, ...]:
+        """Of the curves, shape [T, M] each."""
+        return self.curves.derivatives
+
+    @cached_property
+    def efforts(self) -> Array:
+        """Of the motors in the run, shape [T, M]."""
+        found = reactions(self.model.system, self.run.trajectory, self.run.joint_angles, self.run.joint_rates)
+        return self.model.motor_values(found.efforts)
+
+
 def limited_values(model: Model, names: Collection[str], curves: Curves, run: ForwardRun) -> dict[str, Array]:
-    """The quantities that limits are about, by name, shape [T, M] each.
+    """The quantities of some kinds of limits, by name, shape [T, M] each.
 
     Args:
-        names: Which of `limits.QUANTITIES`.
+        names: Which, of `kinds_of_limits`.
         curves: Of the motors, as simulated.
         run: The simulation.
     """
-    found = {"position": curves.angles, "velocity": curves.rates, "acceleration": curves.accelerations}
-    if "effort" in names:
-        efforts = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates).efforts
-        found["effort"] = model.motor_values(efforts)
-    return {name: found[name] for name in names}
+    performed = PerformedCurves(model, curves, run)
+    return {name: kinds_of_limits()[name].values(performed) for name in names}

@@ -8,9 +8,8 @@ import numpy as np
 
 from calmotion.arrays import Array, BoolArray
 from calmotion.model.character import Character
-from calmotion.model.motor import SERVO
-
-QUANTITIES = ("position", "velocity", "acceleration", "effort")
+from calmotion.model.limits.base import CurveLimit
+from calmotion.model.limits.kinds import kinds_of_limits
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,29 +30,19 @@ def motor_bounds(character: Character, movable: BoolArray | None = None) -> dict
     """Bounds by the name of their quantity; only quantities of which some motor has one.
 
     Args:
-        movable: Motors whose curve may change, shape [M]; of the others only the effort is bounded, since nothing
-            else of them can be changed. None: all motors, with all their limits.
+        movable: Motors whose curve may change, shape [M]; the curves of others are not bounded. None: all motors.
     """
     joints = [character.joints[motor.joint] for motor in character.motors]
     found: dict[str, Bounds] = {}
-
-    def add(name: str, lower: Array, upper: Array) -> None:
-        if movable is not None and name != "effort":
+    for name, kind in kinds_of_limits().items():
+        pairs = [kind.bounds(motor, joint) for motor, joint in zip(character.motors, joints, strict=True)]
+        lower, upper = np.array(pairs, float).reshape(-1, 2).T
+        if movable is not None and isinstance(kind, CurveLimit):
             lower, upper = np.where(movable, lower, -np.inf), np.where(movable, upper, np.inf)
         finite = np.isfinite(np.stack([lower, upper]))
         size = np.max(np.where(finite, np.abs(np.stack([lower, upper])), 0.0), axis=0)
         if np.any(finite):
             found[name] = Bounds(lower, upper, np.where(size > 0.0, size, 1.0))
-
-    add("position", np.array([j.lower for j in joints], float), np.array([j.upper for j in joints], float))
-    for name, values in (
-        ("velocity", [m.max_velocity for m in character.motors]),
-        ("acceleration", [m.max_acceleration for m in character.motors]),
-        # a servo's motor cannot exceed its own
-        ("effort", [np.inf if m.model == SERVO else m.max_torque for m in character.motors]),
-    ):
-        upper = np.array(values, float)
-        add(name, -upper, upper)
     return found
 
 
@@ -63,7 +52,7 @@ class Excess:
 
     Attributes:
         motor: Its index.
-        quantity: One of `QUANTITIES`.
+        quantity: Name of the kind of limit.
         limit: The limit [rad], [rad/s], [rad/s^2] or [N m].
         value: The value that comes closest to it, or exceeds it most.
         instant: When.

@@ -245,6 +245,7 @@ def _motor(motor: Motor, track: Track, character: Character) -> dict[str, Any]:
         f"peak_velocity_{unit}_s": float(speeds.max(initial=0.0)),
         f"max_velocity_{unit}_s": motor.max_velocity,
         f"max_acceleration_{unit}_s2": motor.max_acceleration,
+        f"max_jerk_{unit}_s3": motor.max_jerk,
         "max_force_n" if motor.linear else "max_torque_n_m": motor.max_torque,
         "model": motor.model,
         f"position_gain_{newtons}_{unit}": motor.position_gain,

@@ -13,7 +13,9 @@ from calmotion.host import OperatorResult, Run
 from calmotion.model import Character, LimitUse, Result, Simplification, Simulation
 from calmotion.model.budget import Verdict, verdict_on
 from calmotion.model.character import motors_give
-from calmotion.model.motor import is_exceeded, measure_of
+from calmotion.model.limits.kinds import kinds_of_limits
+from calmotion.model.limits.use import is_exceeded
+from calmotion.model.motor import measure_of
 from calmotion.model.outputs import CsvFile, Figures, Recording, Rig, Verification, Video, WrittenLayer
 from calmotion.model.run import Source
 from calmotion.support.memory import peak_memory
@@ -64,16 +66,17 @@ def left_out_row(row: Simplification) -> dict[str, Any]:
 
 def limit_row(character: Character, limit: LimitUse) -> dict[str, Any]:
     """One row of `limits`."""
-    motor = character.motors[limit.motor]
+    motor, kind = character.motors[limit.motor], kinds_of_limits()[limit.quantity]
+    measure = measure_of(motor)
     return {
         "path": motor.path,
         "quantity": limit.quantity,
-        "unit": measure_of(motor).unit_of(limit.quantity),
+        "unit": kind.unit(measure, measure.si),
         "limit": limit.limit,
         "before": limit.before,
         "after": limit.after,
         "time_s": limit.time_s,
-        "shown": [measure_of(motor).shown(limit.quantity, v) for v in (limit.limit, limit.before, limit.after)],
+        "shown": [kind.shown(measure, v) for v in (limit.limit, limit.before, limit.after)],
         "exceeded": is_exceeded(limit),
         "cost_m": limit.cost_m,
     }

@@ -98,6 +98,7 @@ def _limits(k: int, curves: MotorCurves, angle: str) -> str:
         ("upper", curves.limits[k, 1] * factor, unit),
         ("velocity", motor.max_velocity * factor, f"{unit}/s"),
         ("acceleration", motor.max_acceleration * factor, f"{unit}/s^2"),
+        ("jerk", motor.max_jerk * factor, f"{unit}/s^3"),
         ("effort", motor.max_torque, effort),
     )
     return ", ".join(f"{name} {value:.9g} {u}" for name, value, u in shown if math.isfinite(value)) or "none"

@@ -9,14 +9,7 @@ from rich.console import Console
 
 from calmotion.cli.quantities import counted, length
 from calmotion.cli.tables import print_table, say
-
-# What raises a limit, by its quantity.
-RAISED_BY = {
-    "position": "the limits of the joint",
-    "velocity": "calm:motor:maxVelocity",
-    "acceleration": "calm:motor:maxAcceleration",
-    "effort": "calm:motor:maxTorque",
-}
+from calmotion.model.limits.kinds import kinds_of_limits
 
 
 def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: bool) -> None:
@@ -40,13 +33,13 @@ def print_reason(console: Console, report: dict[str, Any]) -> None:
     if exceeded:
         row = exceeded[0]
         limit, _, value = row["shown"]
-        if row["quantity"] != "position":
+        if not kinds_of_limits()[row["quantity"]].has_sides:
             limit, value = limit.removeprefix("-"), value.removeprefix("-")
         cost = "follow it less well and " if worse else ""
         more = f", and {len(exceeded) - 1} more" if len(exceeded) > 1 else ""
         broken = f"{row['path']} has {row['quantity']} {value} where {limit} is allowed{more}"
         say(console, f"The new curves {cost}exceed {counted(len(exceeded), 'limit')}: {broken}.")
-        names = " and ".join(dict.fromkeys(RAISED_BY[row["quantity"]] for row in exceeded))
+        names = " and ".join(dict.fromkeys(kinds_of_limits()[row["quantity"]].raised_by for row in exceeded))
         times = ", ".join(dict.fromkeys(f"{row['time_s']:.2f} s" for row in exceeded[:3]))
         say(console, f"Slow the animation down around {times}, or raise {names} if the motors can do more.")
     elif worse and any(row["cost_m"] is not None for row in limits):
@@ -60,5 +53,5 @@ def print_reason(console: Console, report: dict[str, Any]) -> None:
 def _excess(row: dict[str, Any]) -> float:
     """By how much the new curves exceed a limit, over its size; only limits of positions have sides."""
     limit, value = float(row["limit"]), float(row["after"])
-    beyond = abs(value - limit) if row["quantity"] == "position" else abs(value) - abs(limit)
+    beyond = abs(value - limit) if kinds_of_limits()[row["quantity"]].has_sides else abs(value) - abs(limit)
     return beyond / max(abs(limit), 1e-12)

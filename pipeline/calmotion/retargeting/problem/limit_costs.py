@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from calmotion.arrays import BoolArray
+from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.limited_step import limited_step
-from calmotion.simulation.motor_limits import QUANTITIES
 
 MOST = 4  # number of limits whose cost is estimated, largest multipliers first
 PRODUCTS, SHARE = 30, 0.05  # most products of a step, and share of the decrease that it may leave
@@ -26,7 +26,7 @@ def limit_costs(problem: RetargetProblem, fixed: BoolArray) -> dict[tuple[int, s
     weights = {
         (motor, name): float(np.sum(np.abs(limits.gradient(name, values)[:, motor])) * limits.bounds[name].scale[motor])
         for name, values in problem.limited.items()
-        if name in QUANTITIES
+        if name in kinds_of_limits()
         for motor in range(values.shape[1])
         if limits.binds(motor, name, values)
     }

@@ -11,7 +11,7 @@ from scipy.interpolate import BSpline
 from scipy.sparse import csc_matrix, csr_matrix, diags, eye_array, hstack, vstack
 
 from calmotion.arrays import Array, IntArray
-from calmotion.simulation.inputs.time_grid import TimeGrid, pre_roll_weights
+from calmotion.simulation.inputs.time_grid import ORDERS, TimeGrid, after_knots, pre_roll_weights
 
 DEGREE = 3
 AT_ONCE = 512  # times at which splines are evaluated at once: all but those that act there are left out
@@ -24,7 +24,7 @@ class OffsetBasis:
     Attributes:
         breaks: Frames that carry a knot, shape [n].
         knots: Their times [s], shape [n].
-        values, rates, accelerations: Basis and its derivatives at the grid's instants, sparse, shape [T, P].
+        derivatives: Basis and its first derivatives at the grid's instants, sparse, shape [T, P] each.
         at_frames: Basis at the frames, sparse, shape [f, P].
         curvatures: Second derivatives at the two Gauss points of each interval between knots, shape [2 (n - 1), P].
         curvature_gram: Gram matrix of the second derivatives, pre-roll included, shape [P, P] [1/s^3].
@@ -38,9 +38,7 @@ class OffsetBasis:
 
     breaks: IntArray
     knots: Array
-    values: csr_matrix
-    rates: csr_matrix
-    accelerations: csr_matrix
+    derivatives: tuple[csr_matrix, ...]
     at_frames: csr_matrix
     curvatures: csr_matrix
     curvature_gram: csr_matrix
@@ -49,6 +47,21 @@ class OffsetBasis:
     wraps: bool
     kept_ends: bool
     moving_end: bool
+
+    @property
+    def values(self) -> csr_matrix:
+        """The basis at the instants, shape [T, P]."""
+        return self.derivatives[0]
+
+    @property
+    def rates(self) -> csr_matrix:
+        """Its first derivatives."""
+        return self.derivatives[1]
+
+    @property
+    def accelerations(self) -> csr_matrix:
+        """Its second derivatives."""
+        return self.derivatives[2]
 
     @property
     def count(self) -> int:
@@ -107,7 +120,8 @@ def basis_on(grid: TimeGrid, breaks: IntArray, kept_ends: bool, moving_end: bool
         inside = np.mod(times, grid.end) if grid.cyclic else np.clip(times, knots[0], knots[-1])
         return _merged(_evaluated(padded, inside, order), merge)
 
-    stored, rates, accelerations = _over_grid(grid, sample)
+    derivatives = _over_grid(grid, sample)
+    stored = derivatives[0]
     # two Gauss points integrate the squared second derivative of a cubic exactly
     width = np.diff(knots)[:, None]
     points = (0.5 * (knots[:-1] + knots[1:])[:, None] + 0.5 * width * np.array([-1, 1]) / math.sqrt(3)).ravel()
@@ -115,10 +129,10 @@ def basis_on(grid: TimeGrid, breaks: IntArray, kept_ends: bool, moving_end: bool
     curvature_gram = curvatures.T @ diags(np.repeat(0.5 * width.ravel(), 2)) @ curvatures
     near = stored[grid.judged] if grid.cyclic else stored
     if not grid.cyclic and grid.pre_steps:
-        before = accelerations[: grid.pre_steps]
+        before = derivatives[2][: grid.pre_steps]
         curvature_gram = curvature_gram + grid.h * (before.T @ before)
     return OffsetBasis(
-        breaks, knots, stored, rates, accelerations, stored[grid.frames], curvatures, csr_matrix(curvature_gram),
+        breaks, knots, derivatives, stored[grid.frames], curvatures, csr_matrix(curvature_gram),
         grid.h * (near.T @ near), support, wraps, kept_ends, moving_end,
     )  # fmt: skip
 
@@ -149,19 +163,19 @@ def _merged(values: csr_matrix, merge: csc_matrix) -> csr_matrix:
     return found
 
 
-def _over_grid(grid: TimeGrid, sample: Callable[[Array, int], csr_matrix]) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
+def _over_grid(grid: TimeGrid, sample: Callable[[Array, int], csr_matrix]) -> tuple[csr_matrix, ...]:
     """As `time_grid.over_grid`, sparse."""
     pre, times = 0 if grid.cyclic else grid.pre_steps, grid.times
-    parts = [sample(times[pre:], order) for order in range(3)]
+    parts = [sample(after_knots(times[pre:], order, grid.h), order) for order in range(ORDERS)]
     if pre:
-        meet = np.concatenate([part[:1].toarray() for part in parts])
+        meet = np.concatenate([part[:1].toarray() for part in parts[:3]])
         columns = np.flatnonzero(np.any(meet, axis=0))  # a few act where the pre-roll ends
         weights = pre_roll_weights(times[:pre], grid.pre_roll)
         for k, rows in enumerate(weights):
             dense = csr_matrix(rows @ meet[:, columns])
             before = csr_matrix((dense.data, columns[dense.indices], dense.indptr), (pre, meet.shape[1]))
             parts[k] = csr_matrix(vstack([before, parts[k]]))
-    return parts[0], parts[1], parts[2]
+    return tuple(parts)
 
 
 def _open(knots: Array) -> tuple[Array, csc_matrix, Array]:

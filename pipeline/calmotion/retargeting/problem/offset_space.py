@@ -9,6 +9,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from calmotion.arrays import Array, IntArray
+from calmotion.model.limits.base import CurveLimit
+from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.simulation.inputs.curves import Curves
 
@@ -64,9 +66,9 @@ class OffsetSpace:
 
     @cached_property
     def splines(self) -> dict[str, csr_matrix]:
-        """Spline matrices [T, P] by the quantity that they give: `position`, `velocity` and `acceleration`."""
-        basis = self.basis
-        return {"position": basis.values, "velocity": basis.rates, "acceleration": basis.accelerations}
+        """Spline matrices [T, P] by the name of the kind of limit whose quantity they give."""
+        kinds = kinds_of_limits().items()
+        return {name: self.basis.derivatives[kind.order] for name, kind in kinds if isinstance(kind, CurveLimit)}
 
     def on_basis(self, basis: OffsetBasis) -> OffsetSpace:
         """The same motors over other splines."""
@@ -86,8 +88,7 @@ class OffsetSpace:
 
     def changed(self, curves: Curves, x: Array) -> Curves:
         """Curves of the motors with their offsets."""
-        values, rates, accelerations = (self.spread(spline, x) for spline in self.splines.values())
-        return Curves(curves.angles + values, curves.rates + rates, curves.accelerations + accelerations)
+        return curves.plus([self.spread(spline, x) for spline in self.basis.derivatives])
 
     @cached_property
     def pull(self) -> Array:

@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray, IntArray
+from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
@@ -34,7 +35,6 @@ from calmotion.retargeting.solver.preconditioner import Preconditioner, RigidPre
 from calmotion.simulation.forward import ForwardRun, limited_values
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
-from calmotion.simulation.motor_limits import QUANTITIES
 from calmotion.simulation.simulator import Simulator
 from calmotion.simulation.target_errors import Objective
 
@@ -155,7 +155,9 @@ class RetargetProblem:
         """Values of the limited quantities at the point evaluated last, shape [T, M] each."""
         if self._limited is None:
             bounds = {} if self.limits is None else self.limits.bounds
-            self._limited = limited_values(self.model, bounds.keys() & set(QUANTITIES), self.changed_curves, self.run)
+            self._limited = limited_values(
+                self.model, bounds.keys() & kinds_of_limits().keys(), self.changed_curves, self.run
+            )
             if EFFORT in bounds:
                 self._limited |= several_robots.further_efforts(self.robots, self.changed_curves)
             self._limited |= several_robots.on_ground(self.robots)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from calmotion.arrays import Array
 from calmotion.model import LimitUse, MotorCurve, OptimizerStep, Result, Simplification, Simulation, WindowRow
+from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.posing import SMOOTHNESS, closeness_of
 from calmotion.retargeting.simplification.pruning import UNCHANGED
-from calmotion.retargeting.windows.parts import Piece, added, joined, offset_curves
+from calmotion.retargeting.windows.parts import Piece, joined, offset_curves
 from calmotion.retargeting.windows.plan import Window
 from calmotion.retargeting.windows.search import Found
 from calmotion.simulation.bodies import mode_tables, skins
@@ -91,7 +93,7 @@ def result_of(
     """
     grid, model = prepared.grid, prepared.model
     offsets = offset_curves(done.offsets, grid)
-    changed = added(curves, offsets)
+    changed = curves.plus(offsets.derivatives)
     before, after = joined(done.before, grid.times), joined(done.after, grid.times)
     objective = Objective.over(model, intended, grid, prepared.shot.animation.weights)
     motors = _motor_curves(done.offsets, curves, grid)
@@ -162,6 +164,13 @@ def _knots(offsets: Array, grid: TimeGrid) -> Array:
     return times
 
 
+class _Performed(NamedTuple):
+    """What motors did."""
+
+    derivatives: tuple[Array, ...]
+    efforts: Array
+
+
 def _limits(
     prepared: Prepared, before: tuple[Curves, Simulation], after: tuple[Curves, Simulation]
 ) -> tuple[LimitUse, ...]:
@@ -169,9 +178,8 @@ def _limits(
     bounds, judged = motor_bounds(prepared.character), prepared.grid.judged
     used = []
     for curves, simulation in (before, after):
-        values = {"position": curves.angles, "velocity": curves.rates, "acceleration": curves.accelerations}
-        values["effort"] = simulation.motion.motor_efforts
-        used.append(excesses(bounds, {name: values[name] for name in bounds}, judged))
+        done = _Performed(curves.derivatives, simulation.motion.motor_efforts)
+        used.append(excesses(bounds, {name: kinds_of_limits()[name].values(done) for name in bounds}, judged))
     return limit_uses(used[0], used[1], prepared.grid)
 
 

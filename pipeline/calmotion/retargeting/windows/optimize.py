@@ -19,7 +19,7 @@ from calmotion.retargeting.problem.adaptive_knots import FIRST
 from calmotion.retargeting.problem.posing import knot_spacing
 from calmotion.retargeting.windows.assembly import Done, result_of
 from calmotion.retargeting.windows.continued import Beginning, needed_instants
-from calmotion.retargeting.windows.parts import Part, Piece, added, offsets_in, part_of, performed, piece_of
+from calmotion.retargeting.windows.parts import Part, Piece, offsets_in, part_of, performed, piece_of
 from calmotion.retargeting.windows.plan import FEWEST, Window, overlap_time, plan_windows
 from calmotion.retargeting.windows.search import Found, Setting, search_window
 from calmotion.retargeting.windows.store import WindowStore, window_keys
@@ -131,7 +131,7 @@ class _Windows:
             kept = part_of(whole, window.first, window.kept, known)
             own = kept.curves_of(self.curves)
             before = self._simulated(kept, own, before, self.done.before, known)
-            changed = added(own, offsets_in(kept, offsets, whole.grid))
+            changed = own.plus(offsets_in(kept, offsets, whole.grid).derivatives)
             after = self._simulated(kept, changed, after, self.done.after, known)
             if searched and not self.done.interrupted:
                 self.store.keep(k, offsets, None if window.is_last else after)

@@ -15,7 +15,7 @@ from calmotion.retargeting.windows.continued import Beginning, ContinuedSimulato
 from calmotion.simulation.forward import ForwardRun, run_forward
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.excerpts import later
-from calmotion.simulation.inputs.time_grid import TimeGrid, over_grid
+from calmotion.simulation.inputs.time_grid import ORDERS, TimeGrid, after_knots, over_grid
 from calmotion.simulation.preparation import Prepared
 from calmotion.simulation.report import at_instants, simulation_of
 from calmotion.simulation.target_errors import IntendedMotion
@@ -43,7 +43,7 @@ class Part:
 
     def curves_of(self, curves: Curves) -> Curves:
         """The part of curves of the whole shot."""
-        return Curves(*(part[self.rows] for part in (curves.angles, curves.rates, curves.accelerations)))
+        return Curves(tuple(part[self.rows] for part in curves.derivatives))
 
     def intended_of(self, intended: IntendedMotion) -> IntendedMotion:
         """The part of an intended motion of the whole shot."""
@@ -82,8 +82,8 @@ def offset_curves(offsets: Array, grid: TimeGrid) -> Curves:
         grid: Of the shot.
     """
     if not offsets.shape[1] or not np.any(offsets):
-        return Curves(*[np.zeros((len(grid.times), offsets.shape[1]))] * 3)
-    return Curves(*over_grid(grid, _sampling(offsets, grid)))
+        return Curves.zero(len(grid.times), offsets.shape[1])
+    return Curves(over_grid(grid, _sampling(offsets, grid)))
 
 
 def offsets_in(part: Part, offsets: Array, grid: TimeGrid) -> Curves:
@@ -95,11 +95,11 @@ def offsets_in(part: Part, offsets: Array, grid: TimeGrid) -> Curves:
     """
     times = grid.times[part.rows]
     if not offsets.shape[1] or not np.any(offsets):
-        return Curves(*[np.zeros((len(times), offsets.shape[1]))] * 3)
+        return Curves.zero(len(times), offsets.shape[1])
     sample = _sampling(offsets, grid)
     if not part.first:  # with a pre-roll, perhaps
-        return Curves(*over_grid(part.prepared.grid, sample))
-    return Curves(*(sample(times, order) for order in range(3)))
+        return Curves(over_grid(part.prepared.grid, sample))
+    return Curves(tuple(sample(after_knots(times, order, grid.h), order) for order in range(ORDERS)))
 
 
 def _sampling(offsets: Array, grid: TimeGrid) -> Callable[[Array, int], Array]:
@@ -111,13 +111,6 @@ def _sampling(offsets: Array, grid: TimeGrid) -> Callable[[Array, int], Array]:
         return np.asarray(spline(np.clip(times, 0.0, end), order))
 
     return sample
-
-
-def added(curves: Curves, offsets: Curves) -> Curves:
-    """Curves with offsets."""
-    return Curves(
-        curves.angles + offsets.angles, curves.rates + offsets.rates, curves.accelerations + offsets.accelerations
-    )
 
 
 def performed(part: Part, curves: Curves, beginning: Beginning | None) -> ForwardRun:

@@ -21,7 +21,7 @@ from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.search import RetargetSearch
 from calmotion.retargeting.solver.gauss_newton import Search
 from calmotion.retargeting.windows.continued import Beginning, ContinuedSimulator
-from calmotion.retargeting.windows.parts import Part, added
+from calmotion.retargeting.windows.parts import Part
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
 from calmotion.simulation.motor_limits import motor_bounds
@@ -151,7 +151,7 @@ def _posed(
     there = BaseOffsets(base.angles, base.accelerations, grid.h) if np.any(base.angles) else None
     objective = Objective.over(model, part.intended_of(intended), grid, prepared.shot.animation.weights)
     problem = RetargetProblem(
-        model, grid, added(part.curves_of(curves), base), objective,
+        model, grid, part.curves_of(curves).plus(base.derivatives), objective,
         OffsetSpace(basis, motors, coupling, smoothness, closeness_of(character), there), prepared.world,
         LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None,
     )  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model.animation import Track
 from calmotion.model.curves import curve_of, held_curve
-from calmotion.simulation.inputs.time_grid import TimeGrid, over_grid
+from calmotion.simulation.inputs.time_grid import ORDERS, TimeGrid, over_grid
 
 PRE_ROLL = 1.0
 AT_REST = 1e-3  # share of the shot's fastest motor below which a start counts as being at rest
@@ -18,19 +18,45 @@ AT_REST = 1e-3  # share of the shot's fastest motor below which a start counts a
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Motor curves at the instants: angles [rad], rates [rad/s], accelerations [rad/s^2], shape [T, M] each."""
+    """Motor curves at the instants.
 
-    angles: Array
-    rates: Array
-    accelerations: Array
+    Attributes:
+        derivatives: Values [rad or m] and their first `ORDERS` - 1 derivatives by time, shape [T, M] each.
+    """
+
+    derivatives: tuple[Array, ...]
+
+    @property
+    def angles(self) -> Array:
+        """Values [rad or m]."""
+        return self.derivatives[0]
+
+    @property
+    def rates(self) -> Array:
+        """[rad/s or m/s]."""
+        return self.derivatives[1]
+
+    @property
+    def accelerations(self) -> Array:
+        """[rad/s^2 or m/s^2]."""
+        return self.derivatives[2]
+
+    def plus(self, others: Sequence[Array]) -> Curves:
+        """The sum with the derivatives of other curves."""
+        return Curves(tuple(own + other for own, other in zip(self.derivatives, others, strict=True)))
+
+    @classmethod
+    def zero(cls, instants: int, motors: int) -> Curves:
+        """Curves that are always zero."""
+        return cls((np.zeros((instants, motors)),) * ORDERS)
 
 
 def sample_curves(tracks: Sequence[Track], grid: TimeGrid) -> Curves:
     """Tracks at the grid's instants, pre-roll included."""
     if not tracks:
-        return Curves(*[np.zeros((len(grid.times), 0))] * 3)
+        return Curves.zero(len(grid.times), 0)
     columns = [over_grid(grid, curve_of(track, grid.end, grid.cyclic)) for track in tracks]
-    return Curves(*(np.stack(parts, axis=1) for parts in zip(*columns, strict=True)))
+    return Curves(tuple(np.stack(parts, axis=1) for parts in zip(*columns, strict=True)))
 
 
 def sample_tracks(tracks: Sequence[Track], grid: TimeGrid) -> tuple[Array, Array]:

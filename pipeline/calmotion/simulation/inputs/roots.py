@@ -66,7 +66,7 @@ def _eased_rotation(frame: MovingFrame, grid: TimeGrid) -> tuple[Rotation, Array
     if not pre:
         return rotation, spin
     # rotation vectors from the first pose, by the quintic of `over_grid`: at 0 their rates are the angular velocity's
-    value, rate, _ = pre_roll_weights(times[:pre], grid.pre_roll)
+    value, rate = pre_roll_weights(times[:pre], grid.pre_roll)[:2]
     start = rotation[0]
     turn_rates = np.stack([np.zeros(3), spin[0], turning(0.0, 2) if first <= 0.0 else np.zeros(3)])
     theta, slope = value @ turn_rates, rate @ turn_rates

@@ -14,7 +14,7 @@ from calmotion.arrays import Array, BoolArray
 from calmotion.errors import ShotError
 from calmotion.model.run import SHAPERS
 from calmotion.simulation.inputs.curves import Curves
-from calmotion.simulation.inputs.time_grid import TimeGrid
+from calmotion.simulation.inputs.time_grid import ORDERS, TimeGrid
 
 LONGEST_DELAY = 0.6  # that is looked for [s]
 CUTOFF = 0.5  # of the low-pass filter, over the lowest frequency, where nobody says
@@ -81,7 +81,7 @@ def shaped(
         for late, amplitude in zip(*impulses(kind, frequencies, damping), strict=True):
             angles += amplitude * source(np.maximum(times - late, times[0]))
     spline = CubicSpline(times, angles)
-    return Curves(angles, spline(times, 1), spline(times, 2))
+    return Curves((angles, *(spline(times, order) for order in range(1, ORDERS))))
 
 
 def best_delay(positions: Array, intended: Array, judged: BoolArray | slice, h: float) -> tuple[float, Array]:

@@ -6,11 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 
 from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.model.curves import Sample
 
 MAX_STEP = 1.0 / 480.0
+ORDERS = 4  # a curve and its first three derivatives
+AFTER = 1e-6  # of a step, by which rounding does not move a time behind a knot
+_QUINTIC = np.array([[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [-0.5, 0.0, 0.0, 1.0, -0.5, 0.0], [0.0, 0.0, 0.0, 0.5, -1.0, 0.5]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,36 +91,36 @@ def make_grid(frame_times: Array, step: float | None, pre_roll: float, cyclic: b
     return TimeGrid(frame_times, substeps, 1 if cyclic else math.ceil(pre_roll / h - 1e-9), h, cyclic)
 
 
-def over_grid(grid: TimeGrid, sample: Sample) -> tuple[Array, Array, Array]:
-    """Values, rates and accelerations of a curve at all instants, pre-roll included, shape [T, ...] each.
+def over_grid(grid: TimeGrid, sample: Sample) -> tuple[Array, ...]:
+    """A curve and its first derivatives by time at all instants, pre-roll included, `ORDERS` of shape [T, ...].
 
     Args:
         sample: The curve over the shot; over all times where the shot loops.
     """
     pre, times = 0 if grid.cyclic else grid.pre_steps, grid.times
-    parts = [sample(times[pre:], order) for order in range(3)]
+    parts = [sample(after_knots(times[pre:], order, grid.h), order) for order in range(ORDERS)]
     if pre:
-        meet = np.stack([part[0] for part in parts])
+        meet = np.stack([part[0] for part in parts[:3]])
         weights = pre_roll_weights(times[:pre], grid.pre_roll)
         parts = [np.concatenate([np.tensordot(rows, meet, 1), part]) for rows, part in zip(weights, parts, strict=True)]
-    return parts[0], parts[1], parts[2]
+    return tuple(parts)
 
 
-def pre_roll_weights(times: Array, length: float) -> tuple[Array, Array, Array]:
-    """Values, rates and accelerations at times in [-length, 0) of the quintic that leaves rest and meets the curve
-    at 0 in value, rate and acceleration; columns multiply these three. It starts half a rate times length back,
+def after_knots(times: Array, order: int, h: float) -> Array:
+    """Times at which to sample a derivative: the third one of a cubic jumps at knots, and counts as it is after them.
+
+    Args:
+        times: On a grid of step h [s], some of them on knots but for rounding.
+    """
+    return times + AFTER * h if order > 2 else times
+
+
+def pre_roll_weights(times: Array, length: float) -> tuple[Array, ...]:
+    """The quintic that leaves rest and meets a curve at 0 in value, rate and acceleration, and its first derivatives,
+    `ORDERS` in all, at times in [-length, 0); columns multiply these three. It starts half a rate times length back,
     where a constant acceleration would."""
     s = (times + length) / length
-    start = 1 - 10 * s**3 + 15 * s**4 - 6 * s**5
-    rate_end = -4 * s**3 + 7 * s**4 - 3 * s**5
-    acceleration_end = 0.5 * s**3 - s**4 + 0.5 * s**5
-    value = np.stack([np.ones_like(s), length * (rate_end - 0.5 * start), length**2 * acceleration_end], axis=1)
-    d_start = (-30 * s**2 + 60 * s**3 - 30 * s**4) / length
-    d_rate = (-12 * s**2 + 28 * s**3 - 15 * s**4) / length
-    d_acceleration = (1.5 * s**2 - 4 * s**3 + 2.5 * s**4) / length
-    rate = np.stack([np.zeros_like(s), length * (d_rate - 0.5 * d_start), length**2 * d_acceleration], axis=1)
-    dd_start = -60 * s + 180 * s**2 - 120 * s**3
-    dd_rate = -24 * s + 84 * s**2 - 60 * s**3
-    dd_acceleration = 3 * s - 12 * s**2 + 10 * s**3
-    bend = np.stack([np.zeros_like(s), (dd_rate - 0.5 * dd_start) / length, dd_acceleration], axis=1)
-    return value, rate, bend
+    return tuple(
+        np.stack([length ** (k - order) * polyval(s, polyder(part, order)) for k, part in enumerate(_QUINTIC)], axis=1)
+        for order in range(ORDERS)
+    )

@@ -26,6 +26,7 @@ def test_limits_are_si_and_the_smaller_torque_counts(tmp_path):
         prim.AddAppliedSchema("CalmMotorAPI")
         set_float(stage, ELBOW, "calm:motor:maxVelocity", 180.0)
         set_float(stage, ELBOW, "calm:motor:maxAcceleration", 90.0)
+        set_float(stage, ELBOW, "calm:motor:maxJerk", 45.0)
         set_float(stage, ELBOW, "calm:motor:maxTorque", 3e7)  # 3 N m in g cm^2/s^2
         prim.CreateAttribute("calm:motor:optimize", Sdf.ValueTypeNames.Bool).Set(False)
         UsdPhysics.DriveAPI(prim, "angular").CreateMaxForceAttr(2e7)
@@ -35,6 +36,7 @@ def test_limits_are_si_and_the_smaller_torque_counts(tmp_path):
     assert elbow.path == ELBOW and elbow.attribute == TARGET_POSITION
     assert character.joints[elbow.joint].path == ELBOW
     assert elbow.max_velocity == pytest.approx(np.pi) and elbow.max_acceleration == pytest.approx(np.pi / 2)
+    assert elbow.max_jerk == pytest.approx(np.pi / 4)
     assert elbow.max_torque == pytest.approx(2.0) and not elbow.optimize
     assert shoulder.optimize and np.isinf([shoulder.max_velocity, shoulder.max_torque]).all()
 

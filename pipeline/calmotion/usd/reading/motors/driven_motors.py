@@ -231,6 +231,7 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
         optimize=may_change(prim),
         max_velocity=velocity_limit(drive.joint, reading.units, reading.notes, kind),
         max_acceleration=float(from_stage(calmotion_limit(prim, "calm:motor:maxAcceleration"))),
+        max_jerk=float(from_stage(calmotion_limit(prim, "calm:motor:maxJerk"))),
         max_torque=effort_limit(drive.joint, reading.units, reading.notes, kind, newton, mujoco),
         linear=linear,
         follows=None if gear is None else Follows(motors[gear.leader], gear.ratio, gear.offset),

@@ -1,0 +1,1 @@
+"""What motors may not exceed: one module for each kind of limit."""

@@ -1,0 +1,43 @@
+"""How far motors go within their limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, eq=False)
+class LimitUse:
+    """How far a motor goes within one of its limits, and what the limit costs.
+
+    Attributes:
+        motor: Motor index.
+        quantity: Name of the kind of limit.
+        limit: In SI.
+        before, after: The value of the input and of the result that comes closest to the limit or exceeds it most.
+        time_s: When, in the result [s].
+        excess: (after - limit) over the size of the limit: positive where it is exceeded.
+        cost_m: By how much the root-mean-square error would fall without the limit; None where it does not bind.
+    """
+
+    motor: int
+    quantity: str
+    limit: float
+    before: float
+    after: float
+    time_s: float
+    excess: float
+    cost_m: float | None = None
+
+
+_REACHED = 1e-3  # of the size of a limit: what is nearer touches it
+_ROUNDING = 1e-6  # of the size of a limit
+
+
+def is_reached(limit: LimitUse) -> bool:
+    """Whether a motor goes up to a limit, or the limit costs something; not whether it merely has one."""
+    return limit.cost_m is not None or limit.excess > -_REACHED
+
+
+def is_exceeded(limit: LimitUse) -> bool:
+    """Whether a motor goes beyond a limit, by more than rounding."""
+    return limit.excess > _ROUNDING
