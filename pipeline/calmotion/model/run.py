@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from calmotion.model.budget import SEARCH_SHARE
@@ -13,7 +14,7 @@ class RunSettings:
     """What the user chose for simulations and searches; None leaves a choice to the shot or to the program.
 
     Attributes:
-        tolerance: Acceptable error at the targets [m].
+        tolerance: Accuracy of the simulation at the targets [m].
         step: Time step [s].
         pre_roll: Length of the pre-roll [s].
         integrator: Name of the integrator.
@@ -121,6 +122,7 @@ class Provenance:
         time_codes_per_second, frames_per_second, start_time_code, end_time_code: Of the stage.
         default_prim: Name of the default prim, or empty.
         earlier_layers: Layers of earlier results in the shot, which were muted to read the intended motion.
+        names: Of prims whose names USD does not allow, as converters encode them, to what the author of the file wrote.
     """
 
     shot: str
@@ -134,3 +136,4 @@ class Provenance:
     end_time_code: float
     default_prim: str
     earlier_layers: tuple[str, ...] = ()
+    names: Mapping[str, str] = field(default_factory=dict)

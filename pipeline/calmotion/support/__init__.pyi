@@ -16,6 +16,7 @@ from calmotion.support.interrupts import check as check
 from calmotion.support.memory import available_memory as available_memory
 from calmotion.support.memory import too_large as too_large
 from calmotion.support.naming import distinct_names as distinct_names
+from calmotion.support.naming import grouped_notes as grouped_notes
 from calmotion.support.naming import nearest as nearest
 from calmotion.support.reading import read_text as read_text
 from calmotion.support.reading import read_toml as read_toml

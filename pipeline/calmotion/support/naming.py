@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import posixpath
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+_PRIM_PATH = re.compile(r"(?<![\w.])/[A-Za-z_][\w./:]*\w")
+_ENCODED = re.compile(r"\btn__\w*")  # how converters to USD write a name that USD does not allow
+_LISTED = 3  # prims that a note names
 
 
 def distinct_names(paths: Sequence[str]) -> dict[str, str]:
@@ -47,3 +53,44 @@ def _like(found: str, names: Sequence[str], least: float = 0.6) -> str:
     by_case = {name.casefold(): name for name in reversed(names)}
     near = get_close_matches(found.casefold(), list(by_case), 1, least)
     return by_case[near[0]] if near else ""
+
+
+def as_written(text: str, names: Mapping[str, str]) -> str:
+    """A text with encoded names of prims (`tn__leftknee_uN9E`) as the author of the file wrote them (`left-knee`).
+
+    Args:
+        text: With names of prims, alone or in paths.
+        names: Encoded to written name.
+    """
+    return _ENCODED.sub(lambda found: names.get(found[0], found[0]), text) if names else text
+
+
+def grouped_notes(notes: Iterable[str]) -> tuple[str, ...]:
+    """The notes; those that differ in their prim paths alone are merged into one, which names a few prims and counts.
+
+    A note about a prim begins with its path and a colon.
+    """
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for note in notes:
+        place, colon, text = note.partition(": ")
+        if not (colon and place.startswith("/")):
+            place, text = "", note
+        groups.setdefault(f"{bool(place)}{_PRIM_PATH.sub('/', text)}", []).append((place, text))
+    return tuple(_merged(group) for group in groups.values())
+
+
+def _merged(group: Sequence[tuple[str, str]]) -> str:
+    places = list(dict.fromkeys(place for place, _ in group))
+    others = [place.rsplit("/", 1)[-1] for place in places[1:_LISTED]]
+    others += [f"{len(places) - _LISTED} more"] if len(places) > _LISTED else []
+    where = " and ".join(filter(None, [", ".join([places[0], *others[:-1]]), *others[-1:]]))
+    paths = [_PRIM_PATH.findall(text) for _, text in group]
+    common = iter(_common_path(same) for same in zip(*paths, strict=True))
+    text = _PRIM_PATH.sub(lambda _: next(common), group[0][1])
+    times = f" ({len(group)} times)" if len(group) > len(places) else ""
+    return f"{where}: {text}{times}" if where else text + times
+
+
+def _common_path(paths: Sequence[str]) -> str:
+    """A path that several have in common, with dots for what differs."""
+    return paths[0] if len(set(paths)) == 1 else f"{posixpath.commonpath(paths).rstrip('/')}/…"

@@ -146,6 +146,7 @@ def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]
         "system_damping_ratios": modes.damping[:SHOWN_MODES].tolist() if modes else [],
         "mode_shapes": list(shapes.paths) if (shapes := run.get(ModeShapes)) else [],
         "notes": list(character.notes),
+        "written_names": dict(provenance.names),
         "needs": [dataclasses.asdict(row) for row in choices.rows] if choices else [],
         "left_out": [left_out_row(row) for row in (*run.left_out(), *_without(choices, reduced, run.get(PlannedStep)))],
         "operators": [operator_row(row) for row in run.results],

@@ -10,7 +10,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.host import OperatorResult, Run
-from calmotion.model import Character, LimitUse, Result, Simplification, Simulation
+from calmotion.model import Character, LimitUse, ModelChoices, Provenance, Result, Simplification, Simulation
 from calmotion.model.budget import Verdict, verdict_on
 from calmotion.model.character import motors_give
 from calmotion.model.limits.kinds import kinds_of_limits
@@ -44,6 +44,7 @@ def target_errors(character: Character, simulation: Simulation, suffix: str) -> 
     return [
         {
             "path": target.path,
+            "position_weight": target.position_weight,
             "rotation_weight": target.rotation_weight,
             f"max_error{suffix}_m": float(position[0][k]),
             f"rms_error{suffix}_m": float(position[1][k]),
@@ -111,6 +112,37 @@ def still_targets(character: Character, result: Result) -> list[str]:
     ]
 
 
+def remaining_errors(character: Character, result: Result) -> list[dict[str, Any]]:
+    """The targets that the curves found leave farther off than the tolerance, and why.
+
+    Args:
+        character: With the motors that move no target marked as idle.
+        result: Of `optimize`.
+
+    Returns:
+        Rows with `path`, `max_error_m`, the number of `motors` that could change, the `directions` in which all targets
+        are followed, and `causes`: `limits` of motors that cost something, `search` that did not converge, `sag` where
+        half of the error is there at rest, `motors` where these are fewer than the directions, `weight` where other
+        targets count more, and `reach` where none of these holds, so that these motors can do no better.
+    """
+    if result.after is None:
+        return []
+    errors = result.after.position_errors
+    largest = np.max(errors[result.after.motion.judged], axis=0, initial=0.0)
+    motors = sum(motor.optimize and not motor.idle and motor.follows is None for motor in character.motors)
+    weights = [target.position_weight for target in character.targets]
+    directions = 3 * sum((t.position_weight > 0.0) + (t.rotation_weight > 0.0) for t in character.targets)
+    common = ["limits"] * any(limit.cost_m is not None for limit in result.limits)
+    common += ["search"] * (result.stopped not in ("", "converged"))
+    rows = []
+    for k in np.flatnonzero(largest > result.tolerance_m):
+        causes = [*common, *["sag"] * bool(errors[0, k] >= 0.5 * largest[k])]
+        causes += ["motors"] * (motors < directions) + ["weight"] * (0.0 < weights[k] < max(weights))
+        row = {"path": character.targets[k].path, "max_error_m": float(largest[k]), "causes": causes or ["reach"]}
+        rows.append(row | {"motors": motors, "directions": directions})
+    return rows
+
+
 def operator_row(result: OperatorResult) -> dict[str, Any]:
     """The outcome of an operator."""
     return {
@@ -125,7 +157,7 @@ def operator_row(result: OperatorResult) -> dict[str, Any]:
 
 def run_report(run: Run, character: Character, result: Result, command: str, total_wall_s: float) -> dict[str, Any]:
     """Everything about a finished `simulate` or `optimize`."""
-    final = result.after or result.before
+    final, choices, provenance = result.after or result.before, run.get(ModelChoices), run.get(Provenance)
     report: dict[str, Any] = {"command": command, "version": __version__}
     report |= _optimized(character, result) if result.after else _simulated(character, result)
     report |= {
@@ -150,6 +182,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "error_shares": _error_shares(character, result),
         "lost_motion": lost_motion(character, result),
         "still_targets": still_targets(character, result),
+        "remaining_errors": remaining_errors(choices.character if choices else character, result),
         "efforts": effort_rows(character, result),
         "reactions": reaction_rows(character, final.motion),
         "contacts": contact_rows(character, final.motion),
@@ -170,6 +203,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "video": video.path if (video := run.get(Video)) else None,
         "left_out": [left_out_row(row) for row in (*run.left_out(), *result.left_out)],
         "notes": list(character.notes),
+        "written_names": dict(provenance.names) if provenance else {},
         "operators": [operator_row(row) for row in run.results],
     }
     return report

@@ -1,4 +1,4 @@
-"""The simplifications of a report: those that cost most, or all."""
+"""The simplifications of a report: a line, or all."""
 
 from __future__ import annotations
 
@@ -7,27 +7,28 @@ from typing import Any
 
 from rich.console import Console
 
-from calmotion.cli.quantities import about
+from calmotion.cli.quantities import about, counted
 from calmotion.cli.tables import say
-
-LISTED = 12  # rows that a report shows by itself; robots with many links have several for each of them
 
 
 def print_left_out(console: Console, rows: Sequence[dict[str, Any]], whole: bool = True) -> None:
-    """The simplifications, each with its reason and estimated error, and the steps that were not needed.
+    """The simplifications of the model.
 
     Args:
         console: Where they are printed.
         rows: Of `left_out`.
-        whole: Whether to print all of them, in the order of the report; otherwise of many those that cost most.
+        whole: Whether to print all of them, with their reasons and the steps that were not needed; otherwise a line.
     """
-    if not whole:
-        rows = sorted(rows, key=lambda row: -(row["estimated_error_m"] or 0.0))
-    shown = rows if whole else rows[:LISTED]
-    for row in shown:
-        error = row["estimated_error_m"]
-        cost = "" if error is None else f"; estimated error {about(error)}"
-        kind = "skipped" if row["skipped"] else "simplified"
-        say(console, f"{kind}: {row['what']} ({row['why']}){cost}")
-    if len(rows) > len(shown):
-        say(console, f"and {len(rows) - len(shown)} more, which cost less: --verbose lists all")
+    if whole:
+        for row in rows:
+            error = row["estimated_error_m"]
+            cost = "" if error is None else f"; estimated error {about(error)}"
+            kind = "skipped" if row["skipped"] else "simplified"
+            say(console, f"{kind}: {row['what']} ({row['why']}){cost}")
+        return
+    made = [row for row in rows if not row["skipped"]]
+    if made:
+        largest = max(made, key=lambda row: row["estimated_error_m"] or 0.0)
+        error = largest["estimated_error_m"]
+        cost = f"; the largest error, about {about(error)}, has: {largest['what']}" if error else ""
+        say(console, f"simplified: the model, in {counted(len(made), 'way')}{cost}. --verbose lists all")

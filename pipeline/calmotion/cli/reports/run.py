@@ -9,25 +9,36 @@ from typing import Any
 
 from rich.console import Console
 
-from calmotion.cli.quantities import about, angle, length
+from calmotion.cli.quantities import about, angle, counted, length
 from calmotion.cli.reports.feet import print_contacts, print_support
 from calmotion.cli.reports.left_out import print_left_out
 from calmotion.cli.reports.limits import print_limits, print_reason
 from calmotion.cli.tables import print_table, say
 from calmotion.model.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
+from calmotion.support.naming import distinct_names
 
 # What helps where an entry of the error budget is too large.
 _SENSITIVE = "With large deflections, or near buckling, small errors grow: use a stiffer robot or a slower motion."
 REMEDIES = {
     MESH: "Use smaller elements: calm:flexible:elementSize of the body, or --set fe.mesh.element_size=LENGTH.",
     PATCHES: "Name the faces that joints hold: a GeomSubset of family calmInterface (docs/reading_usd.md).",
-    STEP: f"Use a shorter --step, or none. {_SENSITIVE}",
+    STEP: f"Use a --step shorter than {{step}}. {_SENSITIVE}",
     REDUCTION: f"Remove calm:flexible:modeCount and calm:flexible:elasticity, or use a larger tolerance. {_SENSITIVE}",
     SUBSPACE: f"Use --keep directions. {_SENSITIVE}",
     CHOICES: "Use --keep all.",
     MEASURED: _SENSITIVE,
 }
 NOTHING_SHAKES = "nothing shakes: all bodies are rigid and all motors ideal"
+HEADLINES, MOTORS = 3, 6  # targets, and motors, that have a place in a sentence
+CAUSES = {
+    "limits": "limits of motors hold it (see the table of limits)",
+    "search": "the search ended early (see below)",
+    "sag": "gravity alone causes half of it, already at rest",
+    "motors": "{motors} motors cannot follow {directions} directions of targets at once, and the weights of the targets "
+    "decide (CalmTargetAPI)",
+    "weight": "other targets have a larger weight",
+    "reach": "these motors cannot take away more, and the search has converged",
+}
 COARSE_EFFORT = 0.05  # of the largest effort of a motor, from which on its error is told
 IDLE_EFFORT = 0.01  # of that of the strongest motor
 
@@ -41,8 +52,8 @@ def print_notes(console: Console, notes: Sequence[str]) -> None:
 def print_shares(console: Console, shares: Sequence[dict[str, Any]]) -> None:
     """The parts of motors that give and of flexible links in the error of the input."""
     rows = [[row["path"], length(row["motors_m"]), length(row["links_m"])] for row in shares]
-    title = "Causes of the input's error (max)"
-    print_table(console, title, ["target", "motors alone", "links alone"], rows)
+    heads = ["target", "motors that give", "links that bend"]
+    print_table(console, "Largest error as animated, by its cause alone", heads, rows)
 
 
 def print_lost_motion(console: Console, lost: dict[str, Any] | None, suffix: str) -> None:
@@ -77,10 +88,13 @@ def print_joint_gap(console: Console, gap: float) -> None:
         say(console, f"joints come apart by up to {length(gap)}")
 
 
-def print_efforts(console: Console, efforts: Sequence[dict[str, Any]]) -> None:
+def print_efforts(console: Console, efforts: Sequence[dict[str, Any]], step: float) -> None:
     """The motor whose efforts depend most on the time step, where that is more than a little.
 
     A motor that hardly works among the others, such as one that turns a cup, does not count.
+
+    Args:
+        step: The time step [s].
     """
     known = [row for row in efforts if row["estimated_error"] is not None and row["largest"] > 0.0]
     strongest: dict[str, float] = {}
@@ -90,45 +104,83 @@ def print_efforts(console: Console, efforts: Sequence[dict[str, Any]]) -> None:
     worst = max(known, key=lambda row: row["estimated_error"] / row["largest"], default=None)
     if worst and worst["estimated_error"] >= COARSE_EFFORT * worst["largest"]:
         error, largest = (f"{worst[key]:.3g} {worst['unit']}" for key in ("estimated_error", "largest"))
-        said = f"depend on the time step: {worst['path']} by {error} of at most {largest}"
-        say(console, f"the efforts of motors {said}. Use a shorter --step where they matter.")
+        said = f"efforts of motors are less accurate than positions: that of {worst['path']}, at most {largest}, by {error}"
+        say(console, f"{said}. Where efforts matter, use a --step shorter than {1000 * step:.3g} ms.")
+
+
+def main_target_first(report: dict[str, Any]) -> list[dict[str, Any]]:
+    """The targets, those of the largest weight first, and of these the one that the animation leaves farthest off."""
+    before = f"max_error{'_before' if _last(report) else ''}_m"
+    return sorted(report["targets"], key=lambda row: (-row["position_weight"], -row[before]))
 
 
 def print_verdict(console: Console, report: dict[str, Any]) -> None:
-    """Before and after, and whether the simulation keeps the tolerance."""
-    worst = max(report["targets"], key=lambda target: target[f"max_error{_last(report)}_m"], default=None)
-    if worst is not None and "objective_after" in report:
-        before = max(target["max_error_before_m"] for target in report["targets"])
-        after = worst["max_error_after_m"]
-        now = f"{length(after)} (at {worst['path']})"
-        if length(after) == length(before):
-            say(console, f"The largest error stays at {now}.")
-        else:
-            say(console, f"The largest error {'falls' if after < before else 'rises'} from {length(before)} to {now}.")
-        print_reason(console, report)
-    elif worst is not None:
-        shaper, motion = report.get("shaper"), "As animated"
+    """The largest error of each target, before and after, and whether the simulation keeps the tolerance."""
+    rows = main_target_first(report)
+    if _is_still(report):
+        say(console, f"{NOTHING_SHAKES[:1].upper()}{NOTHING_SHAKES[1:]}.")
+    elif _last(report):
+        if report["improved"] is False:
+            say(console, "The new curves are worse than the animation.")
+        for row in rows[:HEADLINES]:
+            before, after = (length(row[f"max_error_{when}_m"]) for when in ("before", "after"))
+            falls = row["max_error_after_m"] < row["max_error_before_m"]
+            change = f"{'falls' if falls else 'rises'} from {before} to {after}"
+            say(console, f"{row['path']}: the largest error {f'stays at {after}' if before == after else change}.")
+    else:
+        shaper, motion = report.get("shaper"), "as animated"
         if shaper:
-            motion = "With the low-pass filter" if shaper == "lowpass" else f"With the shaper {shaper}"
-        say(console, f"{motion}, the largest error is {length(worst['max_error_m'])} (at {worst['path']}).")
+            motion = "with the low-pass filter" if shaper == "lowpass" else f"with the shaper {shaper}"
+        for row in rows[:HEADLINES]:
+            say(console, f"{row['path']}: the largest error {motion} is {length(row['max_error_m'])}.")
         if shaper and report["shaper_delay_s"] > 0.0:
             late, without = f"{report['shaper_delay_s']:.3f} s", length(report["delayed_max_error_m"])
             say(console, f"It delays the motion by {late}; without this delay the largest error is {without}.")
+    if len(rows) > HEADLINES and not _is_still(report):
+        say(console, f"The table has {counted(len(rows) - HEADLINES, 'more target')}.")
+    if _last(report):
+        print_reason(console, report)
+    _print_accuracy(console, report)
+
+
+def _print_accuracy(console: Console, report: dict[str, Any]) -> None:
+    """Whether the simulation keeps the tolerance, and what helps where it does not."""
     tolerance = length(report["tolerance_m"])
     if report["tolerance_kept"]:
         error = about(report["simulation_error_m"])
-        which = "the errors after" if _last(report) else "these numbers"
-        say(console, f"The simulation keeps the tolerance of {tolerance}: {which} are accurate to {error}.")
+        which = "errors after the optimisation" if _last(report) else "these errors"
+        say(console, f"The simulation is as accurate as requested: {which} are within {error} (tolerance {tolerance}).")
     elif report["simulation_error_m"] is None:
-        say(console, f"The error of the simulation was not estimated; the tolerance is {tolerance}.")
+        say(console, f"The accuracy of the simulation was not estimated (tolerance {tolerance}).")
     else:
-        source = report["tolerance_missed_by"]
-        error = about(report["simulation_error_m"])
-        say(
-            console,
-            f"The simulation does not keep the tolerance of {tolerance}: error {error}, mostly of the {source}. "
-            f"{REMEDIES[source]}",
-        )
+        source, error = report["tolerance_missed_by"], about(report["simulation_error_m"])
+        cause = f"its own error is about {error}, mostly from the {source}"
+        remedy = REMEDIES[source].format(step=f"{1000 * report['step_s']:.3g} ms")
+        say(console, f"The simulation is less accurate than the tolerance of {tolerance}: {cause}. {remedy}")
+
+
+def print_remaining(console: Console, report: dict[str, Any]) -> None:
+    """How far the motor curves changed, and why errors remain that are larger than the tolerance."""
+    if not _last(report):
+        return
+    offsets = {
+        row["path"]: angle(row["max_offset_rad"]) if "max_offset_rad" in row else length(row["max_offset_m"])
+        for row in sorted(report["motors"], key=lambda row: -max(row.get("max_offset_rad", 0), row.get("max_offset_m", 0)))
+        if row["changed"]
+    }
+    if offsets:
+        names = distinct_names([row["path"] for row in report["motors"]])
+        told = [f"{names[path]} {far}" for path, far in list(offsets.items())[:MOTORS]]
+        told += [f"{len(offsets) - MOTORS} more by less"] if len(offsets) > MOTORS else []
+        say(console, f"Motor curves change by up to: {', '.join(told)}.")
+    for row in report["remaining_errors"][:HEADLINES]:
+        causes = " and ".join(CAUSES[cause].format(**row) for cause in row["causes"])
+        say(console, f"{row['path']} keeps an error of {length(row['max_error_m'])}: {causes}.")
+
+
+def _is_still(report: dict[str, Any]) -> bool:
+    """Whether nothing can shake, and nothing is off."""
+    return not report["can_shake"] and not _shakes(report)
 
 
 def print_budget(console: Console, report: dict[str, Any]) -> None:
@@ -199,6 +251,7 @@ def print_run(report: dict[str, Any], console: Console, verbose: bool = False) -
     """
     print_verdict(console, report)
     print_errors(console, report, verbose)
+    print_remaining(console, report)
     print_robustness(console, report)
     print_files(console, report)
     print_warnings(console, report)
@@ -221,7 +274,7 @@ def print_errors(console: Console, report: dict[str, Any], verbose: bool = False
     for title, unit, shown in (("Position", "m", length), ("Rotation", "rad", angle)):
         name = "error" if unit == "m" else "rotation_error"
         keys = [f"{kind}_{name}{suffix}_{unit}" for kind in ("max", "rms") for suffix in suffixes]
-        targets = [t for t in report["targets"] if verbose or unit == "m" or t["rotation_weight"] > 0.0]
+        targets = [t for t in main_target_first(report) if verbose or unit == "m" or t["rotation_weight"] > 0.0]
         rows = [[target["path"], *(shown(target[key]) for key in keys)] for target in targets]
         print_table(console, f"{title} error of the targets", ["target", *heads], rows)
 
@@ -240,17 +293,15 @@ def print_files(console: Console, report: dict[str, Any]) -> None:
         say(console, f"next: open {report['root_layer']}, which shows the shot with {shown_with}")
     if report["rrd"]:
         say(console, f"next: rerun {report['rrd']}")
-    shakes = _shakes(report)
-    if not report["can_shake"] and not shakes:
-        say(console, NOTHING_SHAKES)
+    if _is_still(report):
         say(console, "next: apply CalmFlexibleBodyAPI to links that bend")
     elif not _last(report):
         command = f"calmotion optimize {shlex.quote(report['shot'])} -o LAYER"
-        if shakes:
+        if _shakes(report):
             say(console, f"next: {command} removes the shake")
         else:
-            done = "no target is off by more than the tolerance"
-            say(console, f"next: {done}; {command} --tolerance LENGTH calms the rest")
+            done = f"every error is below the accuracy of the simulation ({length(report['tolerance_m'])})"
+            say(console, f"next: {done}; {command} --tolerance LENGTH, with a smaller length, removes more")
     if not any(report[name] for name in ("layer", "rrd", "video")):
         say(console, "next: --rrd FILE records the motion for the rerun viewer, --video FILE makes a video of it")
 
@@ -276,8 +327,8 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
     if suffix and report["stopped"] not in ("converged", ""):
         gain, left = report["expected_further_gain_m"], max(t["max_error_after_m"] for t in report["targets"])
         # far from the limits, a step of the search promises more than there is
-        more = f", {about(gain)} expected gain of one more iteration" if gain is not None and gain < left else ""
-        say(console, f"stopped: {report['stopped']}{more}")
+        more = f"; one more iteration may take away {about(gain)}" if gain is not None and gain < left else ""
+        say(console, f"the search ended early: {report['stopped']}{more}")
     for path in report["still_targets"]:
         say(console, f"target {path} does not move, so that it shows no shake: choose a point of a link that moves")
     print_shares(console, report["error_shares"])
@@ -286,7 +337,7 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
     sags = {target["path"]: target[f"sag{suffix}_m"] or 0.0 for target in report["targets"]}
     hanging = max(sags, key=sags.__getitem__, default="")
     if hanging and sags[hanging] > 1e-6:
-        say(console, f"at rest, gravity moves {hanging} by {about(sags[hanging])} (sag)")
+        say(console, f"gravity alone moves {hanging} by {about(sags[hanging])} at rest (sag)")
     seams = [target[f"seam{suffix}_m"] for target in report["targets"]]
     if seams and seams[0] is not None:
         say(console, f"largest distance of a target between start and end of a cycle: {length(max(seams))}")
@@ -301,7 +352,7 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
     if report["refined_steps"]:
         say(console, f"{report['refined_steps']} steps were divided into smaller ones: try a smaller --step")
     print_joint_gap(console, report["max_joint_gap_m"])
-    print_efforts(console, report["efforts"])
+    print_efforts(console, report["efforts"], report["step_s"])
     print_support(console, report["reactions"])
     print_contacts(console, report["contacts"])
 

@@ -12,6 +12,7 @@ import numpy as np
 from calmotion.errors import ShotError, raise_all
 from calmotion.model import Body, Character, Joint, MassProperties, RetargetSettings
 from calmotion.model.motor import PRESCRIBED
+from calmotion.support.naming import grouped_notes
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import scene, targets, topology
 from calmotion.usd.reading.actuators.motor_models import motor_model
@@ -29,7 +30,7 @@ from calmotion.usd.reading.bodies.part_materials import with_parts
 from calmotion.usd.reading.bodies.scenery import scenery_of
 from calmotion.usd.reading.bodies.shapes import note_unread_shape, shapes_of, tets_of
 from calmotion.usd.reading.bodies.unused_physics import tell_what_is_not_used
-from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims_of
+from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
 from calmotion.usd.reading.generic_joints.chains import Between, expanded
 from calmotion.usd.reading.joints import (
     JointPrim,
@@ -203,7 +204,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         scenery=scenery_of(reading, bodies),
     )
     warn_of_units(reading, root, character, tuple(fixed))
-    return replace(character, notes=grouped(reading.notes))
+    return replace(character, notes=grouped_notes(reading.notes))
 
 
 def _body(reading: Reading, path: str, pose: Pose, joints: list[str], fixed: bool) -> Body:

@@ -92,22 +92,6 @@ class Reading:
         return pose_from_matrix(self.world_matrix(prim), str(prim.GetPath()))
 
 
-def grouped(notes: list[str]) -> tuple[str, ...]:
-    """The notes; equal notes about several prims are merged into one."""
-    groups: dict[str, list[str]] = {}
-    for note in notes:
-        place, colon, text = note.partition(": ")
-        groups.setdefault(text if colon and place.startswith("/") else note, []).append(place)
-    merged = []
-    for text, places in groups.items():
-        if text.startswith(places[0]) and len(places) == 1:
-            merged.append(text)
-        else:
-            others = f" and {len(places) - 1} other{'s' * (len(places) > 2)}" if len(places) > 1 else ""
-            merged.append(f"{places[0]}{others}: {text}")
-    return tuple(merged)
-
-
 def prims_of(stage: Usd.Stage) -> Iterator[Usd.Prim]:
     """Every prim of a stage in depth-first order, those inside instances too."""
     from pxr import Usd

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 from calmotion.model import InputLayer, Provenance
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
+from calmotion.usd.reading.context import prims_of
 from calmotion.usd.units import units_of
 
 if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
+_ENCODED = "tn__"  # prefix of names that USD's converters encode (Bootstring)
 _PACKAGE = ".usdz"
 
 
@@ -41,7 +43,14 @@ def provenance_of(path: str, stage: Usd.Stage, clock: Clock, earlier: tuple[str,
         end_time_code=clock.end,
         default_prim=default.GetName() if default else "",
         earlier_layers=tuple(stages.display_name(layer, path) for layer in earlier),
+        names=_written_names(stage),
     )
+
+
+def _written_names(stage: Usd.Stage) -> dict[str, str]:
+    """Names of prims that converters had to encode, to the names that their files have."""
+    encoded = (prim for prim in prims_of(stage) if prim.GetName().startswith(_ENCODED))
+    return {prim.GetName(): prim.GetDisplayName() for prim in encoded if prim.GetDisplayName()}
 
 
 def notes_of_results(composed: Usd.Stage, path: str, earlier: Sequence[str], inputs: Sequence[InputLayer]) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from calmotion.errors import raise_all
 from calmotion.model import Animation, Character, MotorTracks, MovingFrame, Provenance, Track
+from calmotion.support.naming import as_written, grouped_notes
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock, clock_of, still_clock
 from calmotion.usd.diagnostics import quiet, with_places
@@ -19,7 +20,7 @@ from calmotion.usd.reading.animated.constants import hold_constants
 from calmotion.usd.reading.animated_transforms import carriers, codes_of
 from calmotion.usd.reading.bases.roots import moving_frames
 from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
-from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims_of
+from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
 from calmotion.usd.reading.joints import joint_prims
 from calmotion.usd.reading.motors.driven_motors import BODIES, CONSTANT, DRIVE, GIVEN, Drive, to_si
 from calmotion.usd.reading.motors.free_ranges import free_tracks
@@ -84,9 +85,10 @@ def read_shot(
         of_results = notes_of_results(composed, path, earlier, provenance.layers)
         weights = weight_tracks(part, character.targets, clock)
         free = free_tracks(part, character.motors, clock)
-        unread = grouped([error.message() for error in (*unread_attributes(part), *misplaced_schemas(part))])
+        unread = grouped_notes([error.message() for error in (*unread_attributes(part), *misplaced_schemas(part))])
     notes = (f"{place}: {message}" for place, message in with_places(messages, part, prims_of(part)))
-    character = dataclasses.replace(character, notes=(*character.notes, *of_results, *unread, *notes))
+    told = (*character.notes, *of_results, *unread, *notes)
+    character = dataclasses.replace(character, notes=tuple(as_written(note, provenance.names) for note in told))
     return character, Animation(clock.frame_times(), tracks, current, read.moving, weights, free), provenance
 
 
