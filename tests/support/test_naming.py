@@ -1,5 +1,5 @@
 import pytest
-from calmotion.support.naming import distinct_names, nearest
+from calmotion.support.naming import as_written, distinct_names, grouped_notes, nearest
 
 
 def test_paths_are_shortened_to_their_last_distinct_parts():
@@ -38,3 +38,24 @@ def test_nothing_is_suggested_where_no_name_is_like_it(found):
 
 def test_words_are_compared_without_case():
     assert nearest("Zvd", ["zv", "zvd"]) == "Did you mean zvd? "
+
+
+@pytest.mark.parametrize(
+    ("notes", "told"),
+    [
+        (["/a/b: it holds 3: still", "no scene: down", "/c: it holds 3: still", "/d: moves"],
+         ["/a/b and c: it holds 3: still", "no scene: down", "/d: moves"]),
+        ([f"/R/j{k}: its limit is that of /R/Physics/act{k} (MuJoCo)" for k in range(7)],
+         ["/R/j0, j1, j2 and 4 more: its limit is that of /R/Physics/… (MuJoCo)"]),
+        (["/a: removed an open sheet"] * 10, ["/a: removed an open sheet (10 times)"]),
+        (["ignored /a/x, a copy of /b"] * 2 + ["ignored /a/y, a copy of /b"], ["ignored /a/…, a copy of /b (3 times)"]),
+        ([f"/a{k}: still" for k in range(4)], ["/a0, a1, a2 and a3: still"]),
+    ],
+)  # fmt: skip
+def test_notes_that_differ_in_their_prims_alone_are_one(notes, told):
+    assert list(grouped_notes(notes)) == told
+
+
+def test_encoded_names_are_told_as_the_author_of_the_file_wrote_them():
+    names = {"tn__leftknee_uN9E": "left-knee"}
+    assert as_written("/R/tn__leftknee_uN9E/x of tn__other_a1", names) == "/R/left-knee/x of tn__other_a1"

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import calmotion as cm
+import numpy as np
 import pytest
-from calmotion.workflow.report import still_targets
+from calmotion.workflow.report import main_target, remaining_errors, still_targets
 from pxr import UsdGeom
 from small_shots import FORE, UPPER, make_target, write_arm
 
@@ -20,3 +23,20 @@ def test_a_target_at_the_hinge_of_a_link_that_nothing_moves_is_named(tmp_path, b
 
     found = cm.simulate(write_arm(tmp_path / "arm.usda", edit), step=1 / 120, pre_roll=0.0)
     assert still_targets(found.shot.character, found.result) == [path] * expected
+
+
+def test_the_main_target_and_the_causes_of_what_remains_follow_from_weights_motors_and_limits(tmp_path):
+    found = cm.optimize(write_arm(tmp_path / "arm.usda"), step=1 / 48, pre_roll=0.0)
+    character, result = found.shot.character, replace(found.result, tolerance_m=0.0, limits=(), stopped="converged")
+    (tip,) = character.targets
+    assert main_target(character, result) == tip.path
+    (row,) = remaining_errors(character, result)
+    assert row["path"] == tip.path and row["max_error_m"] == found.max_error
+    assert (row["directions"], row["motors"], row["causes"]) == (3, 2, ["motors"])
+    assert remaining_errors(character, replace(result, stopped="no further decrease"))[0]["causes"][0] == "search"
+    assert remaining_errors(character, replace(result, tolerance_m=1.0)) == []
+    assert remaining_errors(character, replace(result, after=None)) == []
+    light = replace(tip, path="/light", position_weight=0.5)
+    two = replace(character, targets=(light, tip))
+    errors = replace(result.before, position_errors=np.repeat(result.before.position_errors, 2, axis=1))
+    assert main_target(two, replace(result, before=errors)) == tip.path

@@ -129,8 +129,8 @@ def simulation_options(command: argparse.ArgumentParser, integrators: str) -> No
         "--tolerance",
         metavar="LENGTH",
         type=quantity("m", needs_unit=True, positive=True),
-        help="acceptable error at the targets, with a unit (1mm); time step, modes and simplifications follow from it "
-        "(default: that of the shot, or a thousandth of the reach of the character)",
+        help="accuracy of the simulation at the targets, with a unit (1mm); time step, modes and simplifications "
+        "follow from it (default: that of the shot, or a thousandth of the reach of the character)",
     )
     model.add_argument("--integrator", metavar="NAME", default=None, help=integrators)
     model.add_argument(

@@ -17,6 +17,7 @@ from calmotion.cli.tables import console_on, filled
 from calmotion.errors import ShotError, each, failure_of_machine
 from calmotion.host import Host
 from calmotion.support.memory import was_short
+from calmotion.support.naming import as_written
 from calmotion.workflow.json_values import plain
 from calmotion.workflow.problems import Problem, RunError
 
@@ -138,11 +139,21 @@ def conclude(
         output.object({**report, **({"error": errors[0], "errors": errors} if errors else {})})
         return
     if report and show:
-        show(dict(report), console_on(output.stream))
+        names = report.get("written_names", {})
+        show(_as_written(dict(report), names) if names else dict(report), console_on(output.stream))
     for problem in problems:
         if problem.traceback:
             print(problem.traceback, end="", file=sys.stderr)
         tell_error(problem.error)
+
+
+def _as_written(value: Any, names: Mapping[str, str]) -> Any:
+    """A value of a report, with the names of prims in it as the author of the file wrote them."""
+    if isinstance(value, str):
+        return as_written(value, names)
+    if isinstance(value, Mapping):
+        return {key: _as_written(inner, names) for key, inner in value.items()}
+    return [_as_written(inner, names) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def tell_failed_plugins(host: Host) -> None:

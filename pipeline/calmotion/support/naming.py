@@ -79,11 +79,17 @@ def grouped_notes(notes: Iterable[str]) -> tuple[str, ...]:
     return tuple(_merged(group) for group in groups.values())
 
 
+def listed(paths: Sequence[str]) -> str:
+    """Prim paths as a list for people: the first, the names of a few more, and how many others there are."""
+    shown = paths if len(paths) <= _LISTED + 1 else paths[:_LISTED]  # one more is no shorter than its name
+    others = [path.rsplit("/", 1)[-1] for path in shown[1:]]
+    others += [f"{len(paths) - len(shown)} more"] if len(paths) > len(shown) else []
+    return " and ".join([", ".join([paths[0], *others[:-1]]), *others[-1:]])
+
+
 def _merged(group: Sequence[tuple[str, str]]) -> str:
     places = list(dict.fromkeys(place for place, _ in group))
-    others = [place.rsplit("/", 1)[-1] for place in places[1:_LISTED]]
-    others += [f"{len(places) - _LISTED} more"] if len(places) > _LISTED else []
-    where = " and ".join(filter(None, [", ".join([places[0], *others[:-1]]), *others[-1:]]))
+    where = listed(places)
     paths = [_PRIM_PATH.findall(text) for _, text in group]
     common = iter(_common_path(same) for same in zip(*paths, strict=True))
     text = _PRIM_PATH.sub(lambda _: next(common), group[0][1])

@@ -44,7 +44,6 @@ def target_errors(character: Character, simulation: Simulation, suffix: str) -> 
     return [
         {
             "path": target.path,
-            "position_weight": target.position_weight,
             "rotation_weight": target.rotation_weight,
             f"max_error{suffix}_m": float(position[0][k]),
             f"rms_error{suffix}_m": float(position[1][k]),
@@ -110,6 +109,14 @@ def still_targets(character: Character, result: Result) -> list[str]:
     return [
         target.path for target, at in zip(character.targets, still, strict=True) if at and not target.rotation_weight
     ]
+
+
+def main_target(character: Character, result: Result) -> str | None:
+    """Path of the target of the largest weight; of several, that which the animation leaves farthest off."""
+    errors = np.max(result.before.position_errors[result.before.motion.judged], axis=0, initial=0.0)
+    rows = zip(character.targets, errors, strict=True)
+    main = max(rows, key=lambda row: (row[0].position_weight, row[1]), default=None)
+    return main[0].path if main else None
 
 
 def remaining_errors(character: Character, result: Result) -> list[dict[str, Any]]:
@@ -181,6 +188,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         **_accuracy(run, result),
         "error_shares": _error_shares(character, result),
         "lost_motion": lost_motion(character, result),
+        "main_target": main_target(character, result),
         "still_targets": still_targets(character, result),
         "remaining_errors": remaining_errors(choices.character if choices else character, result),
         "efforts": effort_rows(character, result),

@@ -2,15 +2,14 @@ import io
 
 import pytest
 from calmotion.cli.reports.run import (
-    REMEDIES,
     print_budget,
     print_efforts,
     print_errors,
     print_files,
     print_joint_gap,
     print_robustness,
-    print_verdict,
 )
+from calmotion.cli.reports.verdict import REMEDIES, print_remaining, print_verdict
 from calmotion.cli.tables import console_on
 
 
@@ -19,8 +18,12 @@ def report(**values):
     budget = [{"source": "mesh", "allowed_m": 4e-4, "estimated_m": None}]
     budget = [{"source": "time step", "allowed_m": 5e-4, "estimated_m": 3e-4}, *budget]
     known = {"error_budget": budget, "tolerance_m": 1e-3, "tolerance_kept": True, "tolerance_missed_by": None}
-    known |= {"shot": "shot.usda", "limits": [], "objective_before": 2.0, "improved": True, "interrupted": False}
-    return known | {"simulation_error_m": 3e-4, "verified_error_m": None, "targets": []} | values
+    known |= {"shot": "shot.usda", "limits": [], "interrupted": False, "improved": True, "step_s": 2e-3}
+    return (
+        known
+        | {"simulation_error_m": 3e-4, "verified_error_m": None, "targets": [], "can_shake": True, "main_target": None}
+        | values
+    )
 
 
 def printed(values):
@@ -33,7 +36,7 @@ def printed(values):
 def test_the_error_budget_is_a_table_and_the_verdict_a_sentence():
     text = printed(report())
     assert "time step   0.5 mm     0.3 mm" in text and "mesh        0.4 mm    unknown" in text
-    assert "The simulation keeps the tolerance of 1 mm: these numbers are accurate to 0.3 mm." in " ".join(text.split())
+    assert "as accurate as requested: these errors are within 0.3 mm (tolerance 1 mm)." in " ".join(text.split())
     verified = {"verified_step_s": 5e-4, "verified_modes": 44, "verified_mesh_error_m": 5e-5, "verified_parts": 1}
     measured = printed(report(verified_error_m=2e-4, **verified))
     said = "measured simulation error 0.2 mm, against a run with steps of 0.5 ms and 44 elastic coordinates"
@@ -55,13 +58,14 @@ def test_the_delay_of_a_shaper_is_told_with_the_error_without_it(delay, said):
 @pytest.mark.parametrize("source", REMEDIES)
 def test_a_tolerance_that_is_not_kept_is_reported_with_what_would_help(source):
     text = printed(report(tolerance_kept=False, tolerance_missed_by=source, simulation_error_m=2e-3))
-    said = f"does not keep the tolerance of 1 mm: error 2 mm, mostly of the {source}. {REMEDIES[source]}"
+    said = f"less accurate than the tolerance of 1 mm: its own error is about 2 mm, mostly from the {source}. "
+    said += REMEDIES[source].format(step="2 ms")
     assert said in " ".join(text.split())
 
 
 def test_without_an_estimate_nothing_is_claimed():
     text = printed(report(error_budget=[], tolerance_kept=False, simulation_error_m=None))
-    assert text.split() == "The error of the simulation was not estimated; the tolerance is 1 mm.".split()
+    assert text.split() == "The accuracy of the simulation was not estimated (tolerance 1 mm).".split()
 
 
 @pytest.mark.parametrize(("gap", "told"), [(0.0, ""), (9e-7, ""), (7.1e-5, "joints come apart by up to 0.071 mm")])
@@ -74,7 +78,7 @@ def test_joints_that_come_apart_are_reported(gap, told):
 @pytest.mark.parametrize("verbose", [False, True])
 def test_rotations_without_weight_are_printed_only_on_request(verbose):
     errors = {f"{kind}_{name}": 0.1 for kind in ("max", "rms") for name in ("error_m", "rotation_error_rad")}
-    targets = [{"path": "/Cup", "rotation_weight": 0.05} | errors, {"path": "/Elbow", "rotation_weight": 0.0} | errors]
+    targets = [{"path": path, "rotation_weight": weight} | errors for path, weight in (("/Cup", 0.05), ("/Elbow", 0.0))]
     stream = io.StringIO()
     print_errors(console_on(stream), report(targets=targets), verbose)
     position, rotation = stream.getvalue().split("Rotation error of the targets")
@@ -98,7 +102,7 @@ def test_a_shot_that_keeps_within_the_tolerance_is_not_said_to_shake(error, turn
     target = {"path": "/Cup", "max_error_m": error, "max_rotation_error_rad": turn, "rotation_weight": weight}
     print_files(console_on(stream), report(**files, figures=[], targets=[target], can_shake=True))
     assert ("next: calmotion optimize shot.usda -o LAYER removes the shake" in stream.getvalue()) == shakes
-    assert ("off by more than the tolerance" in stream.getvalue()) != shakes
+    assert ("below the accuracy of the simulation" in stream.getvalue()) != shakes
 
 
 @pytest.mark.parametrize("optimised", [False, True])
@@ -107,24 +111,57 @@ def test_of_a_rigid_robot_with_ideal_motors_is_told_that_nothing_shakes(optimise
     files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv"))
     suffix = "_before" if optimised else ""
     target = {"path": "/Cup", f"max_error{suffix}_m": 1e-9, f"max_rotation_error{suffix}_rad": 0.0}
-    values = report(**files, figures=[], targets=[target | {"rotation_weight": 1.0}], can_shake=False)
-    print_files(console_on(stream), values | ({"objective_after": 0.0} if optimised else {}))
-    assert "nothing shakes" in stream.getvalue() and "CalmFlexibleBodyAPI" in stream.getvalue()
-    assert "calmotion optimize" not in stream.getvalue()
+    target |= {"rotation_weight": 1.0}
+    values = report(**files, figures=[], targets=[target], can_shake=False)
+    values |= {"objective_after": 0.0} if optimised else {}
+    print_verdict(console_on(stream), values)
+    print_files(console_on(stream), values)
+    assert stream.getvalue().startswith("Nothing shakes") and "CalmFlexibleBodyAPI" in stream.getvalue()
+    assert "calmotion optimize" not in stream.getvalue() and "/Cup" not in stream.getvalue()
 
 
-def test_the_answer_comes_first():
-    targets = [
-        {"path": "/Cup", "max_error_before_m": 0.06, "max_error_after_m": 1e-3},
-        {"path": "/Elbow", "max_error_before_m": 0.01, "max_error_after_m": 5e-3},
+def two_targets(cup_after=1e-3, main="/Cup"):
+    errors = {"/Elbow": (0.01, 5e-3), "/Cup": (0.06, cup_after)}
+    rows = [
+        {"path": path, "max_error_before_m": before, "max_error_after_m": after}
+        for path, (before, after) in errors.items()
     ]
-    text = printed(report(targets=targets, objective_after=1.0))
-    assert text.startswith("The largest error falls from 60 mm to 5 mm (at /Elbow).")
-    assert "the errors after are accurate to 0.3 mm" in text, "those before may be off by a twentieth of the shake"
-    targets[0]["max_error_after_m"] = 0.07
-    assert "rises from 60 mm to 70 mm" in printed(report(targets=targets, objective_after=1.0))
+    return report(targets=rows, objective_after=1.0, main_target=main)
+
+
+def test_each_target_has_its_own_error_before_and_after_and_the_main_one_is_first():
+    text = printed(two_targets())
+    assert text.splitlines()[:2] == [
+        "The largest error falls from 60 mm to 1 mm (at /Cup).",
+        "At /Elbow, it falls from 10 mm to 5 mm.",
+    ]
+    assert "errors after the optimisation are within 0.3 mm" in text, "those before may be off by more"
+    assert "to 5 mm (at /Elbow)" in printed(two_targets(main="/Elbow")).splitlines()[0]
+    worse = printed(two_targets(0.07) | {"improved": False}).splitlines()
+    assert worse[:2] == [
+        "The new curves are worse than the animation.",
+        "The largest error rises from 60 mm to 70 mm (at /Cup).",
+    ]
     alone = printed(report(targets=[{"path": "/Cup", "max_error_m": 0.06}]))
     assert alone.startswith("As animated, the largest error is 60 mm (at /Cup).")
+
+
+def test_how_far_motors_move_and_why_errors_remain_are_told():
+    cause = {"motors": 5, "directions": 9}
+    remaining = [cause | {"path": "/Cup", "max_error_m": 1.4e-3, "causes": ["motors"]}]
+    remaining += [cause | {"path": "/Elbow", "max_error_m": 5.5e-3, "causes": ["motors"]}]
+    remaining += [cause | {"path": "/Nose", "max_error_m": 2e-3, "causes": ["limits", "sag"]}]
+    motors = [{"path": f"/J{k}", "changed": k < 8, "max_offset_rad": 0.01 * k} for k in range(9)]
+    stream = io.StringIO()
+    print_remaining(console_on(stream), two_targets() | {"motors": motors, "remaining_errors": remaining})
+    lines = stream.getvalue().splitlines()
+    assert lines[0].startswith("Angles of motors change by at most: J7 4.011°, J6") and "2 more by less" in lines[0]
+    assert lines[1].startswith(
+        "What remains, 5.5 mm at /Elbow, 1.4 mm at /Cup: 5 motors cannot follow all 9 directions"
+    )
+    assert lines[2].startswith(
+        "What remains, 2 mm at /Nose: limits of motors hold it (see the table of limits) and gravity"
+    )
 
 
 def test_curves_on_random_robots_are_a_table():
@@ -157,8 +194,9 @@ def test_a_motor_that_hardly_works_does_not_decide_how_well_efforts_are_known():
 
     rows = [row("/Shoulder", 20.0, 0.2), row("/WristRoll", 0.004, 0.002)]
     stream = io.StringIO()
-    print_efforts(console_on(stream), rows)
+    print_efforts(console_on(stream), rows, 5e-3)
     assert stream.getvalue() == ""
     stream = io.StringIO()
-    print_efforts(console_on(stream), [*rows, row("/Elbow", 5.0, 1.0)])
-    assert "/Elbow by 1 N m of at most 5 N m" in " ".join(stream.getvalue().split())
+    print_efforts(console_on(stream), [*rows, row("/Elbow", 5.0, 1.0)], 5e-3)
+    text = " ".join(stream.getvalue().split())
+    assert "that of /Elbow, at most 5 N m, may be off by 1 N m" in text and "use a --step shorter than 5 ms" in text

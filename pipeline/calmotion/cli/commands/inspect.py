@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from calmotion.cli import (
     FAILED,
@@ -37,6 +38,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="check the shot before publishing: run every cheap check and USD's validators, list all findings, and end "
         "with status 1 if there are any",
     )
+    command.add_argument("--verbose", action="store_true", help="also print all simplifications and their reasons")
     simulation_options(command, "bdf2, newmark, generalized-alpha, rk4 or radau (default: automatic)")
 
 
@@ -54,7 +56,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
             **run_arguments(args, display),
         )
     findings = inspection.findings
-    show = None if args.quiet and not args.strict else print_inspection
+    show = None if args.quiet and not args.strict else partial(print_inspection, verbose=args.verbose)
     conclude(inspection.report(), inspection.problems, output, show)
     if inspection.interrupted:
         return INTERRUPTED

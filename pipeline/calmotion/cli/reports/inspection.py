@@ -2,27 +2,37 @@
 
 from __future__ import annotations
 
+import re
 import shlex
+from collections.abc import Iterable
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from calmotion.cli.quantities import angle, counted, frequency, length
 from calmotion.cli.reports.left_out import print_left_out
-from calmotion.cli.reports.run import NOTHING_SHAKES, print_notes
+from calmotion.cli.reports.run import print_notes
+from calmotion.cli.reports.verdict import NOTHING_SHAKES
 from calmotion.cli.tables import print_table, say
 from calmotion.model.motor import DRIVE, ON_ERROR, ON_JOINT, PRESCRIBED, SERVO
 from calmotion.model.outputs import ERROR, WARNING
+from calmotion.support.naming import grouped_notes, listed
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+MODES = 5  # natural frequencies that are told by themselves
 
-def print_inspection(report: dict[str, Any], console: Console) -> None:
-    """Print the content of a shot, or the findings of a check."""
+
+def print_inspection(report: dict[str, Any], console: Console, verbose: bool = False) -> None:
+    """Print the content of a shot, or the findings of a check.
+
+    Args:
+        verbose: Whether all simplifications are printed, and all natural frequencies.
+    """
     if "findings" in report:
         _print_findings(console, report)
     else:
-        _print_contents(console, report)
+        _print_contents(console, report, verbose)
 
 
 def _print_findings(console: Console, report: dict[str, Any]) -> None:
@@ -37,7 +47,7 @@ def _print_findings(console: Console, report: dict[str, Any]) -> None:
     say(console, f"{report['shot']}: {counts if levels else 'no findings'}")
 
 
-def _print_contents(console: Console, report: dict[str, Any]) -> None:
+def _print_contents(console: Console, report: dict[str, Any], verbose: bool) -> None:
     units = report["units"]
     frames = counted(report["frames"], "frame")
     say(console, f"{report['shot']}: {report['character']}, {frames}, {report['duration_s']:.4g} s")
@@ -55,9 +65,9 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
     print_table(console, "Bodies", ["body", "kind", "mass", "elements", "frequencies"], bodies, texts=2)
     solids = [_solid_row(body) for body in report["bodies"] if "solid" in body]
     print_table(console, "Solids of flexible bodies", ["body", "made of", "volume", "frequency error"], solids, texts=2)
-    for body in report["bodies"]:
-        for note in body.get("solid_notes", ()):
-            say(console, f"{body['path']}: {note}")
+    notes = (f"{body['path']}: {note}" for body in report["bodies"] for note in body.get("solid_notes", ()))
+    for note in grouped_notes(notes):
+        say(console, note)
     print_table(
         console,
         "Joints",
@@ -79,11 +89,13 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
         texts=2,
     )
     if report["system_frequencies_hz"]:
-        modes = zip(report["system_frequencies_hz"], report["system_damping_ratios"], strict=True)
-        shown = ", ".join(f"{frequency(hertz)} Hz ({ratio:.2g})" for hertz, ratio in modes)
+        modes = list(zip(report["system_frequencies_hz"], report["system_damping_ratios"], strict=True))
+        shown = ", ".join(
+            f"{frequency(hertz)} Hz ({ratio:.2g})" for hertz, ratio in modes[: None if verbose else MODES]
+        )
         say(console, f"natural frequencies of the character in its first pose (damping ratios): {shown}, ...")
     _print_gains(console, report)
-    print_left_out(console, report["left_out"])
+    print_left_out(console, report["left_out"], verbose)
     if report["mode_shapes"]:
         say(console, f"mode shapes: {', '.join(report['mode_shapes'])}")
     print_notes(console, report["notes"])
@@ -119,24 +131,22 @@ def _expected(row: dict[str, Any]) -> str:
     if row["windows"] > 1:
         windows = f", in {row['windows']} windows of {row['window_s']:.3g} s that overlap by {row['overlap_s']:.3g} s"
     time, size = readable_hours(row["hours"]), decimal(round(1e9 * row["memory_gb"]))
-    return f"optimize is expected to take {time} of processor time and {size} of memory{windows}"
+    return f"optimize is expected to take about {time} of processor time, and {size} of memory for the search{windows}"
 
 
 def _print_gains(console: Console, report: dict[str, Any]) -> None:
     """Gains of the motors, and what they would do to the animation."""
-    rows = [_gain_row(motor) for motor in report["motors"] if motor["gains_from"]]
-    if rows:
-        heads = ["motor", "model", "read from", "position gain", "velocity gain"]
-        print_table(console, "Gains of motors", heads, rows, texts=3)
+    rows = _alike(_gain_row(motor) for motor in report["motors"] if motor["gains_from"])
+    heads = ["motor", "model", "read from", "position gain", "velocity gain"]
+    print_table(console, "Gains of motors", heads, rows, texts=3)
     for kind, what in _DAMPING.items():
         own = [m for m in report["motors"] if m["gains_from"] and m["damping_on"] == kind and _gains(m)[1]]
         if own:
             gains = f"The velocity gain of {counted(len(own), 'motor')}"
             say(console, f"{gains} acts on {what} (calm:motor:dampingOn: {kind}).")
-    servos = [_servo_row(motor) for motor in report["motors"] if motor["rotor"]]
-    if servos:
-        heads = ["servo", "type", "armature", "gear", "friction", "viscous", "no-load speed", "delay", "backlash"]
-        print_table(console, "Servos", heads, servos, texts=2)
+    servos = _alike(_servo_row(motor) for motor in report["motors"] if motor["rotor"])
+    heads = ["servo", "type", "armature", "gear", "friction", "viscous", "no-load speed", "delay", "backlash"]
+    print_table(console, "Servos", heads, servos, texts=2)
     effects = report["effects_of_gains"]
     if effects:
         ideal = all(motor["model"] == PRESCRIBED for motor in report["motors"])
@@ -149,6 +159,14 @@ def _print_gains(console: Console, report: dict[str, Any]) -> None:
             f"(ideal motors: {length(lag['ideal_max_error_m'])}), and the sag at rest {length(rest['sag_m'])} at "
             f"{rest['path']} (ideal motors: {length(rest['ideal_sag_m'])}).{remedy}",
         )
+
+
+def _alike(rows: Iterable[list[str]]) -> list[list[str]]:
+    """The rows of a table, those that differ in their motor alone as one."""
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for path, *cells in rows:
+        groups.setdefault(tuple(cells), []).append(path)
+    return [[listed(paths), *cells] for cells, paths in groups.items()]
 
 
 _DAMPING = {
@@ -165,7 +183,8 @@ def _gains(motor: dict[str, Any]) -> tuple[float, float]:
 def _gain_row(motor: dict[str, Any]) -> list[str]:
     (position, velocity), linear = _gains(motor), "min_m" in motor
     shown, per = ("N/m", "N s/m") if linear else ("N m/rad", "N m s/rad")
-    return [motor["path"], motor["model"], motor["gains_from"], f"{position:.4g} {shown}", f"{velocity:.4g} {per}"]
+    source = f"calm:motor:type {motor['type']}" if motor["type"] else re.sub(r" of /[^(]*", " ", motor["gains_from"])
+    return [motor["path"], motor["model"], source, f"{position:.4g} {shown}", f"{velocity:.4g} {per}"]
 
 
 def _servo_row(motor: dict[str, Any]) -> list[str]:

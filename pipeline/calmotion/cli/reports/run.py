@@ -9,36 +9,20 @@ from typing import Any
 
 from rich.console import Console
 
-from calmotion.cli.quantities import about, angle, counted, length
+from calmotion.cli.quantities import about, angle, length
 from calmotion.cli.reports.feet import print_contacts, print_support
 from calmotion.cli.reports.left_out import print_left_out
-from calmotion.cli.reports.limits import print_limits, print_reason
+from calmotion.cli.reports.limits import print_limits
+from calmotion.cli.reports.verdict import (
+    is_optimized,
+    is_still,
+    main_target_first,
+    print_remaining,
+    print_verdict,
+    shakes,
+)
 from calmotion.cli.tables import print_table, say
-from calmotion.model.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
-from calmotion.support.naming import distinct_names
 
-# What helps where an entry of the error budget is too large.
-_SENSITIVE = "With large deflections, or near buckling, small errors grow: use a stiffer robot or a slower motion."
-REMEDIES = {
-    MESH: "Use smaller elements: calm:flexible:elementSize of the body, or --set fe.mesh.element_size=LENGTH.",
-    PATCHES: "Name the faces that joints hold: a GeomSubset of family calmInterface (docs/reading_usd.md).",
-    STEP: f"Use a --step shorter than {{step}}. {_SENSITIVE}",
-    REDUCTION: f"Remove calm:flexible:modeCount and calm:flexible:elasticity, or use a larger tolerance. {_SENSITIVE}",
-    SUBSPACE: f"Use --keep directions. {_SENSITIVE}",
-    CHOICES: "Use --keep all.",
-    MEASURED: _SENSITIVE,
-}
-NOTHING_SHAKES = "nothing shakes: all bodies are rigid and all motors ideal"
-HEADLINES, MOTORS = 3, 6  # targets, and motors, that have a place in a sentence
-CAUSES = {
-    "limits": "limits of motors hold it (see the table of limits)",
-    "search": "the search ended early (see below)",
-    "sag": "gravity alone causes half of it, already at rest",
-    "motors": "{motors} motors cannot follow {directions} directions of targets at once, and the weights of the targets "
-    "decide (CalmTargetAPI)",
-    "weight": "other targets have a larger weight",
-    "reach": "these motors cannot take away more, and the search has converged",
-}
 COARSE_EFFORT = 0.05  # of the largest effort of a motor, from which on its error is told
 IDLE_EFFORT = 0.01  # of that of the strongest motor
 
@@ -104,83 +88,9 @@ def print_efforts(console: Console, efforts: Sequence[dict[str, Any]], step: flo
     worst = max(known, key=lambda row: row["estimated_error"] / row["largest"], default=None)
     if worst and worst["estimated_error"] >= COARSE_EFFORT * worst["largest"]:
         error, largest = (f"{worst[key]:.3g} {worst['unit']}" for key in ("estimated_error", "largest"))
-        said = f"efforts of motors are less accurate than positions: that of {worst['path']}, at most {largest}, by {error}"
-        say(console, f"{said}. Where efforts matter, use a --step shorter than {1000 * step:.3g} ms.")
-
-
-def main_target_first(report: dict[str, Any]) -> list[dict[str, Any]]:
-    """The targets, those of the largest weight first, and of these the one that the animation leaves farthest off."""
-    before = f"max_error{'_before' if _last(report) else ''}_m"
-    return sorted(report["targets"], key=lambda row: (-row["position_weight"], -row[before]))
-
-
-def print_verdict(console: Console, report: dict[str, Any]) -> None:
-    """The largest error of each target, before and after, and whether the simulation keeps the tolerance."""
-    rows = main_target_first(report)
-    if _is_still(report):
-        say(console, f"{NOTHING_SHAKES[:1].upper()}{NOTHING_SHAKES[1:]}.")
-    elif _last(report):
-        if report["improved"] is False:
-            say(console, "The new curves are worse than the animation.")
-        for row in rows[:HEADLINES]:
-            before, after = (length(row[f"max_error_{when}_m"]) for when in ("before", "after"))
-            falls = row["max_error_after_m"] < row["max_error_before_m"]
-            change = f"{'falls' if falls else 'rises'} from {before} to {after}"
-            say(console, f"{row['path']}: the largest error {f'stays at {after}' if before == after else change}.")
-    else:
-        shaper, motion = report.get("shaper"), "as animated"
-        if shaper:
-            motion = "with the low-pass filter" if shaper == "lowpass" else f"with the shaper {shaper}"
-        for row in rows[:HEADLINES]:
-            say(console, f"{row['path']}: the largest error {motion} is {length(row['max_error_m'])}.")
-        if shaper and report["shaper_delay_s"] > 0.0:
-            late, without = f"{report['shaper_delay_s']:.3f} s", length(report["delayed_max_error_m"])
-            say(console, f"It delays the motion by {late}; without this delay the largest error is {without}.")
-    if len(rows) > HEADLINES and not _is_still(report):
-        say(console, f"The table has {counted(len(rows) - HEADLINES, 'more target')}.")
-    if _last(report):
-        print_reason(console, report)
-    _print_accuracy(console, report)
-
-
-def _print_accuracy(console: Console, report: dict[str, Any]) -> None:
-    """Whether the simulation keeps the tolerance, and what helps where it does not."""
-    tolerance = length(report["tolerance_m"])
-    if report["tolerance_kept"]:
-        error = about(report["simulation_error_m"])
-        which = "errors after the optimisation" if _last(report) else "these errors"
-        say(console, f"The simulation is as accurate as requested: {which} are within {error} (tolerance {tolerance}).")
-    elif report["simulation_error_m"] is None:
-        say(console, f"The accuracy of the simulation was not estimated (tolerance {tolerance}).")
-    else:
-        source, error = report["tolerance_missed_by"], about(report["simulation_error_m"])
-        cause = f"its own error is about {error}, mostly from the {source}"
-        remedy = REMEDIES[source].format(step=f"{1000 * report['step_s']:.3g} ms")
-        say(console, f"The simulation is less accurate than the tolerance of {tolerance}: {cause}. {remedy}")
-
-
-def print_remaining(console: Console, report: dict[str, Any]) -> None:
-    """How far the motor curves changed, and why errors remain that are larger than the tolerance."""
-    if not _last(report):
-        return
-    offsets = {
-        row["path"]: angle(row["max_offset_rad"]) if "max_offset_rad" in row else length(row["max_offset_m"])
-        for row in sorted(report["motors"], key=lambda row: -max(row.get("max_offset_rad", 0), row.get("max_offset_m", 0)))
-        if row["changed"]
-    }
-    if offsets:
-        names = distinct_names([row["path"] for row in report["motors"]])
-        told = [f"{names[path]} {far}" for path, far in list(offsets.items())[:MOTORS]]
-        told += [f"{len(offsets) - MOTORS} more by less"] if len(offsets) > MOTORS else []
-        say(console, f"Motor curves change by up to: {', '.join(told)}.")
-    for row in report["remaining_errors"][:HEADLINES]:
-        causes = " and ".join(CAUSES[cause].format(**row) for cause in row["causes"])
-        say(console, f"{row['path']} keeps an error of {length(row['max_error_m'])}: {causes}.")
-
-
-def _is_still(report: dict[str, Any]) -> bool:
-    """Whether nothing can shake, and nothing is off."""
-    return not report["can_shake"] and not _shakes(report)
+        said = f"that of {worst['path']}, at most {largest}, may be off by {error}"
+        remedy = f"Where efforts matter, use a --step shorter than {1000 * step:.3g} ms."
+        say(console, f"efforts of motors are less accurate than positions: {said}. {remedy}")
 
 
 def print_budget(console: Console, report: dict[str, Any]) -> None:
@@ -206,11 +116,6 @@ def print_budget(console: Console, report: dict[str, Any]) -> None:
             say(
                 console, f"that run was made of {report['verified_parts']} parts, which differ by {gap} where they meet"
             )
-
-
-def _last(report: dict[str, Any]) -> str:
-    """Suffix of the numbers of the motion that results."""
-    return "_after" if "objective_after" in report else ""
 
 
 def print_robustness(console: Console, report: dict[str, Any]) -> None:
@@ -269,7 +174,7 @@ def print_errors(console: Console, report: dict[str, Any], verbose: bool = False
     Args:
         verbose: Whether rotations are printed also of targets whose rotation has no weight.
     """
-    suffixes = ["_before", "_after"] if _last(report) else [""]
+    suffixes = ["_before", "_after"] if is_optimized(report) else [""]
     heads = [f"{kind}{' ' + s[1:] if s else ''}" for kind in ("max", "rms") for s in suffixes]
     for title, unit, shown in (("Position", "m", length), ("Rotation", "rad", angle)):
         name = "error" if unit == "m" else "rotation_error"
@@ -289,15 +194,15 @@ def print_files(console: Console, report: dict[str, Any]) -> None:
         names = ", ".join(figure.name for figure in figures if figure.parent == folder)
         say(console, f"wrote {names} in {folder}")
     if report["root_layer"]:
-        shown_with = "the new curves" if _last(report) else "the simulated motion"
+        shown_with = "the new curves" if is_optimized(report) else "the simulated motion"
         say(console, f"next: open {report['root_layer']}, which shows the shot with {shown_with}")
     if report["rrd"]:
         say(console, f"next: rerun {report['rrd']}")
-    if _is_still(report):
+    if is_still(report):
         say(console, "next: apply CalmFlexibleBodyAPI to links that bend")
-    elif not _last(report):
+    elif not is_optimized(report):
         command = f"calmotion optimize {shlex.quote(report['shot'])} -o LAYER"
-        if _shakes(report):
+        if shakes(report):
             say(console, f"next: {command} removes the shake")
         else:
             done = f"every error is below the accuracy of the simulation ({length(report['tolerance_m'])})"
@@ -306,19 +211,9 @@ def print_files(console: Console, report: dict[str, Any]) -> None:
         say(console, "next: --rrd FILE records the motion for the rerun viewer, --video FILE makes a video of it")
 
 
-def _shakes(report: dict[str, Any]) -> bool:
-    """Whether a target is farther off than the tolerance in the input, in position or in rotation as it counts."""
-    before = "_before" if _last(report) else ""
-    position, rotation = f"max_error{before}_m", f"max_rotation_error{before}_rad"
-    return any(
-        max(target[position], target["rotation_weight"] ** 0.5 * target[rotation]) > report["tolerance_m"]
-        for target in report["targets"]
-    )
-
-
 def print_warnings(console: Console, report: dict[str, Any]) -> None:
     """What may be otherwise than the user expects."""
-    suffix = _last(report)
+    suffix = is_optimized(report)
     if suffix and report["resumed_iterations"]:
         say(
             console,
@@ -359,7 +254,7 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
 
 def print_work(console: Console, report: dict[str, Any]) -> None:
     """The search and the steps: what the run cost."""
-    if _last(report):
+    if is_optimized(report):
         say(
             console,
             f"objective {report['objective_before']:.6g} -> {report['objective_after']:.6g} in {report['iterations']} "

@@ -1,0 +1,133 @@
+"""What a report of `simulate` and `optimize` says first: the error of each target, how accurate it is, what remains."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+
+from calmotion.cli.quantities import about, angle, counted, length
+from calmotion.cli.reports.limits import print_reason
+from calmotion.cli.tables import say
+from calmotion.model.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
+from calmotion.support.naming import distinct_names
+
+# What helps where an entry of the error budget is too large.
+_SENSITIVE = "With large deflections, or near buckling, small errors grow: use a stiffer robot or a slower motion."
+REMEDIES = {
+    MESH: "Use smaller elements: calm:flexible:elementSize of the body, or --set fe.mesh.element_size=LENGTH.",
+    PATCHES: "Name the faces that joints hold: a GeomSubset of family calmInterface (docs/reading_usd.md).",
+    STEP: f"Use a --step shorter than {{step}}. {_SENSITIVE}",
+    REDUCTION: f"Remove calm:flexible:modeCount and calm:flexible:elasticity, or use a larger tolerance. {_SENSITIVE}",
+    SUBSPACE: f"Use --keep directions. {_SENSITIVE}",
+    CHOICES: "Use --keep all.",
+    MEASURED: _SENSITIVE,
+}
+NOTHING_SHAKES = "nothing shakes: all bodies are rigid and all motors ideal"
+HEADLINES, MOTORS = 3, 6  # targets, and motors, that have a place in a sentence
+CAUSES = {
+    "limits": "limits of motors hold it (see the table of limits)",
+    "search": "the search ended early (see below)",
+    "sag": "gravity alone causes half of it, already at rest",
+    "motors": "{motors} motors cannot follow all {directions} directions of the targets (positions and rotations), and "
+    "the weights of the targets decide (CalmTargetAPI)",
+    "weight": "other targets have a larger weight",
+    "reach": "these motors cannot take away more, and the search has converged",
+}
+
+
+def is_optimized(report: dict[str, Any]) -> str:
+    """Suffix of the numbers of the motion that results."""
+    return "_after" if "objective_after" in report else ""
+
+
+def main_target_first(report: dict[str, Any]) -> list[dict[str, Any]]:
+    """The targets, the main one first, then that which the animation leaves farthest off."""
+    before = f"max_error{'_before' if is_optimized(report) else ''}_m"
+    return sorted(report["targets"], key=lambda row: (row["path"] != report["main_target"], -row[before]))
+
+
+def print_verdict(console: Console, report: dict[str, Any]) -> None:
+    """The largest error of each target, before and after, and whether the simulation keeps the tolerance."""
+    rows = main_target_first(report)
+    if is_still(report):
+        say(console, f"{NOTHING_SHAKES[:1].upper()}{NOTHING_SHAKES[1:]}.")
+    elif is_optimized(report):
+        if report["improved"] is False:
+            say(console, "The new curves are worse than the animation.")
+        for row in rows[:HEADLINES]:
+            before, after = (length(row[f"max_error_{when}_m"]) for when in ("before", "after"))
+            falls = row["max_error_after_m"] < row["max_error_before_m"]
+            change = f"{'falls' if falls else 'rises'} from {before} to {after}"
+            _say_of(console, row, rows, "The largest error", f"stays at {after}" if before == after else change)
+    else:
+        shaper, motion = report.get("shaper"), "As animated"
+        if shaper:
+            motion = "With the low-pass filter" if shaper == "lowpass" else f"With the shaper {shaper}"
+        for row in rows[:HEADLINES]:
+            _say_of(console, row, rows, f"{motion}, the largest error", f"is {length(row['max_error_m'])}")
+        if shaper and report["shaper_delay_s"] > 0.0:
+            late, without = f"{report['shaper_delay_s']:.3f} s", length(report["delayed_max_error_m"])
+            say(console, f"It delays the motion by {late}; without this delay the largest error is {without}.")
+    if len(rows) > HEADLINES and not is_still(report):
+        say(console, f"The table has {counted(len(rows) - HEADLINES, 'more target')}.")
+    if is_optimized(report):
+        print_reason(console, report)
+    _print_accuracy(console, report)
+
+
+def _say_of(console: Console, row: dict[str, Any], rows: list[dict[str, Any]], what: str, is_so: str) -> None:
+    """A sentence on the largest error of a target; further ones are shorter than that of the main target."""
+    path = row["path"]
+    say(console, f"{what} {is_so} (at {path})." if row is rows[0] else f"At {path}, it {is_so}.")
+
+
+def _print_accuracy(console: Console, report: dict[str, Any]) -> None:
+    """Whether the simulation keeps the tolerance, and what helps where it does not."""
+    tolerance = length(report["tolerance_m"])
+    if report["tolerance_kept"]:
+        error = about(report["simulation_error_m"])
+        which = "errors after the optimisation" if is_optimized(report) else "these errors"
+        say(console, f"The simulation is as accurate as requested: {which} are within {error} (tolerance {tolerance}).")
+    elif report["simulation_error_m"] is None:
+        say(console, f"The accuracy of the simulation was not estimated (tolerance {tolerance}).")
+    else:
+        source, error = report["tolerance_missed_by"], about(report["simulation_error_m"])
+        cause = f"its own error is about {error}, mostly from the {source}"
+        remedy = REMEDIES[source].format(step=f"{1000 * report['step_s']:.3g} ms")
+        say(console, f"The simulation is less accurate than the tolerance of {tolerance}: {cause}. {remedy}")
+
+
+def print_remaining(console: Console, report: dict[str, Any]) -> None:
+    """How far the motor curves changed, and why errors remain that are larger than the tolerance."""
+    if not is_optimized(report):
+        return
+    names = distinct_names([row["path"] for row in report["motors"]])
+    for kind, shown, key in (("Angles", angle, "max_offset_rad"), ("Lengths", length, "max_offset_m")):
+        changed = sorted((r for r in report["motors"] if r["changed"] and key in r), key=lambda row: -row[key])
+        told = [f"{names[row['path']]} {shown(float(f'{row[key]:.2g}'))}" for row in changed[:MOTORS]]
+        told += [f"{len(changed) - MOTORS} more by less"] if len(changed) > MOTORS else []
+        if told:
+            say(console, f"{kind} of motors change by at most: {', '.join(told)}.")
+    groups: dict[str, list[str]] = {}
+    for row in sorted(report["remaining_errors"], key=lambda row: -row["max_error_m"]):
+        causes = " and ".join(CAUSES[cause].format(**row) for cause in row["causes"])
+        groups.setdefault(causes, []).append(f"{length(row['max_error_m'])} at {row['path']}")
+    for causes, errors in groups.items():
+        more = f" and {counted(len(errors) - HEADLINES, 'more target')}" if len(errors) > HEADLINES else ""
+        say(console, f"What remains, {', '.join(errors[:HEADLINES])}{more}: {causes}.")
+
+
+def is_still(report: dict[str, Any]) -> bool:
+    """Whether nothing can shake, and nothing is off."""
+    return not report["can_shake"] and not shakes(report)
+
+
+def shakes(report: dict[str, Any]) -> bool:
+    """Whether a target is farther off than the tolerance in the input, in position or in rotation as it counts."""
+    before = "_before" if is_optimized(report) else ""
+    position, rotation = f"max_error{before}_m", f"max_rotation_error{before}_rad"
+    return any(
+        max(target[position], target["rotation_weight"] ** 0.5 * target[rotation]) > report["tolerance_m"]
+        for target in report["targets"]
+    )
