@@ -3,13 +3,159 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 PRESCRIBED, DRIVE, SERVO = MODELS = ("prescribed", "drive", "servo")  # models of motors
 ON_JOINT, ON_ERROR = "joint", "error"  # what a velocity gain multiplies
 FRICTION_SPEED = float(np.radians(5.0))  # within which Coulomb friction changes its sign, where none is given [rad/s]
+
+
+class FrictionTerms(NamedTuple):
+    """Terms of the largest friction of a rotor beside Coulomb's, see `multibody.motors.friction`.
+
+    Attributes:
+        stribeck: Friction that is there at rest and gone at speed [N m].
+        speed, exponent: Of its decay exp(-(|speed| / speed)^exponent) [rad/s], [-].
+        motor_load, joint_load: Friction by the torques on the motor's and on the joint's side of the gear [-].
+        stribeck_motor_load, stribeck_joint_load: The same, gone at speed [-].
+        motor_quadratic, joint_quadratic: Friction by the square of the smaller of both torques, while the motor drives
+            or is driven against its torque, gone at speed [1/(N m)].
+    """
+
+    stribeck: float = 0.0
+    speed: float = 1.0
+    exponent: float = 1.0
+    motor_load: float = 0.0
+    joint_load: float = 0.0
+    stribeck_motor_load: float = 0.0
+    stribeck_joint_load: float = 0.0
+    motor_quadratic: float = 0.0
+    joint_quadratic: float = 0.0
+
+
+@dataclass(frozen=True)
+class Coulomb:
+    """Friction of one size at all speeds and loads, `Rotor.friction` (M1 of Duclusaud et al., Extended Friction Models
+    for the Physics Simulation of Servo Actuators, arXiv 2410.08650; the other laws are their M2 to M6)."""
+
+    name: ClassVar[str] = "coulomb"
+
+    def terms(self) -> FrictionTerms:
+        """The terms beside Coulomb's."""
+        return FrictionTerms()
+
+
+@dataclass(frozen=True)
+class Stribeck(Coulomb):
+    """Friction that is larger at rest than at speed (M2); attributes as of `FrictionTerms`."""
+
+    name: ClassVar[str] = "stribeck"
+    stribeck: float = 0.0
+    stribeck_speed: float = 0.2
+    stribeck_exponent: float = 1.0
+
+    def terms(self) -> FrictionTerms:
+        """The terms beside Coulomb's."""
+        return FrictionTerms(self.stribeck, self.stribeck_speed, self.stribeck_exponent)
+
+
+@dataclass(frozen=True)
+class Load(Coulomb):
+    """Friction that grows with the torques on both sides of the gear by the same share (M3)."""
+
+    name: ClassVar[str] = "load"
+    load: float = 0.0
+
+    def terms(self) -> FrictionTerms:
+        """The terms beside Coulomb's."""
+        return FrictionTerms(motor_load=self.load, joint_load=self.load)
+
+
+@dataclass(frozen=True)
+class StribeckLoad(Stribeck):
+    """Both (M4)."""
+
+    name: ClassVar[str] = "stribeckLoad"
+    load: float = 0.0
+    stribeck_load: float = 0.0
+
+    def terms(self) -> FrictionTerms:
+        """The terms beside Coulomb's."""
+        return super().terms()._replace(
+            motor_load=self.load, joint_load=self.load, stribeck_motor_load=self.stribeck_load,
+            stribeck_joint_load=self.stribeck_load,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Directional(Stribeck):
+    """As M4, with a share for each side: a gear loses otherwise where the motor drives than where it is driven (M5)."""
+
+    name: ClassVar[str] = "directional"
+    motor_load: float = 0.0
+    joint_load: float = 0.0
+    stribeck_motor_load: float = 0.0
+    stribeck_joint_load: float = 0.0
+
+    def terms(self) -> FrictionTerms:
+        """The terms beside Coulomb's."""
+        return super().terms()._replace(
+            motor_load=self.motor_load, joint_load=self.joint_load, stribeck_motor_load=self.stribeck_motor_load,
+            stribeck_joint_load=self.stribeck_joint_load,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Quadratic(Directional):
+    """As M5, and by the square of the torque (M6)."""
+
+    name: ClassVar[str] = "quadratic"
+    motor_quadratic: float = 0.0
+    joint_quadratic: float = 0.0
+
+    def terms(self) -> FrictionTerms:
+        """The terms beside Coulomb's."""
+        return super().terms()._replace(motor_quadratic=self.motor_quadratic, joint_quadratic=self.joint_quadratic)
+
+
+FRICTION_LAWS: tuple[type[Coulomb], ...] = (Coulomb, Stribeck, Load, StribeckLoad, Directional, Quadratic)
+
+
+@dataclass(frozen=True)
+class DirectCurrent:
+    """A motor that is fed with a voltage: its controller sets the duty cycle in proportion to the error.
+
+        torque = torque_constant / resistance (voltage clip(duty_gain error) - torque_constant speed)
+
+    Attributes:
+        voltage, resistance: Of the supply [V] and of the winding [ohm].
+        torque_constant: Seen at the joint [N m/A].
+        duty_gain: Duty cycle by the error [1/rad].
+        max_duty: Largest duty cycle.
+    """
+
+    voltage: float
+    resistance: float
+    torque_constant: float
+    duty_gain: float
+    max_duty: float = 1.0
+
+    @property
+    def position_gain(self) -> float:
+        """[N m/rad]."""
+        return self.torque_constant / self.resistance * self.voltage * self.duty_gain
+
+    @property
+    def largest_torque(self) -> float:
+        """At rest [N m]."""
+        return self.torque_constant / self.resistance * self.voltage * self.max_duty
+
+    @property
+    def back_emf(self) -> float:
+        """Torque that the induced voltage takes [N m s/rad]."""
+        return self.torque_constant**2 / self.resistance
 
 
 @dataclass(frozen=True)
@@ -24,6 +170,9 @@ class Rotor:
         friction_speed: Speed by which it is smoothed [rad/s].
         no_load_speed: At which the motor has no torque left [rad/s].
         knee: Share of it up to which the largest torque is there.
+        law: What else friction depends on.
+        back_emf: Torque that the voltage which the rotor induces takes from a motor fed with a voltage, whatever its
+            controller wants [N m s/rad].
     """
 
     armature: float = 0.0
@@ -34,6 +183,8 @@ class Rotor:
     friction_speed: float = FRICTION_SPEED
     no_load_speed: float = np.inf
     knee: float = 0.0
+    law: Coulomb = Coulomb()
+    back_emf: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -55,8 +55,21 @@ QUANTITIES = {
     "viscous_friction": Quantity("viscous friction", "N m s/rad", 1.0, "N m s/rad", "N s/m", "N s/m"),
     "position_gain": Quantity("position gain", "N m/rad", 1.0, "N m/rad", "N/m", "N/m", True),
     "velocity_gain": Quantity("velocity gain", "N m s/rad", 1.0, "N m s/rad", "N s/m", "N s/m"),
+    "torque_constant": Quantity("torque constant, at the joint", "N m/A", 1.0, "N m/A", "N/A", "N/A", True),
+    "resistance": Quantity("resistance of the winding", "ohm", 1.0, "ohm", "ohm", "ohm", True),
     "delay": Quantity("delay", "s", 1.0, "s", "s", "s"),
     "backlash": Quantity("backlash, end to end", "deg", math.pi / 180.0, "rad", "m", "m"),
+    "stribeck": Quantity("friction at rest, gone at speed", "N m", 1.0, "N m", "N", "N"),
+    "stribeck_speed": Quantity("speed at which it is gone", "deg/s", math.pi / 180.0, "rad/s", "m/s", "m/s", True),
+    "stribeck_exponent": Quantity("exponent of its decay", "", 1.0, "", "", "", True),
+    "load": Quantity("friction by the torque in the gear", "", 1.0, "", "", ""),
+    "stribeck_load": Quantity("the same, gone at speed", "", 1.0, "", "", ""),
+    "motor_load": Quantity("friction by the motor's torque", "", 1.0, "", "", ""),
+    "joint_load": Quantity("friction by the joint's torque", "", 1.0, "", "", ""),
+    "stribeck_motor_load": Quantity("the first of both, gone at speed", "", 1.0, "", "", ""),
+    "stribeck_joint_load": Quantity("the second of both, gone at speed", "", 1.0, "", "", ""),
+    "motor_quadratic": Quantity("friction by its square, driven", "1/(N m)", 1.0, "1/(N m)", "1/N", "1/N"),
+    "joint_quadratic": Quantity("friction by its square, driving", "1/(N m)", 1.0, "1/(N m)", "1/N", "1/N"),
 }
 
 
@@ -72,6 +85,7 @@ class MotorType:
         title: What it is, for people.
         group: One of `GROUPS`.
         aliases: Other names.
+        law: Name of the law of its friction; empty: Coulomb's.
     """
 
     name: str
@@ -81,6 +95,7 @@ class MotorType:
     title: str = ""
     group: str = "other"
     aliases: tuple[str, ...] = ()
+    law: str = ""
 
     def get(self, quantity: str, fallback: float) -> float:
         """A value in SI, or the fallback where it is not known."""
@@ -166,7 +181,7 @@ def _motor_type(at: _Table, table: Any) -> MotorType:
     if not isinstance(table, dict):
         at.problems.append(ShotError("must be a table", path=at.file, attribute=at.name, found=table, remedy=_REMEDY))
         return MotorType(at.name, {}, {})
-    texts, linear = ("title", "group"), table.get("linear", False)
+    texts, linear = ("title", "group", "friction_model"), table.get("linear", False)
     if not isinstance(linear, bool):
         at.wrong("must be true or false", "linear", linear)
     values = {}
@@ -182,6 +197,7 @@ def _motor_type(at: _Table, table: Any) -> MotorType:
     return MotorType(
         at.name, values, _sources(at, table.get("sources", {}), values), linear is True,
         str(table.get("title", at.name)), str(table.get("group", "other")), tuple(map(str, table.get("aliases", ()))),
+        str(table.get("friction_model", "")),
     )  # fmt: skip
 
 

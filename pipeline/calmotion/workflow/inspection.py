@@ -260,7 +260,7 @@ def _motor(motor: Motor, track: Track, character: Character) -> dict[str, Any]:
     }
 
 
-def _rotor(motor: Motor, newtons: str, unit: str) -> dict[str, float]:
+def _rotor(motor: Motor, newtons: str, unit: str) -> dict[str, float | str]:
     """The rotor of a servo; infinite where there is no limit."""
     own = motor.rotor
     return {
@@ -272,6 +272,8 @@ def _rotor(motor: Motor, newtons: str, unit: str) -> dict[str, float]:
         f"friction_speed_{unit}_s": own.friction_speed,
         f"no_load_speed_{unit}_s": own.no_load_speed,
         "torque_speed_knee": own.knee,
+        "friction_model": own.law.name,
+        f"back_emf_{newtons}_s_{unit}": own.back_emf,
     }
 
 

@@ -1,10 +1,30 @@
 """Simulations of motors that give, for the tests of drives and of servos."""
 
+from dataclasses import replace
+
 import numpy as np
+from arms import chain, compiled
+from calmotion.model.motor import Rotor
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
+
+G = 9.81
+MASS, LENGTH = 0.8, 0.5
+INERTIA = MASS * LENGTH**2
+
+
+def servo(character, k, d, limit=np.inf, **rotor):
+    """The model with all motors as servos."""
+    changes = {"model": "servo", "position_gain": k, "velocity_gain": d, "rotor": Rotor(**rotor), "max_torque": limit}
+    motors = tuple(replace(motor, **changes) for motor in character.motors)
+    return compiled(replace(character, motors=motors))
+
+
+def pendulum(*gains, gravity=G, **rotor):
+    character = chain(1, driven=(0,), mass=MASS, length=LENGTH)
+    return servo(replace(character, gravity=np.array([0.0, 0.0, -gravity])), *gains, **rotor)
 
 
 def run(model, motors, rates, h, integrator="bdf2"):

@@ -9,6 +9,7 @@ from calmotion.multibody.kernels import components as component_kernels
 from calmotion.multibody.model.system import (
     LINEAR,
     NEOHOOKEAN,
+    SERVO_COLUMNS,
     STVK,
     System,
     allocate_state,
@@ -140,7 +141,7 @@ def particle_system(
         rows=np.array(rows, dtype=np.int32),
         servos=np.zeros(0, dtype=np.int32),
         rotor=np.full(joints, -1, dtype=np.int32),
-        servo=np.zeros((joints, 8)),
+        servo=np.zeros((joints, SERVO_COLUMNS)),
         sliding=np.isin(np.arange(joints), sliding).astype(np.int32),
         moving=np.array([moving.index(j) if j in moving else -1 for j in range(joints)], dtype=np.int32),
         contact=np.zeros(joints, dtype=np.int32),

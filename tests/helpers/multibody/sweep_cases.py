@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from calmotion.model import Motor
-from calmotion.model.motor import Rotor
+from calmotion.model.motor import Quadratic, Rotor
 from calmotion.multibody.analysis.kinematics import set_rotors, system_poses
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
@@ -38,6 +38,9 @@ def motor_of(model, gain):
     if model == "damped drive":
         return Motor(0, "", "", model="drive", position_gain=gain, velocity_gain=3.0, damping_on="joint")
     rotor = Rotor(0.3, np.inf, 0.0, 0.2, 0.4, 0.5, 40.0, 0.2)
+    if model == "load":
+        law = Quadratic(0.3, 0.4, 2.0, 0.05, 0.02, 0.05, 0.1, 1e-4, 2e-4)
+        rotor = replace(rotor, law=law, back_emf=0.3)
     if model == "servo":
         rotor = replace(rotor, gear_stiffness=5.0 * gain, gear_damping=1.0)
     return Motor(0, "", "", model="servo", position_gain=gain, velocity_gain=3.0, rotor=rotor, max_torque=0.2 * gain)
@@ -156,6 +159,7 @@ CASES = {
         LOOPED,
     ),
     "servos": ([6, 6, 5, 6], [STVK, LINEAR, LINEAR, LINEAR], (3,), (), (), 0, (1,), True, SERVOS),
+    "friction by load": ([6, 6, 6, 6], None, (3,), (), (), 0, (), True, dict.fromkeys((0, 1, 3), "load")),
     "servos around a loop": (
         [6, 6, 3, 5],
         None,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from arms import chain, compiled
 from calmotion.model import Motor
-from calmotion.model.motor import Rotor
+from calmotion.model.motor import Quadratic, Rotor
 from calmotion.multibody.motors.inverse import inverse_commands
 from motor_runs import pitch, run
 
@@ -15,13 +15,24 @@ TIMES = H * np.arange(700)
 WAVE = np.pi * np.clip((TIMES - 0.1) / 0.5, 0.0, 1.0)
 CURVE = (0.4 * np.sin(WAVE) ** 4)[:, None]
 SERVO = {"model": "servo", "rotor": Rotor(0.05, np.inf, 0.0, 0.5, 0.3), "max_torque": 60.0}
+LOADED = {
+    "model": "servo",
+    "rotor": Rotor(0.05, np.inf, 0.0, 0.3, 0.3, back_emf=0.2, law=Quadratic(0.2, 0.3, 1.2, 0.1, 0.05, 0.02, 0.1, 0.01)),
+}
 GEAR = {"model": "servo", "rotor": replace(SERVO["rotor"], gear_stiffness=900.0)}
 
 
 @pytest.mark.parametrize(
     ("kind", "more"),
-    [("joint", {"model": "drive"}), ("error", {"model": "drive"}), ("joint", SERVO), ("error", SERVO), ("joint", GEAR)],
-    ids=["damped drive", "drive", "damped servo", "servo", "gear"],
+    [
+        ("joint", {"model": "drive"}),
+        ("error", {"model": "drive"}),
+        ("joint", SERVO),
+        ("error", SERVO),
+        ("joint", GEAR),
+        ("error", LOADED),
+    ],
+    ids=["damped drive", "drive", "damped servo", "servo", "gear", "friction by load"],
 )
 def test_motors_on_the_commands_do_what_ideal_ones_do(kind, more):
     character = chain(1, driven=(0,), length=0.4, mass=0.8)

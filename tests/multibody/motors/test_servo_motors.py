@@ -6,27 +6,10 @@ import numpy as np
 import pytest
 from arms import chain, compiled, frame
 from calmotion.model import Body, Character, Joint, MassProperties, Motor
-from calmotion.model.motor import Rotor
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.motors.servos import motor_effort
-from motor_runs import pitch, run, smooth
+from motor_runs import INERTIA, LENGTH, MASS, G, pendulum, pitch, run, servo, smooth
 from scipy.integrate import solve_ivp
-
-G = 9.81
-MASS, LENGTH = 0.8, 0.5
-INERTIA = MASS * LENGTH**2
-
-
-def servo(character, k, d, limit=np.inf, **rotor):
-    """The model with all motors as servos."""
-    changes = {"model": "servo", "position_gain": k, "velocity_gain": d, "rotor": Rotor(**rotor), "max_torque": limit}
-    motors = tuple(replace(motor, **changes) for motor in character.motors)
-    return compiled(replace(character, motors=motors))
-
-
-def pendulum(*gains, gravity=G, **rotor):
-    character = chain(1, driven=(0,), mass=MASS, length=LENGTH)
-    return servo(replace(character, gravity=np.array([0.0, 0.0, -gravity])), *gains, **rotor)
 
 
 def test_two_mass_joint_has_its_closed_form_resonance_and_antiresonance():

@@ -46,7 +46,7 @@ def test_gradient_matches_central_differences_of_the_whole_simulation(case):
     g_angle, g_rate = adjoint(lin, gradient)
     d_angle, d_rate = curves(case.dp)
     found = float(np.sum(g_angle * d_angle) + np.sum(g_rate * d_rate))
-    e = 1e-3
+    e = 5e-4
 
     def difference(e):
         return (case.value(case.p + e * case.dp) - case.value(case.p - e * case.dp)) / (2 * e)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from calmotion.cli import Output, console_on, json_option, print_table, say
+from calmotion.model.motor import Coulomb
 
 if TYPE_CHECKING:
     from calmotion.rigging.motor_types import MotorType
@@ -60,6 +61,7 @@ def _row(motor: MotorType) -> dict[str, Any]:
         "group": motor.group,
         "aliases": list(motor.aliases),
         "linear": motor.linear,
+        "friction_model": motor.law or Coulomb.name,
         "values": {
             name: {"value": value, "unit": units[name], "source": motor.sources[name]}
             for name, value in motor.values.items()
@@ -74,6 +76,7 @@ def _as_toml(motor: MotorType) -> str:
     lines = [f"[{motor.name}]", f"title = {text(motor.title)}", f"group = {text(motor.group)}"]
     lines += [f"aliases = {text(list(motor.aliases))}"] if motor.aliases else []
     lines += ["linear = true"] if motor.linear else []
+    lines += [f"friction_model = {text(motor.law)}"] if motor.law else []
     lines += [f"{name} = {float(f'{motor.in_table(name):.12g}')!r}" for name in motor.values]
     lines += [f"[{motor.name}.sources]", *(f"{name} = {text(motor.sources[name])}" for name in motor.values)]
     return "\n".join(lines) + "\n"

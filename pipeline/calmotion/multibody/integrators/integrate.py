@@ -21,7 +21,7 @@ from calmotion.multibody.integrators.trajectory import Inputs, Trajectory, copy_
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.moving_markers import rooted
 from calmotion.multibody.model.phases import has_contacts
-from calmotion.multibody.model.system import State, System
+from calmotion.multibody.model.system import BEYOND_COULOMB, State, System
 from calmotion.multibody.motors.between_instants import hermite_drive, stage_inputs
 from calmotion.multibody.statics.equilibrium import equilibrium
 
@@ -44,12 +44,17 @@ def integrate(
     knots on instants.
 
     Raises:
-        IntegrationError: Contacts, by another integrator than BDF2.
+        IntegrationError: Contacts, by another integrator than BDF2; friction that depends on accelerations, by RK4.
     """
     if has_contacts(system) and integrator != "bdf2":
         raise IntegrationError(
             "only bdf2 simulates contacts", attribute="--integrator", found=integrator, remedy="Leave it out."
         )
+    if integrator == "rk4" and np.any(system.servo[:, BEYOND_COULOMB]):
+        raise IntegrationError(
+            "rk4 simulates no friction of motors but Coulomb's", attribute="--integrator", found=integrator,
+            remedy="Leave it out, or set calm:motor:frictionModel to coulomb.",
+        )  # fmt: skip
     if integrator in IMPLICIT:
         try:
             return simulate(

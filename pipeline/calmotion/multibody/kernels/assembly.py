@@ -222,7 +222,7 @@ def assemble(
         law, u, v = law_of(system, b), state.u[b], state.V[b, 6:]
         neohookean_forces(law, u, v, tangent, w.law, blocks.res[b], blocks.P[b], blocks.K[b])
     for joint in system.servos:
-        servo_rows(system, joint, angle[joint], rate[joint], integrator.gamma, state, tangent, blocks)
+        servo_rows(system, joint, angle[joint], rate[joint], integrator.gamma, state, Vd, tangent, blocks)
     if tangent:
         acceleration = integrator.acceleration
         for b in range(count):

@@ -11,6 +11,7 @@ import numpy as np
 from calmotion.arrays import Array, IntArray
 from calmotion.model.character import WORLD, Character, Frame
 from calmotion.multibody.kernels.so3 import matrix_of
+from calmotion.multibody.model.system import SERVO_COLUMNS
 from calmotion.multibody.model.topology import Tree
 from calmotion.reduction.reduced_body import Marker, ReducedBody
 
@@ -115,8 +116,8 @@ def joint_arrays(
         rest[k] = _rest_value(character, bodies_of, position[k], rotation[k], joint.kind == "prismatic")
     arrays = {
         "side": side, "rows": rows, "servos": np.zeros(0, np.int32), "rotor": np.full(count, -1, np.int32),
-        "servo": np.zeros((count, 8)), "sliding": sliding, "moving": moved, "contact": contact, "position": position,
-        "rotation": rotation, "Phi": Phi, "Psi": Psi,
+        "servo": np.zeros((count, SERVO_COLUMNS)), "sliding": sliding, "moving": moved, "contact": contact,
+        "position": position, "rotation": rotation, "Phi": Phi, "Psi": Psi,
     }  # fmt: skip
     return JointArrays(arrays, motor, sign, rest)
 

@@ -20,6 +20,8 @@ JOINT_ROWS = 6
 BACKWARD_DIFFERENCE, NEWMARK = 0, 1  # families of time-stepping formulas
 # columns of `System.servo`
 POSITION_GAIN, VELOCITY_GAIN, FRICTION, FRICTION_SPEED, LARGEST_EFFORT, INVERSE_SPEED, KNEE, RATE_SHARE = range(8)
+BACK_EMF, BEYOND_COULOMB, FRICTION_TERMS = 8, 9, 10
+SERVO_COLUMNS = 19
 LINEAR, STVK, NEOHOOKEAN = 0, 1, 2  # elastic laws; `finite_rotation` distinguishes linear and nonlinear by zero
 
 
@@ -37,10 +39,11 @@ class System(NamedTuple):
             (floating), shape [J].
         servos: Numbers of the joints that have a rotor.
         rotor: Elastic coordinate of the component on side 1 that is a joint's rotor, -1 for none, shape [J].
-        servo: Of each rotor's motor, shape [J, 8]: gains [N m/rad], [N m s/rad], Coulomb friction [N m] and the speed
+        servo: Of each rotor's motor, shape [J, 19]: gains [N m/rad], [N m s/rad], Coulomb friction [N m] and the speed
             by which it is smoothed [rad/s], largest effort [N m], inverse of the no-load speed [s/rad], the share of it
             up to which the largest effort is there, and the share of the command's rate that the velocity gain
-            multiplies: 1, or 0 where it acts on the joint's own speed.
+            multiplies: 1, or 0 where it acts on the joint's own speed; torque by the induced voltage [N m s/rad],
+            whether friction has more terms than Coulomb's, and these (`model.motor.FrictionTerms`).
         sliding: Whether a joint has a length along its axis instead of an angle, shape [J].
         moving: Row of `work.Work.world` that moves the world-side marker of a joint, -1 for none, shape [J].
         contact: Rows of a joint that comes and goes while it holds, 0 for other joints, shape [J]; see `phases`.

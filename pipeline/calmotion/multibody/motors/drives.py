@@ -27,7 +27,7 @@ import numpy as np
 
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
-from calmotion.model.motor import ON_ERROR, PRESCRIBED, SERVO, Motor, Rotor
+from calmotion.model.motor import ON_ERROR, PRESCRIBED, SERVO, Coulomb, Motor, Rotor
 from calmotion.multibody.model.system import LINEAR, System
 
 
@@ -157,5 +157,5 @@ def _controller(motor: Motor, own: Rotor) -> list[float]:
     return [
         motor.position_gain, motor.velocity_gain, own.friction, own.friction_speed,
         motor.max_torque if motor.model == SERVO else math.inf, 1.0 / own.no_load_speed, own.knee,
-        float(motor.damping_on == ON_ERROR),
+        float(motor.damping_on == ON_ERROR), own.back_emf, float(own.law != Coulomb()), *own.law.terms(),
     ]  # fmt: skip

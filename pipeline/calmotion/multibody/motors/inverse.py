@@ -10,8 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.model.motor import ON_JOINT, PRESCRIBED, SERVO, Motor, Rotor
+from calmotion.model.motor import ON_JOINT, PRESCRIBED, SERVO, Coulomb, Motor, Rotor
+from calmotion.multibody.model.system import FRICTION, FRICTION_TERMS, SERVO_COLUMNS
+from calmotion.multibody.motors.friction import largest_friction
 
+_TURNS = 20
 _TORQUE_SHARE = 0.95  # of its largest torque, that a command asks of a motor at most
 
 
@@ -38,14 +41,33 @@ def _command(motor: Motor, times: Array, value: Array, effort: Array) -> Array:
     own, h = motor.rotor if motor.model == SERVO else Rotor(), float(times[1] - times[0])
     turned = value + effort / own.gear_stiffness
     speed = np.gradient(turned, h)
-    friction = own.viscous_friction * speed + own.friction * np.tanh(speed / own.friction_speed)
-    wanted = effort + own.armature * np.gradient(speed, h) + friction
+    wanted = effort + own.armature * np.gradient(speed, h) + (own.viscous_friction + own.back_emf) * speed
+    wanted = wanted + _friction(own, effort, wanted - own.back_emf * speed, speed)
     if motor.model == SERVO:
         wanted = np.clip(wanted, -_TORQUE_SHARE * motor.max_torque, _TORQUE_SHARE * motor.max_torque)
     lag = motor.velocity_gain / motor.position_gain
     ahead = wanted / motor.position_gain
     ahead = ahead + lag * speed if motor.damping_on == ON_JOINT else _relaxed(ahead, h / max(lag, 1e-9 * h))
     return np.asarray(np.interp(times + motor.delay, times, turned + ahead))
+
+
+def _friction(own: Rotor, effort: Array, left: Array, speed: Array) -> Array:
+    """Friction of a rotor that passes an effort on.
+
+    Args:
+        left: What the motor exerts besides friction, shape [T].
+        speed: Of the rotor, shape [T].
+    """
+    share = np.tanh(speed / own.friction_speed)
+    found = own.friction * share
+    if own.law == Coulomb():
+        return np.asarray(found)
+    row = np.zeros(SERVO_COLUMNS)
+    row[FRICTION], row[FRICTION_TERMS:] = own.friction, own.law.terms()
+    for _ in range(_TURNS):  # it is less than the torque of the motor that it depends on
+        sizes = [largest_friction(row, m, t, w)[0] for m, t, w in zip(left + found, effort, speed, strict=True)]
+        found = share * np.array(sizes)
+    return np.asarray(found)
 
 
 def _relaxed(wanted: Array, ratio: float) -> Array:

@@ -5,10 +5,11 @@ The rotor's angle phi, seen at the joint, is an elastic coordinate of the compon
 
     tau_f tanh(phi' / w_f) - tau_m,     tau_m = sat(k_p (theta_c - phi) + k_d (r theta_c' - phi'), phi')
 
-where r is 1, or 0 for a velocity gain on the joint's own speed, and sat keeps the torque, e, between limits that depend
-on the speed: the largest torque T up to a share (the knee) of the no-load speed w_0, from there falling linearly to
-zero at w_0; against the motion it is T. All of it is smooth: with s(x) = x / (1 + x^16)^(1/16), which is x to 1e-6 up
-to x = 0.5 and never exceeds one,
+where r is 1, or 0 for a velocity gain on the joint's own speed. `friction` has other laws of friction than this
+Coulomb's, and where a motor is fed with a voltage, the torque by the voltage that it induces is taken from tau_m.
+sat keeps the torque, e, between limits that depend on the speed: the largest torque T up to a share (the knee) of the
+no-load speed w_0, from there falling linearly to zero at w_0; against the motion it is T. All of it is smooth: with
+s(x) = x / (1 + x^16)^(1/16), which is x to 1e-6 up to x = 0.5 and never exceeds one,
 
     upper = T s((1 - phi'/w_0) / (1 - knee)),   lower = -T s((1 + phi'/w_0) / (1 - knee))
     tau_m = middle + half s((e - middle) / half),   middle, half = (upper + lower) / 2, (upper - lower) / 2
@@ -20,6 +21,8 @@ import math
 
 from calmotion.arrays import Array
 from calmotion.multibody.model.system import (
+    BACK_EMF,
+    BEYOND_COULOMB,
     FRICTION,
     FRICTION_SPEED,
     INVERSE_SPEED,
@@ -32,6 +35,7 @@ from calmotion.multibody.model.system import (
     State,
     System,
 )
+from calmotion.multibody.motors.friction import gear_friction
 from calmotion.support.compilation import kernel, shared_kernel
 
 _LEAST = 1e-6  # distance of the limits, of the largest torque
@@ -82,18 +86,21 @@ def rotor_effort(system: System, joint: int, angle: float, rate: float, state: S
     motor, speed = system.servo[joint], state.V[b, 6 + k]
     too_slow = motor[RATE_SHARE] * rate - speed
     wanted = motor[POSITION_GAIN] * (angle - state.u[b, k]) + motor[VELOCITY_GAIN] * too_slow
-    return motor_effort(motor, wanted, speed)[0]
+    induced: float = motor[BACK_EMF] * speed
+    return motor_effort(motor, wanted, speed)[0] - induced
 
 
 @shared_kernel
 def servo_rows(
-    system: System, joint: int, angle: float, rate: float, gamma: float, state: State, tangent: bool, blocks: Blocks
-) -> None:
-    """Adds the motor's torque and the friction to the row of the rotor, and their derivatives to K, P and on_rotor.
+    system: System, joint: int, angle: float, rate: float, gamma: float, state: State, Vd: Array, tangent: bool,
+    blocks: Blocks,
+) -> None:  # fmt: skip
+    """Adds the motor's torque and the friction to the row of the rotor, and their derivatives to K, P, D and on_rotor.
 
     Args:
         angle, rate: The command.
         gamma: 1, or 0 where the system rests: nothing then depends on velocities.
+        Vd: Accelerations, shape [B, N].
     """
     b, k = system.side[joint, 1], system.rotor[joint]
     motor, a = system.servo[joint], 6 + k
@@ -101,14 +108,26 @@ def servo_rows(
     speed = gamma * state.V[b, a]
     wanted = stiffness * (angle - state.u[b, k]) + damping * (motor[RATE_SHARE] * rate - speed)
     effort, by_wanted, by_speed = motor_effort(motor, wanted, speed)
-    friction, width = motor[FRICTION], motor[FRICTION_SPEED]
-    drag = math.tanh(speed / width) if friction > 0.0 else 0.0
-    blocks.res[b, a] += friction * drag - effort
+    effort -= motor[BACK_EMF] * speed
+    by_speed -= motor[BACK_EMF]
+    drag, by_effort, drag_by_speed = 0.0, 0.0, 0.0
+    if motor[BEYOND_COULOMB] > 0.0:
+        viscous, inertia = system.damping[b, k, k], system.inertia[b, k]
+        left = effort - inertia * Vd[b, a] - viscous * speed
+        drag, by_effort, by_left, drag_by_speed = gear_friction(motor, effort, left, speed)
+        by_effort += by_left
+        drag_by_speed -= by_left * viscous
+        if tangent:
+            blocks.D[b, a, a] -= by_left * inertia
+    elif motor[FRICTION] > 0.0:
+        share = math.tanh(speed / motor[FRICTION_SPEED])
+        drag = motor[FRICTION] * share
+        drag_by_speed = motor[FRICTION] / motor[FRICTION_SPEED] * (1.0 - share * share)
+    blocks.res[b, a] += drag - effort
     if not tangent:
         return
+    by_wanted *= 1.0 - by_effort
     blocks.K[b, a, a] += by_wanted * stiffness
-    blocks.P[b, a, a] += by_wanted * damping - by_speed
-    if friction > 0.0:
-        blocks.P[b, a, a] += friction / width * (1.0 - drag * drag)
+    blocks.P[b, a, a] += by_wanted * damping - (1.0 - by_effort) * by_speed + drag_by_speed
     blocks.on_rotor[joint, 0] = -by_wanted * stiffness
     blocks.on_rotor[joint, 1] = -by_wanted * damping * motor[RATE_SHARE]

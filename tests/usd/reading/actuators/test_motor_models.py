@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from calmotion import ShotError
 from calmotion.model.motor import Rotor
+from calmotion.rigging.motor_types import motor_types
 from calmotion.usd.reading import read_shot
 from pxr import Sdf, UsdPhysics, Vt
 from small_shots import ELBOW, SHOULDER, Scale, set_float, write_arm
@@ -260,3 +261,67 @@ def test_models_and_gains_that_cannot_be_used_are_refused(tmp_path, edit, attrib
 
 def test_gains_that_no_model_uses_are_not_refused(tmp_path):
     assert read(tmp_path, lambda stage: physics_gains(stage, -2.0))[1].position_gain == 0.0
+
+
+def written(stage, tokens, **values):
+    """A servo with tokens and numbers in its attributes, by names with `__` for `:`."""
+    model(stage, "servo")
+    prim = stage.GetPrimAtPath(ELBOW)
+    for name, value in tokens.items():
+        prim.CreateAttribute(f"calm:motor:{name}", Sdf.ValueTypeNames.Token).Set(value)
+    for name, value in values.items():
+        set_float(stage, ELBOW, f"calm:motor:{name.replace('__', ':')}", value)
+
+
+def test_laws_of_friction_are_read_in_si_from_grams_and_centimetres(tmp_path):
+    values = {
+        "friction__stribeck": 3e6, "friction__stribeckSpeed": 90.0, "friction__motorLoad": 0.2,
+        "friction__jointLoad": 0.1, "friction__motorQuadratic": 2e-9, "positionGain": 1.0,
+    }  # fmt: skip
+    elbow = read(tmp_path, lambda stage: written(stage, {"frictionModel": "quadratic"}, **values), Scale(0.01, 0.001))[
+        1
+    ]
+    law = elbow.rotor.law
+    assert (law.name, law.stribeck_exponent, law.joint_quadratic) == ("quadratic", 1.0, 0.0)
+    assert (law.stribeck, law.stribeck_speed) == pytest.approx((0.3, np.pi / 2))
+    assert (law.motor_load, law.joint_load, law.motor_quadratic) == pytest.approx((0.2, 0.1, 0.02))
+
+
+VOLTS = {"voltage": 7.4, "resistance": 4.0, "torqueConstant": 0.4, "dutyGain": 0.03}
+
+
+def test_a_motor_fed_with_a_voltage_has_gain_limit_and_back_emf_of_its_winding(tmp_path):
+    elbow = read(tmp_path, lambda stage: written(stage, {}, viscousFriction=1e-4, maxDuty=0.9, **VOLTS))[1]
+    per_degree = 57.29577951308232
+    assert elbow.position_gain == pytest.approx(0.4 / 4.0 * 7.4 * 0.03 * per_degree)
+    assert elbow.max_torque == pytest.approx(0.4 / 4.0 * 7.4 * 0.9)
+    assert (elbow.rotor.back_emf, elbow.rotor.viscous_friction) == pytest.approx((0.04, 1e-4 * per_degree))
+
+    def of_a_type(stage):
+        written(stage, {"type": "xl330-m288"}, voltage=5.0, dutyGain=0.03)
+
+    named = read(tmp_path, of_a_type)[1].rotor
+    kind = motor_types()["xl330-m288"].values
+    assert named.back_emf == pytest.approx(kind["torque_constant"] ** 2 / kind["resistance"])
+    assert named.back_emf + named.viscous_friction == pytest.approx(kind["viscous_friction"])
+
+
+@pytest.mark.parametrize(
+    ("tokens", "values", "attribute", "what"),
+    [
+        ({"frictionModel": "stribek"}, {}, "frictionModel", "Did you mean stribeck"),
+        ({"frictionModel": "load"}, {"friction__stribeck": 1.0}, "friction:stribeck", "has no such value"),
+        ({}, {"friction__load": 0.1}, "friction:load", "has no such value"),
+        ({"frictionModel": "load"}, {"friction__load": -0.1}, "friction:load", "not negative"),
+        ({"frictionModel": "load"}, {"friction__load": 1.5}, "frictionModel", "takes all torque"),
+        ({"frictionModel": "stribeck"}, {"friction__stribeckSpeed": 0.0}, "friction:stribeckSpeed", "finite"),
+        ({}, VOLTS | {"positionGain": 1.0}, "positionGain", "by the duty cycle"),
+        ({}, VOLTS | {"resistance": -1.0}, "resistance", "positive"),
+        ({}, {"voltage": 5.0}, "resistance", "needs it"),
+    ],
+)
+def test_frictions_and_windings_that_cannot_be_are_refused(tmp_path, tokens, values, attribute, what):
+    given = {"positionGain": 1.0} | values if "voltage" not in values else values
+    with pytest.raises(ShotError, match=what) as caught:
+        read(tmp_path, lambda stage: written(stage, tokens, **given))
+    assert (caught.value.path, caught.value.attribute) == (ELBOW, f"calm:motor:{attribute}")

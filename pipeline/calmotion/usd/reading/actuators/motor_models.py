@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.model.motor import MODELS, ON_ERROR, ON_JOINT, PRESCRIBED
+from calmotion.model.motor import MODELS, ON_ERROR, ON_JOINT, PRESCRIBED, DirectCurrent
 from calmotion.rigging.motor_types import MotorType
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
@@ -74,7 +74,7 @@ def _token(prim: Usd.Prim, name: str, allowed: Sequence[str], fallback: str, wha
 
 def read_gains(
     joint: JointPrim, actuator: Usd.Prim | None, newton: NewtonActuator | None, units: StageUnits, model: str,
-    kind: MotorType,
+    kind: MotorType, current: DirectCurrent | None = None,
 ) -> Gains:  # fmt: skip
     """The gains that pull a joint towards the motor's command; those of the first source that has a position gain:
     Calmotion, the named motor, UsdPhysics, an actuator of MuJoCo or of Newton.
@@ -84,10 +84,13 @@ def read_gains(
         newton: The actuator of Newton that does.
         model: Of the motor: one that gives must have gains.
         kind: The named motor; its velocity gain goes with a position gain of Calmotion's, too.
+        current: The motor, where it is fed with a voltage: its gain is that of its duty cycle.
 
     Raises:
         ShotError: A gain that is negative or not finite, a motor that gives without a gain, or a wrong DAMPING_ON.
     """
+    if current is not None:
+        return Gains(current.position_gain, 0.0, "calm:motor:dutyGain and calm:motor:voltage (Calmotion)")
     used = model != PRESCRIBED
     own, *others = zip(_POSITION, _VELOCITY, strict=True)
     found = (

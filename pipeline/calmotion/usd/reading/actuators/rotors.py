@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.model.motor import PRESCRIBED, SERVO, Rotor
+from calmotion.model.motor import PRESCRIBED, SERVO, DirectCurrent, Rotor
 from calmotion.rigging.motor_types import MotorType
 from calmotion.usd.dialects import ARMATURE, FRICTION, VISCOUS_FRICTION, Spelling, authored
+from calmotion.usd.reading.actuators.laws import friction_law
 from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.units import StageUnits
@@ -95,15 +96,26 @@ def read_backlash(joint: JointPrim, units: StageUnits, kind: MotorType) -> float
 
 
 def read_rotor(
-    joint: JointPrim, units: StageUnits, model: str, kind: MotorType, newton: NewtonActuator | None, notes: list[str]
-) -> Rotor:
+    joint: JointPrim, units: StageUnits, model: str, kind: MotorType, newton: NewtonActuator | None, notes: list[str],
+    current: DirectCurrent | None = None,
+) -> Rotor:  # fmt: skip
     """The rotor of a servo, SI; of an ideal motor the one that it would have as a servo, and of a drive an empty one.
+
+    Args:
+        current: The motor, where it is fed with a voltage. Viscous friction of a named motor then comes without what
+            its torque constant and its resistance make of it.
 
     Raises:
         ShotError: A value out of its range, of a servo or a motor whose type is named.
     """
     if model == SERVO or kind.values:
-        return _rotor(joint, units, model, kind, newton, notes)
+        found = _rotor(joint, units, model, kind, newton, notes)
+        if current is None:
+            return found
+        viscous = found.viscous_friction
+        if viscous == kind.get("viscous_friction", -1.0) and "resistance" in kind.values:
+            viscous = max(0.0, viscous - kind.values["torque_constant"] ** 2 / kind.values["resistance"])
+        return replace(found, viscous_friction=viscous, back_emf=current.back_emf)
     try:
         found = _rotor(joint, units, model, kind, newton, [])
     except ShotError:
@@ -158,6 +170,7 @@ def _rotor(
         friction_speed=at.own("frictionSpeed", "friction_speed", length, empty.friction_speed, positive=True),
         no_load_speed=at.own("noLoadSpeed", "no_load_speed", length, speed, positive=True),
         knee=knee,
+        law=friction_law(joint, units, kind),
     )  # fmt: skip
 
 

@@ -11,8 +11,10 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.model import Follows, Motor
+from calmotion.model.motor import SERVO
 from calmotion.usd import schemas
 from calmotion.usd.dialects import number_of
+from calmotion.usd.reading.actuators.laws import direct_current
 from calmotion.usd.reading.actuators.motor_models import motor_model, read_gains
 from calmotion.usd.reading.actuators.named_types import named_type
 from calmotion.usd.reading.actuators.newton_actuators import ACTUATOR, TARGETS, newton_actuator
@@ -222,7 +224,9 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
     gear, model, kind = drive.gear, motor_model(prim), named_type(drive.joint)
     newton = newton_actuator(reading.stage, drive.actuator)
     mujoco = reading.stage.GetPrimAtPath(drive.actuator) if drive.actuator and newton is None else None
-    gains = read_gains(drive.joint, mujoco, newton, reading.units, model, kind)
+    current = direct_current(drive.joint, reading.units, kind) if model == SERVO else None
+    gains = read_gains(drive.joint, mujoco, newton, reading.units, model, kind, current)
+    limit = effort_limit(drive.joint, reading.units, reading.notes, kind, newton, mujoco)
     return Motor(
         joint=index,
         path=drive.joint.path,
@@ -232,7 +236,7 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
         max_velocity=velocity_limit(drive.joint, reading.units, reading.notes, kind),
         max_acceleration=float(from_stage(calmotion_limit(prim, "calm:motor:maxAcceleration"))),
         max_jerk=float(from_stage(calmotion_limit(prim, "calm:motor:maxJerk"))),
-        max_torque=effort_limit(drive.joint, reading.units, reading.notes, kind, newton, mujoco),
+        max_torque=limit if current is None else current.largest_torque,
         linear=linear,
         follows=None if gear is None else Follows(motors[gear.leader], gear.ratio, gear.offset),
         model=model,
@@ -240,7 +244,7 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
         velocity_gain=gains.velocity,
         damping_on=gains.damping_on,
         gains_from=gains.source,
-        rotor=read_rotor(drive.joint, reading.units, model, kind, newton, reading.notes),
+        rotor=read_rotor(drive.joint, reading.units, model, kind, newton, reading.notes, current),
         delay=read_delay(drive.joint, model, kind, newton),
         backlash=read_backlash(drive.joint, reading.units, kind),
         kind=kind.name,

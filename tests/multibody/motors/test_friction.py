@@ -1,0 +1,96 @@
+"""Laws of friction: against the formulas of their authors, their derivatives, and a pendulum's own equations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calmotion.model.motor import Coulomb, DirectCurrent, Directional, Load, Quadratic, Rotor, Stribeck, StribeckLoad
+from calmotion.multibody.model.system import FRICTION, FRICTION_SPEED, FRICTION_TERMS, SERVO_COLUMNS
+from calmotion.multibody.motors.friction import gear_friction, largest_friction
+from motor_runs import INERTIA, LENGTH, MASS, G, pendulum, pitch, run, smooth
+from scipy.integrate import solve_ivp
+
+BASE, WIDTH = 0.012, 0.05
+LAWS = [
+    Stribeck(0.03, 0.9, 1.3),
+    Load(0.1),
+    StribeckLoad(0.03, 0.9, 0.8, 0.1, 0.2),
+    Directional(0.03, 0.9, 1.3, 0.25, 0.02, 0.05, 0.2),
+    Quadratic(0.03, 0.9, 1.3, 0.25, 0.02, 0.05, 0.2, 0.01, 0.02),
+]
+
+
+def row(law, friction=BASE):
+    found = np.zeros(SERVO_COLUMNS)
+    found[FRICTION], found[FRICTION_SPEED], found[FRICTION_TERMS:] = friction, WIDTH, law.terms()
+    return found
+
+
+def authors(law, m, t, w):
+    """F of M1 to M6 as arXiv 2410.08650 has it; the external torque is -t."""
+    k = law.terms()
+    s, size, other = np.exp(-(abs(w / k.speed) ** k.exponent)), abs(m), abs(t)
+    found = BASE + s * k.stribeck + abs(k.joint_load * -t - k.motor_load * m)
+    found += s * abs(k.stribeck_joint_load * -t - k.stribeck_motor_load * m)
+    if np.sign(-t) != np.sign(m):
+        found += s * (k.joint_quadratic * t * t * (other < size) + k.motor_quadratic * m * m * (other > size))
+    return found
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_laws_are_those_of_their_authors_but_for_rounded_corners(law):
+    for m, t in ((3.0, 2.0), (2.0, 3.0), (-3.0, 2.0), (3.0, -2.5), (-2.0, -3.0)):
+        for w in (0.0, 0.4, -1.5, 8.0):
+            found, corners = largest_friction(row(law), m, t, w)[0], 0.2 * (BASE + 0.03)
+            assert found == pytest.approx(authors(law, m, t, w), abs=corners)
+
+
+@pytest.mark.parametrize("law", [Coulomb(), *LAWS], ids=lambda law: law.name)
+def test_derivatives_match_differences_and_friction_brakes(law):
+    e, own = 1e-6, row(law)
+    for m, y in ((0.3, 0.25), (0.2, 0.4), (-0.3, 0.2), (0.3, -0.25), (0.004, 0.003)):
+        for w in (-2.0, -0.03, 0.01, 0.5):
+            f, *slopes = gear_friction(own, m, y, w)
+            assert f * w > 0.0
+            assert f == pytest.approx(np.tanh(w / WIDTH) * largest_friction(own, m, y - f, w)[0], rel=1e-12)
+            for k, slope in enumerate(slopes):
+                ends = [gear_friction(own, *(np.array([m, y, w]) + s * e * np.eye(3)[k]))[0] for s in (1, -1)]
+                assert slope == pytest.approx((ends[0] - ends[1]) / (2 * e), rel=1e-5, abs=1e-7)
+    assert gear_friction(own, 0.3, 0.2, 0.0)[0] == 0.0
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_a_pendulum_on_a_servo_with_each_law_moves_as_its_differential_equations_say(law):
+    current = DirectCurrent(7.4, 4.0, 2.6, 20.0)
+    own, emf = row(replace(law), 0.3), current.back_emf
+    own[FRICTION_SPEED] = 0.3
+    k, armature, viscous = current.position_gain, 0.03, 0.1
+
+    def motor(t, y):
+        return k * (smooth(np.array([t]))[0][0, 0] - y[0]) - emf * y[1]
+
+    def slope(t, y):
+        m, gravity = motor(t, y), MASS * G * LENGTH * np.cos(y[0])
+        # rotor and link move together: what is left accelerates both
+        low, high = -50.0, 50.0
+        for _ in range(80):
+            f = 0.5 * (low + high)
+            acceleration = (m + gravity - viscous * y[1] - f) / (INERTIA + armature)
+            passed = INERTIA * acceleration - gravity
+            excess = np.tanh(y[1] / 0.3) * largest_friction(own, m, passed, y[1])[0] - f
+            low, high = (f, high) if excess > 0.0 else (low, f)
+        return [y[1], acceleration]
+
+    theta = 0.0
+    for _ in range(100):
+        theta = MASS * G * LENGTH * np.cos(theta) / k
+    exact = solve_ivp(slope, (0, 0.8), [theta, 0.0], "RK45", rtol=1e-7, atol=1e-9, dense_output=True)
+    rotor = Rotor(armature, viscous_friction=viscous, friction=0.3, friction_speed=0.3, law=law, back_emf=emf)
+    errors = []
+    for h in (2e-3, 1e-3):
+        times = np.arange(0.0, 0.8, h)
+        found, loads = run(pendulum(k, 0.0, **vars(rotor)), *smooth(times), h)
+        errors.append(np.abs(pitch(found.states) - exact.sol(times)[0]).max())
+    expected = [motor(t, exact.sol(t)) for t in times]
+    assert np.abs(loads.efforts[:, 0] - expected).max() < 1e-2 * np.abs(expected).max()
+    assert errors[1] < 1e-3 and errors[0] / errors[1] > 2.5, errors
