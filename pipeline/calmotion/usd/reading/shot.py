@@ -25,9 +25,11 @@ from calmotion.usd.reading.joints import joint_prims
 from calmotion.usd.reading.motors.driven_motors import BODIES, CONSTANT, DRIVE, GIVEN, Drive, to_si
 from calmotion.usd.reading.motors.free_ranges import free_tracks
 from calmotion.usd.reading.motors.given_tracks import given_joints, given_track, length_note
+from calmotion.usd.reading.motors.holds import held
 from calmotion.usd.reading.motors.posed_motors import joint_motions, pose_codes, posed_track
 from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stacks, performed_on, skeletal_tracks
 from calmotion.usd.reading.motors.tracks import read_track, sample_codes
+from calmotion.usd.reading.motors.turns import unwrapped
 from calmotion.usd.reading.motors.unused_animation import target_positions
 from calmotion.usd.reading.plausibility.motions import motion_doubts
 from calmotion.usd.reading.provenance import notes_of_results, provenance_of
@@ -189,6 +191,9 @@ def motor_tracks(
             elif drive.source == CONSTANT and drive.constant is not None:
                 ends = np.unique([clock.start, clock.end])
                 tracks[path] = Track(clock.seconds(ends), np.full(len(ends), drive.constant))
+    frame = 1.0 / clock.frames_per_second
+    for joint in (drive.joint for drive in drives if drive.joint.path in tracks):
+        tracks[joint.path] = held(unwrapped(tracks[joint.path], joint, reading), frame, joint, reading)
     for drive in drives:
         if drive.gear is not None and drive.gear.leader in tracks:
             led = tracks[drive.gear.leader]
