@@ -8,7 +8,6 @@ import os
 import shutil
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ import synthetic
 from calmotion.errors import ShotError
 from calmotion.host import PluginError
 from calmotion.model.run import OutputPaths
-from calmotion.testing import check_plugin, host_with, run_operator
+from calmotion.testing import host_with, run_operator
 from PIL import Image, ImageSequence
 
 PLUGIN = Path(__file__).resolve().parents[2] / "plugins" / "video"
@@ -42,10 +41,6 @@ def write(path, result, settings=None):
 def ink(picture, color):
     """Pixels of a color."""
     return np.all(np.abs(np.asarray(picture.convert("RGB")).astype(int) - color) < 12, axis=-1)
-
-
-def test_the_plugin_keeps_to_the_rules():
-    assert check_plugin(PLUGIN) == []
 
 
 def test_a_video_plays_the_shot_then_its_worst_moment_and_is_twice_the_same(tmp_path, video):
@@ -143,28 +138,6 @@ def test_no_frame_is_kept_after_the_next_one(tmp_path, video):
     assert drawn == list(range(30)), "each frame is drawn once, in order"
     assert max(alive) <= 3, alive
     assert len(Image.open(tmp_path / "a.webp").getexif()) == 0
-
-
-def test_frames_are_drawn_in_threads_and_written_in_order(tmp_path, video, monkeypatch):
-    """Few at once, however many processors there are: each frame takes memory while it is drawn."""
-    together, most, drawn, lock = 0, [], [], threading.Lock()
-
-    def draw(film, moment):
-        nonlocal together
-        with lock:
-            together += 1
-            most.append(together)
-            drawn.append(moment)
-        picture = Image.new("RGB", (32, 32), (moment, 0, 0))
-        with lock:
-            together -= 1
-        return picture
-
-    monkeypatch.setattr(video.film, "draw_frame", draw)
-    told = []
-    frames = list(video.film._drawn(None, range(10), lambda fraction, message: told.append(fraction)))
-    assert [frame.getpixel((0, 0))[0] for frame in frames] == list(range(10)) and sorted(drawn) == list(range(10))
-    assert max(most) <= video.film.AT_ONCE and told == sorted(told) and 0.0 == told[0] < told[-1] < 1.0
 
 
 def test_an_interrupted_video_leaves_nothing(tmp_path, video):

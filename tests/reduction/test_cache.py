@@ -13,7 +13,6 @@ from calmotion.model import ElasticMaterial, FlexibleSettings, Simplification
 from calmotion.reduction import cache as reduction_cache
 from calmotion.reduction.cache import cache_key, cached_reduction, recomputed
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
-from calmotion.support.caching.cache_folder import CACHES, REDUCTIONS
 
 
 @pytest.fixture(autouse=True)
@@ -123,17 +122,6 @@ def test_what_cannot_be_kept_is_named():
         cache_key(np.array([None]))
 
 
-def test_a_file_torn_at_any_place_is_computed_again(folder):
-    body = a_body()
-    cached_reduction("torn", lambda: body)
-    (path,) = folder.glob("*.npz")
-    whole = path.read_bytes()
-    for size in [0, 1, 4, 100, *range(200, len(whole), 311), len(whole) - 1]:
-        path.write_bytes(whole[:size])
-        assert same(cached_reduction("torn", lambda: body), body)
-        assert same(cached_reduction("torn", never), body)  # it was written again
-
-
 def test_a_file_with_a_changed_byte_is_computed_again_with_a_notice(folder, caplog):
     body = a_body()
     cached_reduction("flipped", lambda: body)
@@ -146,21 +134,6 @@ def test_a_file_with_a_changed_byte_is_computed_again_with_a_notice(folder, capl
         assert same(cached_reduction("flipped", lambda: calls.append(1) or body), body)
     assert len(calls) == len(places) == len(caplog.messages)
     assert str(path) in caplog.messages[0] and "made again" in caplog.messages[0]
-
-
-def test_a_foreign_file_is_ignored(folder):
-    body, other = a_body(1), a_body(2)
-    cached_reduction("mine", lambda: body)
-    (path,) = folder.glob("*.npz")
-    cached_reduction("theirs", lambda: other)
-    (theirs,) = set(folder.glob("*.npz")) - {path}
-    for content in (theirs.read_bytes(), b"not an archive", b""):
-        path.write_bytes(content)
-        assert same(cached_reduction("mine", lambda: body), body)
-    with open(path, "wb") as file:
-        np.save(file, np.zeros(3))
-    assert same(cached_reduction("mine", lambda: body), body)
-    assert same(cached_reduction("mine", never), body)
 
 
 def test_a_file_never_makes_objects_of_other_types(folder, monkeypatch):
@@ -176,23 +149,6 @@ def test_a_folder_that_cannot_be_written_is_skipped(tmp_path, monkeypatch):
     monkeypatch.setenv("CALMOTION_CACHE", str(blocked))
     body = a_body()
     assert cached_reduction("x", lambda: body) is body
-
-
-def test_the_oldest_go_when_the_limit_is_passed(folder, monkeypatch):
-    size = None
-    for k in range(4):
-        cached_reduction(k, a_body)
-        path = folder / f"{cache_key(k)}.npz"
-        size = path.stat().st_size
-        os.utime(path, (1e9 + k, 1e9 + k))
-    cached_reduction(0, never)  # used: it is now the newest
-    abandoned = folder / ".calmotion-left.npz"
-    abandoned.write_text("")
-    os.utime(abandoned, (1e9, 1e9))
-    monkeypatch.setitem(CACHES, REDUCTIONS, ("reduced bodies", int(3.5 * size)))
-    cached_reduction("new", a_body)
-    kept = {path.stem for path in folder.iterdir()}
-    assert kept == {cache_key(k) for k in (0, 3, "new")}
 
 
 WORKER = """

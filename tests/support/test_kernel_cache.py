@@ -82,31 +82,6 @@ def test_any_damage_to_any_file_is_seen(make, tmp_path, caplog, name):
         assert make().load("key") == list(range(100))
 
 
-def test_a_file_in_the_place_of_another_one_is_not_taken(make, tmp_path):
-    for name in ("name", "other"):
-        cache_file(tmp_path, name).save("key", f"code of {name}")
-    for suffix in ("1.nbc", "nbi"):
-        own, other = tmp_path / f"name.{suffix}", tmp_path / f"other.{suffix}"
-        whole = own.read_bytes()
-        own.write_bytes(other.read_bytes())
-        assert make().load("key") is None
-        own.write_bytes(whole)
-        assert make().load("key") == "code of name"
-
-
-def test_data_that_could_not_be_written_are_in_no_index(make, tmp_path, monkeypatch):
-    make().save("key", "former")
-    (tmp_path / "name.nbi").unlink()  # so that its name is free again
-    write = KernelCacheFile._write
-
-    def full(self, name, value):
-        return not name.endswith(".nbc") and write(self, name, value)
-
-    monkeypatch.setattr(KernelCacheFile, "_write", full)
-    make().save("other", "code for other types")
-    assert make().load("other") is None
-
-
 def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
     (tmp_path / "file").write_text("")
     cache = cache_file(tmp_path / "file" / "folder", "name")

@@ -14,7 +14,6 @@ from calmotion.views.rendering import (
     draw_over_ghost,
     fit_camera,
     floor_below,
-    lay_ghost,
     pose,
     prepare,
     visible_surfaces,
@@ -86,17 +85,6 @@ def test_a_motion_that_is_the_intended_one_has_no_outline(seen):
     center = np.array(camera.size) / 2 - 6e2 / camera.scale * (place - camera.center)
     near = draw_over_ghost(dataclasses.replace(shaken, camera=dataclasses.replace(shaken.camera, center=center)))
     assert np.any(near[..., 1].astype(int) > near[..., 0].astype(int) + 30)
-
-
-def test_the_outline_is_drawn_where_the_poses_differ_alone():
-    front, ghost = np.full((20, 40), -1, dtype=np.int32), np.full((20, 40), -1, dtype=np.int32)
-    front[5:15, 5:15] = ghost[5:15, 5:15] = 0
-    ghost[5:15, 25:35] = 1
-    mixed = lay_ghost(np.ones((20, 40, 3)), front, ghost, 2, (0.0, 1.0, 0.0), 1)
-    assert np.all(mixed[:, :20] == 1.0)
-    assert np.all(mixed[6:14, 26:34, 0] < 1.0) and mixed[5, 30, 0] < mixed[10, 30, 0]
-    hidden = lay_ghost(np.ones((20, 40, 3)), front, np.where(ghost == 1, 2, ghost), 2, (0.0, 1.0, 0.0), 1)
-    assert np.all(hidden == 1.0), "scenery has no outline"
 
 
 def test_the_shadow_falls_on_the_floor_and_on_what_lies_there(seen):

@@ -33,9 +33,3 @@ def test_a_round_tube_stays_smooth_around_and_sharp_at_its_end():
     side = normals[sources < count]
     np.testing.assert_allclose(side[:, :2], points[sources[sources < count]][:, :2], atol=0.1)
     assert np.abs(side[:, 2]).max() == pytest.approx(0.0)
-
-
-def test_triangles_without_area_are_ignored():
-    points, triangles = synthetic.box((0, 0, 0), (1, 1, 1))
-    _, _, normals = split_at_creases(points, np.vstack([triangles, [[0, 0, 1]]]).astype(np.int32))
-    assert np.all(np.isfinite(normals))

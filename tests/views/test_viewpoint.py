@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import synthetic
-from calmotion.views.playback import world_points
-from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, hull_corners, moving_cloud, near_scenery
+from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, moving_cloud, near_scenery
 
 
 def test_the_sphere_contains_every_target_but_not_the_hidden_guide():
@@ -52,31 +51,6 @@ def test_the_eye_is_as_near_as_the_whole_motion_allows():
     across = np.abs(offset @ right) / depth / (aspect * np.tan(half))
     upright = np.abs(offset @ np.cross(right, forward)) / depth / np.tan(half)
     assert max(across.max(), upright.max()) == pytest.approx(1.0), "inside the picture, and reaching its edge"
-
-
-def test_corners_of_hulls_reach_as_far_as_all_points():
-    character, result = synthetic.character(), synthetic.result()
-    motion = result.before.motion
-    cloud = moving_cloud(character, result.skins, motion)
-    every = [
-        points
-        for row in np.unique(np.linspace(0, len(motion.times) - 1, 40).astype(int))
-        for index, body in enumerate(character.bodies)
-        for points, surface in zip(
-            world_points(body, index, result.skins[index], motion, row), body.surfaces, strict=True
-        )
-        if surface.drawn
-    ]
-    directions = np.random.default_rng(0).standard_normal((50, 3))
-    every = np.concatenate([*every, motion.target_positions.reshape(-1, 3)])
-    np.testing.assert_allclose((cloud @ directions.T).max(axis=0), (every @ directions.T).max(axis=0), rtol=1e-3)
-
-
-def test_of_a_flat_surface_all_points_are_taken():
-    flat = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.5, 0.5, 0.0]])
-    assert hull_corners(flat).tolist() == [0, 1, 2, 3, 4]
-    cube = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)] + [[0.5, 0.5, 0.5]])
-    assert sorted(hull_corners(cube)) == list(range(8))
 
 
 def test_scenery_near_the_character_belongs_into_the_picture_and_a_stage_does_not():

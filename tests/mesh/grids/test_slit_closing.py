@@ -40,13 +40,6 @@ def test_a_ball_keeps_its_surface():
     assert surface_volume(points, triangles) == pytest.approx(4.0 / 3.0 * np.pi * 0.1**3, rel=3.0 * H**2 / 0.1**2)
 
 
-def test_all_triangles_look_outwards():
-    points, triangles = closed(trimesh.creation.icosphere(3, 0.1))
-    x = points[triangles]
-    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    assert (np.einsum("tx,tx->t", normal, x.mean(axis=1)) > 0.0).all()
-
-
 @pytest.mark.parametrize("angle", [0.0, 0.4])
 @pytest.mark.parametrize("width", [1e-4, 0.5, 1.5, CLOSED - 0.05])
 def test_slits_narrower_than_the_ball_are_closed(width, angle):

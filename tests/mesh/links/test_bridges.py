@@ -27,19 +27,6 @@ def rod(tilt=0.0, gap=0.01):
     return made
 
 
-def test_a_solid_that_is_near_along_its_side_is_bridged():
-    made, gap = joined(rod(), "bridged", 0.02)
-    solids = [piece for piece in made.split() if piece.volume > 1e-9]  # bridges may leave cavities
-    assert len(solids) == 1 and 0.01 < gap < 0.02
-
-
-def test_a_solid_that_is_near_at_an_end_is_not_bridged():
-    upright = rod(tilt=np.pi / 2)
-    assert upright.extents[2] == pytest.approx(0.4)
-    made, _ = joined(upright, "bridged", 0.02)
-    assert made is None
-
-
 @pytest.mark.parametrize(("degrees", "struts"), [(0.0, 2), (8.0, 2), (45.0, 1), (90.0, 1)])
 def test_a_rod_gets_a_strut_at_each_end_that_is_not_too_far(degrees, struts):
     above = rod(tilt=np.radians(degrees))

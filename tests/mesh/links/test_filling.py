@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import trimesh
 from calmotion.errors import ShotError
-from calmotion.mesh.element_sizes import shape_of
 from calmotion.mesh.grids import gridded
 from calmotion.mesh.grids.contacts import without_contacts
 from calmotion.mesh.repair import closed_solid
@@ -50,18 +47,6 @@ def test_a_surface_of_too_many_details_is_simplified(host):
     assert f"all {len(rough.faces)} would take too long" in note and "are missing" in note
     assert not any("on a grid" in text for text in mesh.quality.repairs)
     assert mesh.quality.volume == pytest.approx(float(rough.volume), rel=1e-2)
-
-
-def test_more_detail_is_kept_within_less_distance():
-    rough = rough_box()
-    made = closed_solid.Solid(np.array(rough.vertices), np.array(rough.faces), float(rough.volume), ())
-    plain = shape_of(made.points, made.triangles)
-    tried = [filling_module._attempt(made, replace(plain, detail=k), 0.01, 0, 1.0) for k in (1.0, 2.0)]
-    assert all(attempt.detailed for attempt in tried)
-    assert tried[1].distance == pytest.approx(0.5 * tried[0].distance, rel=1e-6)
-    assert len(tried[0].triangles) == 3_000 < len(tried[1].triangles) < 6_000
-    off = [np.abs(trimesh.Trimesh(t.points, t.triangles).volume / rough.volume - 1.0) for t in tried]
-    assert off[1] < off[0] < 0.01
 
 
 def test_details_are_left_out_where_following_them_takes_too_long(host, monkeypatch):

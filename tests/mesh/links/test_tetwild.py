@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.mesh.tetrahedralize import tetwild as tetwild_module
-from calmotion.mesh.tetrahedralize import tetwild_worker
 from mesher_links import box
 
 
@@ -79,13 +78,6 @@ def test_a_surface_has_one_mesh():
     assert all(np.array_equal(one, other) for one, other in zip(*meshes, strict=True))
 
 
-def test_random_numbers_of_a_file_that_is_no_library_are_left_alone(tmp_path):
-    worker, file = tetwild_worker, tmp_path / "library.so"
-    for content in (b"", b"\x7fELF\x01\x01" + bytes(100), b"MZ" + bytes(100)):
-        file.write_bytes(content)
-        assert not worker.fix_random_numbers(str(file), 1)
-
-
 def test_a_mesh_that_took_too_long_is_not_tried_again_unless_it_may_take_longer(monkeypatch):
     tetwild, cube, tries = tetwild_module, box(), []
 
@@ -99,17 +91,3 @@ def test_a_mesh_that_took_too_long_is_not_tried_again_unless_it_may_take_longer(
         with pytest.raises(tetwild.OutOfTime, match="limit of processor time"):
             tetwild.tetrahedralize(np.array(cube.vertices), np.array(cube.faces), 0.01, 1e-3, "/Arm/link", time, True)
     assert tries == [5.0, 9.0]
-
-
-def test_elements_are_improved_less_where_that_takes_most_of_the_time():
-    tetwild, cube = tetwild_module, box()
-    points, faces = np.array(cube.vertices), np.array(cube.faces)
-    edge = float(np.cbrt(cube.volume))
-
-    def improved(size, copies=1):
-        return tetwild._improvement(points, np.tile(faces, (copies, 1)), size)
-
-    normal, large = improved(edge / 8.0), improved(edge / 12.0)
-    assert normal[0] == large[0] and normal[1] < large[1]
-    dense, denser = improved(edge, 2_400 // len(faces)), improved(edge, 3_000 // len(faces))
-    assert denser[0] == dense[0] < normal[0] and large[1] < dense[1] < denser[1]

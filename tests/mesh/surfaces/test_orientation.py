@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.mesh.surfaces.orientation import closing_signs, directed_edges, patch_boundaries, patches_of
+from calmotion.mesh.surfaces.orientation import closing_signs, patch_boundaries, patches_of
 from calmotion.mesh.tetrahedra import boundary_triangles, surface_volume
 
 
@@ -18,12 +18,6 @@ def ones(triangles):
     return np.ones(len(triangles))
 
 
-def test_every_edge_of_a_closed_surface_is_passed_once_in_each_direction(cube):
-    edge, forward = directed_edges(cube[1])
-    assert np.array_equal(np.bincount(edge), np.full(len(cube[1]) * 3 // 2, 2))
-    assert np.array_equal(np.bincount(edge[forward]), np.bincount(edge[~forward]))
-
-
 @pytest.mark.parametrize("share", [3, 4, 10])
 def test_flipped_triangles_are_found_and_the_majority_keeps_its_orientation(cube, share):
     points, triangles = cube
@@ -32,22 +26,6 @@ def test_flipped_triangles_are_found_and_the_majority_keeps_its_orientation(cube
     patches = patches_of(mixed, ones(mixed))
     assert patches.count == 1 and len(patches.one_sided) == 0
     assert np.array_equal(np.flatnonzero(patches.flip), np.arange(0, len(mixed), share))
-
-
-def test_what_agrees_is_left_alone_even_inside_out(cube):
-    patches = patches_of(cube[1][:, ::-1], ones(cube[1]))
-    assert not patches.flip.any()
-
-
-def test_a_moebius_strip_has_one_side():
-    i = np.arange(10)
-    a, b, c, d = 2 * i, 2 * i + 1, 2 * i + 2, 2 * i + 3
-    c[-1], d[-1] = 1, 0
-    strip = np.vstack([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)])
-    assert patches_of(strip, ones(strip)).one_sided.tolist() == [0]
-    c[-1], d[-1] = 0, 1  # without the half turn it is a plain band
-    band = np.vstack([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)])
-    assert len(patches_of(band, ones(band)).one_sided) == 0
 
 
 def test_patches_end_at_edges_of_more_than_two_triangles_and_are_reoriented_as_a_whole(cube):
@@ -79,9 +57,3 @@ def test_patches_end_at_edges_of_more_than_two_triangles_and_are_reoriented_as_a
         pair[np.searchsorted(outer, patches.label[~wall])][:, None] < 0, both[~wall][:, ::-1], both[~wall]
     )
     assert abs(surface_volume(places, turned)) == pytest.approx(2.0, rel=1e-12)
-
-
-def test_patches_that_fit_are_unchanged():
-    boundaries = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    assert closing_signs(boundaries).tolist() == [1.0, 1.0]
-    assert abs(closing_signs(np.abs(boundaries)).sum()) == 0.0

@@ -10,7 +10,7 @@ from calmotion.multibody.model.model import compile_model
 from calmotion.multibody.model.topology import span_tree
 from calmotion.multibody.statics.equilibrium import equilibrium
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.testing import beam_arm, branched_links
+from calmotion.testing import beam_arm
 from four_bar import four_bar
 from particles import particle_system
 from sweep_cases import rigid_start
@@ -45,11 +45,6 @@ def reduced(made):
     character, meshes = made
     tree = span_tree(character)
     return compile_model(character, tree, reduce_bodies(character, tree, meshes))
-
-
-def branched():
-    character, bodies = branched_links()
-    return compile_model(character, span_tree(character), bodies)
 
 
 def test_elastic_modes_are_those_of_the_undeformed_character():
@@ -88,36 +83,6 @@ def test_what_hangs_free_has_no_elastic_frequency():
     slow = omega < 1e-12 * omega[-1]
     assert np.flatnonzero(slow).tolist() == [0, 1, 2, 3, 4], "the hinges turn without a force, to rounding"
     assert max(np.abs(shape[:, slow]).max(initial=0.0) for shape in shapes) < 1e-9
-
-
-def test_motions_along_a_tree_span_those_that_joints_allow(monkeypatch):
-    """`null_space` takes time with the cube of the number of bodies."""
-    from calmotion.multibody.analysis import modes
-
-    model, found, spans = branched(), [], []
-    along = modes._tree_motions
-    for motions in (along, lambda *arguments: None):
-        monkeypatch.setattr(modes, "_tree_motions", motions)
-        found.append((modes.elastic_modes(model)[0], *modes.system_modes(model, model.rest_angles)))
-        angles, workspace = model.rest_angles, Workspace.for_system(model.system)
-        spans.append(modes._matrices(model.system, rigid_state(model, angles), angles, workspace)[3])
-    for one, other in zip(*found, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-6)
-    by_tree, orthonormal = spans
-    assert by_tree.shape == orthonormal.shape
-    rest = by_tree - orthonormal @ (orthonormal.T @ by_tree)
-    assert np.abs(rest).max() < 1e-9 * np.abs(by_tree).max()
-
-
-def test_joints_that_form_a_loop_or_leave_a_child_free_are_not_a_tree_of_welds():
-    from calmotion.multibody.analysis import modes
-
-    model = branched()
-    system, offset = model.system, np.concatenate([[0], np.cumsum(6 + model.system.elastic)])
-    rows = np.zeros((6 * len(system.rows), int(offset[-1])))
-    assert modes._tree_motions(system, rows, offset) is None, "no row tells anything of a child"
-    loop = system._replace(side=np.concatenate([system.side, system.side[:1]]))
-    assert modes._tree_motions(loop, rows, offset) is None
 
 
 def test_an_upright_pendulum_falls_and_a_hanging_one_does_not():

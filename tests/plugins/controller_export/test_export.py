@@ -135,14 +135,6 @@ def test_no_output_of_a_result_is_written_over_its_shot_or_a_layer_of_it(shot_fi
     assert shot_file.read_text() == ONE_HINGE
 
 
-@pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_result_has_no_commands_at_a_rate_that_is_none(shot_file, tmp_path, rate):
-    result = cm.simulate(shot_file, step="10ms", tolerance="1mm")
-    with pytest.raises(cm.SettingError, match="rate"):
-        write_curves(result, tmp_path / "a.csv", rate=rate)
-    assert not (tmp_path / "a.csv").exists()
-
-
 def test_the_curves_of_a_result_are_written_at_a_rate(shot_file, tmp_path):
     result = cm.simulate(shot_file, step="10ms", tolerance="1mm")
     file = write_curves(result, tmp_path / "a.csv", rate=50, settings={"export.csv.angles": "deg"})

@@ -82,22 +82,6 @@ def test_what_is_off_takes_the_color_of_the_input_and_what_is_not_keeps_its_own(
     assert ("/input/Robot/Base/Box", "Mesh3D:vertex_colors") not in columns
 
 
-def test_normals_of_a_box_are_those_of_its_faces(columns):
-    normals = np.array(columns["/input/Robot/Tip/Ball", "Mesh3D:vertex_normals"][1][0])
-    points = np.array(columns["/input/Robot/Tip/Ball", "Mesh3D:vertex_positions"][1][0])
-    assert sorted(np.abs(normals).max(axis=1).tolist()) == pytest.approx([1.0] * 24)
-    assert np.all(np.sum(normals * points, axis=1) > 0.0)
-
-
-def test_the_ghost_lies_inside_the_body_where_nothing_is_off(columns):
-    (own,), (ghost,) = (
-        np.array(columns[f"/{root}/Robot/Tip/Ball", "Mesh3D:vertex_positions"][1])
-        for root in ("input", "reference/input")
-    )
-    assert 0.0 < np.abs(own).max() - np.abs(ghost).max() < 0.1 * np.abs(own).max()
-    assert np.all(np.abs(ghost) <= np.abs(own) + 1e-9)
-
-
 @pytest.mark.parametrize("root", ["input", "optimized"])
 def test_the_ghost_is_seen_only_while_its_body_is_off(columns, root):
     result, frames, character = synthetic.result(), synthetic.animation().frame_times, synthetic.character()

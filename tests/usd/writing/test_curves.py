@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from calmotion.model import Animation, Motor, MotorCurve, Track
 from calmotion.usd.clock import Clock
-from calmotion.usd.writing.curves import NEAR, attribute_spec, author_curves, curve_values, sample_times
+from calmotion.usd.writing.curves import NEAR, author_curves, curve_values, sample_times
 from pxr import Sdf
 
 FRAMES = np.arange(13) / 24.0
@@ -71,11 +71,3 @@ def test_values_are_degrees_at_the_time_codes_of_the_stage():
 def test_values_of_length_motors_are_in_the_stage_s_unit():
     layer, path, _ = authored("/arm/slide", "drive:linear:physics:targetPosition", linear=True)
     assert layer.QueryTimeSample(path, 105) == pytest.approx(100.0 * CURVE.frame_values[4], rel=1e-6)
-
-
-def test_the_prims_above_an_attribute_are_overs():
-    layer = Sdf.Layer.CreateAnonymous(".usda")
-    spec = attribute_spec(layer, "/a/b.size", Sdf.ValueTypeNames.Double)
-    assert attribute_spec(layer, "/a/b.size", Sdf.ValueTypeNames.Double) == spec
-    for path in ("/a", "/a/b"):
-        assert layer.GetPrimAtPath(path).specifier == Sdf.SpecifierOver

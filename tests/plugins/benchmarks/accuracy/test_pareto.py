@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from calmotion_plugins.benchmarks.accuracy.reference_bench import Point, front, over_fastest
-from calmotion_plugins.benchmarks.accuracy.work_precision import print_points
 
 
 def test_the_front_has_the_settings_that_no_other_beats():
@@ -26,10 +25,3 @@ def test_a_choice_is_compared_with_the_fastest_that_keeps_the_tolerance(points):
     ratio, fastest = over_fastest(points, [1e-2, 1e-3])[1e-3]
     assert ratio == pytest.approx(1.6) and fastest.setting == "fastest"
     assert over_fastest(points[-1:], [1e-2, 1e-3]) == {1e-3: (1.0, points[-1])}
-
-
-def test_the_fastest_setting_is_reported(points, capsys):
-    print_points(points, 1e-6)
-    assert capsys.readouterr().out.endswith(
-        "1 mm: 1.60 times the run time of the fastest setting that keeps it (newmark, fastest, 1 coordinates)\n"
-    )

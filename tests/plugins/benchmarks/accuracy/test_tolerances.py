@@ -78,25 +78,6 @@ def test_the_command_reports_whether_tolerances_are_kept(shot, rows, monkeypatch
     assert tolerances.main(arguments) == 1
 
 
-def test_an_interrupted_table_goes_on_with_the_rows_that_it_lacks(shot, rows, monkeypatch, tmp_path):
-    table, asked = str(tmp_path / "rows.csv"), []
-    monkeypatch.setattr(tolerances, "load_unreduced", lambda path: shot)
-    monkeypatch.setattr(Tolerances, "warm", lambda self, *arguments: None)
-
-    def kept(self, tolerance, command):
-        asked.append(tolerance)
-        return next(row for row in rows if row.tolerance_m == tolerance)
-
-    monkeypatch.setattr(Tolerances, "kept", kept)
-    common = ["arm.usda", "--optimize", "--json", "--csv", table]
-    assert tolerances.main([*common, "--tolerances", "10mm"]) == 0
-    assert tolerances.main([*common, "--tolerances", "10mm", "1mm", "--resume"]) == 0
-    assert asked == [rows[0].tolerance_m, rows[1].tolerance_m]
-    assert tolerances.main([*common, "--tolerances", "1mm", "--resume"]) == 0 and len(asked) == 2
-    with open(table, newline="") as file:
-        assert sorted(float(row["tolerance_m"]) for row in csv.DictReader(file)) == [1e-3, 1e-2]
-
-
 def test_a_reference_with_finer_meshes_knows_how_far_its_reduction_may_be_off(shot, few_nodes):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reference_bench, "REFERENCE_STEP", 1 / 960)
@@ -105,14 +86,3 @@ def test_a_reference_with_finer_meshes_knows_how_far_its_reduction_may_be_off(sh
     assert len(bench.shot.meshes.meshes[0].tets) > len(shot.meshes.meshes[0].tets)
     assert fine.bar_m < rough.bar_m
     assert reference_bench.distance(rough.positions, fine.positions) < rough.bar_m
-
-
-def test_references_of_other_curves_have_the_same_finer_meshes(shot, few_nodes):
-    bench = reference_bench.Bench(shot, nodes=2.0)
-    other = bench.of(shot_of(quintic(0.6, 0.35, 0.1), 0.75))
-    assert other.shot.meshes is bench.shot.meshes and other.shot.animation is not shot.animation
-    again = other.of(shot.animation)
-    assert again.shot.meshes is bench.shot.meshes and again.shot.animation is shot.animation
-    positions = [each.run(each.bodies(1e-3), 1 / 240).positions for each in (bench, again, other)]
-    assert reference_bench.distance(positions[0], positions[1]) == 0.0
-    assert reference_bench.distance(positions[0], positions[2]) > 1e-3

@@ -8,7 +8,7 @@ from calmotion.testing import beam_arm, quintic, shot_of
 from calmotion.tolerance.step_error import distance
 from calmotion_plugins.benchmarks.accuracy import reference_bench, work_precision, work_precision_points
 from calmotion_plugins.benchmarks.accuracy.reference_bench import Bench
-from calmotion_plugins.benchmarks.accuracy.work_precision_points import chosen_points, forward_points
+from calmotion_plugins.benchmarks.accuracy.work_precision_points import forward_points
 from calmotion_plugins.benchmarks.common.shots import Unreduced
 
 
@@ -62,26 +62,6 @@ def test_smaller_steps_are_nearer(points):
 def test_a_linear_arm_is_farther_off_than_a_nonlinear_one(points):
     law = {point.setting: point.error_m for point in of(points, "law")}
     assert law["stvk"] < 0.5 * law["linear"] and abs(law["neohookean"] - law["stvk"]) < 0.2 * law["linear"]
-
-
-def test_more_modes_are_nearer(points):
-    few, many = of(points, "modes")
-    assert many.error_m <= few.error_m and many.coordinates > few.coordinates
-
-
-def test_finer_reductions_are_closer_and_omitted_pairs_have_no_noticeable_effect(points):
-    coarse, fine = of(points, "reduction")
-    assert fine.error_m < coarse.error_m and fine.coordinates > coarse.coordinates
-    (every,) = of(points, "pairs")
-    assert every.coordinates == fine.coordinates and abs(every.error_m - fine.error_m) < 1e-5
-
-
-def test_what_is_chosen_keeps_its_tolerance(bench, reference):
-    default, *chosen = chosen_points(bench, reference, (1e-2, 1e-3))
-    assert default.series == "default" and default.step_s == pytest.approx(1 / 480)
-    for point, tolerance in zip(chosen, (1e-2, 1e-3), strict=True):
-        assert point.error_m < tolerance
-    assert chosen[0].step_s > chosen[1].step_s
 
 
 def test_the_command_writes_a_table_a_picture_and_one_object(bench, reference, points, monkeypatch, capsys, tmp_path):

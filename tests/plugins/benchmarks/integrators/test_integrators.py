@@ -12,7 +12,6 @@ from calmotion_plugins.benchmarks.integrators.integrators import (
     RATE,
     WORKING_STEP,
     Fate,
-    Measured,
     Scene,
     arm_scene,
     order_of,
@@ -44,11 +43,6 @@ def test_orders_are_those_of_the_methods(scene, explicit):
     assert order_of(rows, "rk4") > 3.5, rows
     finest = {row.integrator: row.position_error for row in rows}
     assert finest["rk4"] < 0.01 * finest["newmark"] < 0.01 * finest["bdf2"]
-
-
-def test_the_order_is_the_slope_of_the_errors():
-    rows = [Measured("a", h, 3.0 * h**4, 2.0 * h**2, 1.0) for h in (0.1, 0.05, 0.025)]
-    assert order_of(rows, "a") == pytest.approx(4.0) and order_of(rows, "a", "velocity_error") == pytest.approx(2.0)
 
 
 def test_only_bdf2_takes_thin_steel_links_through_a_fast_motion():

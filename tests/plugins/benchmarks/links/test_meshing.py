@@ -53,26 +53,6 @@ def test_the_table_shows_errors_that_decrease_towards_the_finest_mesh(shot, tmp_
     assert lines[-1].startswith("fore: ") and lines[-1].endswith("% over 3 meshes")
 
 
-def test_the_automatic_mesh_is_judged_by_the_finest_one():
-    rows = [
-        meshing.Row("fore", size, nodes, 1.0, f1, 2.0 * f1, 3.0 * f1, np.nan, 9.0, 0.1, "joint")
-        for size, nodes, f1 in ((np.nan, 900, 103.0), (8.0, 500, 110.0), (2.0, 50_000, 100.0))
-    ]
-    rows = meshing._compared(rows)
-    assert [row.error for row in rows] == pytest.approx([3.0, 10.0, np.nan], nan_ok=True)
-    assert meshing.verdicts(rows) == (
-        "fore: the automatic mesh is 3% off the finest one (50000 nodes), 9% are estimated; the first frequency "
-        "spreads by 10% over 3 meshes\n"
-    )
-    assert meshing.verdicts(rows[:1]) == ""
-    assert meshing.table(rows).splitlines()[2].startswith("| fore | auto | 900 |")
-
-
-def test_links_that_cannot_be_meshed_are_reported_and_the_others_are_measured(shot, tmp_path, capsys):
-    assert meshing.main([f"{shot}:foot", "--sizes", "1"]) == 1
-    assert "no such link" in capsys.readouterr().err
-
-
 def test_a_refined_row_is_named_and_judges_the_automatic_mesh(shot, tmp_path):
     (fore,) = read_links(f"{shot}:fore")
     auto, refined = meshing.study(fore, ["auto"], 60.0, refine=6_000)
@@ -80,8 +60,3 @@ def test_a_refined_row_is_named_and_judges_the_automatic_mesh(shot, tmp_path):
     assert refined.nodes > auto.nodes and 0.0 < auto.error < 2.0 and refined.estimate < auto.estimate
     assert "| fore | refined |" in meshing.table([auto, refined])
     assert "the automatic mesh" in meshing.verdicts([auto, refined])
-
-
-def test_sizes_are_multiples_of_the_automatic_one_or_lengths():
-    assert meshing._length("1.4", 0.01) == pytest.approx(0.014)
-    assert meshing._length("8mm", 0.01) == pytest.approx(0.008)

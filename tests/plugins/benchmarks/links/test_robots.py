@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from calmotion_plugins.benchmarks.links import meshing, robots, survey, tables
+from calmotion_plugins.benchmarks.links import meshing, robots, survey
 from calmotion_plugins.benchmarks.scenes.links import read_links
 from small_shots import LENGTH, WIDTH, write_arm
 
@@ -97,30 +97,3 @@ def test_copies_and_mirror_images_are_surveyed_once(shot):
     first = robots.first_of_its_kind(links)
     assert first[:4] == [0, 1, 0, 0] and first[5] == 1
     assert first[4] == (4 if fore.mass else 1)
-
-
-def test_the_summary_counts_copies_with_the_time_of_their_first_and_without(shot):
-    (fore,) = read_links(f"{shot}:fore")
-    late = survey.LinkRow(robot="arm", link="late", source="visual surface", nodes=10, seconds=30.0)
-    quick = replace(late, link="quick", seconds=3.0)
-    assert "1 took no more than 20 s of processor time (50%)" in tables.summary([late, quick])
-    assert "copies" not in tables.summary([late, quick])
-    told = tables.summary([late, quick, survey.same_row(late, fore, "arm"), survey.same_row(quick, fore, "other")])
-    assert "2 took no more than 20 s of processor time (50%)" in told
-    assert "2 are copies or mirror images" in told and "3 took no more (75%)" in told
-
-
-def test_broken_surfaces_are_like_no_other(shot):
-    (fore,) = read_links(f"{shot}:fore")
-    (part, *_) = fore.body.surfaces
-
-    def of(part):
-        return replace(fore, body=replace(fore.body, surfaces=(part,)))
-
-    lost, nowhere = (
-        replace(part, triangles=part.triangles + len(part.points)),
-        replace(part, points=np.nan * part.points),
-    )
-    assert robots.first_of_its_kind([fore, of(lost), of(nowhere), of(replace(part, triangles=lost.triangles[:1]))]) == [
-        0, 1, 2, 3,
-    ]  # fmt: skip

@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import chain
-from calmotion import ShotError
 from calmotion.model import Animation, Track
 from calmotion.model.motor import Rotor
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion_plugins.benchmarks.motors.commands import ALLOWED, beginning, compare, main, with_rigid_bodies
+from calmotion_plugins.benchmarks.motors.commands import ALLOWED, compare, main
 from pxr import UsdPhysics
 from small_shots import ELBOW, SHOULDER, write_arm
 
@@ -34,20 +33,6 @@ def test_commands_with_the_model_leave_a_tenth_of_the_error_also_in_mujoco(dampi
     assert row.ideal_mm > 10.0 and row.mujoco_ideal_mm == pytest.approx(row.ideal_mm, rel=0.02)
     assert row.share < ALLOWED and row.mujoco_share < ALLOWED and row.apart < 2e-3
     assert row.optimised_mm == pytest.approx(row.share * row.ideal_mm) and row.motors == 2
-
-
-def test_the_beginning_of_a_shot_has_its_frames_up_to_a_time():
-    _, animation = arm()
-    cut = beginning(animation, 0.5)
-    assert cut.frame_times[-1] == 0.5 and cut.current is cut.tracks
-    assert np.array_equal(cut.tracks[1].values, animation.tracks[1].values[:13])
-
-
-def test_links_without_a_mass_of_their_own_are_refused():
-    character, _ = arm()
-    with pytest.raises(ShotError, match="mass") as caught:
-        with_rigid_bodies(replace(character, bodies=(replace(character.bodies[0], mass=None), character.bodies[1])))
-    assert caught.value.path == "/C/L0"
 
 
 def test_the_command_reads_a_shot_whose_motors_have_gains(tmp_path, capsys):
