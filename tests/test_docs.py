@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import html
+import json
 import os
 import re
 import shlex
@@ -29,6 +30,41 @@ def test_every_path_on_a_page_exists(page):
     named = re.findall(r"`([\w./-]+(?:\.py|/))`", page.read_text())
     made = ("speed_watch/", "build/")  # by commands on these pages
     assert [name for name in named if "/" in name and not name.startswith(made) and not _exists(name)] == []
+
+
+BECOME = r"([\d.]+) mm (?:of error )?become ([\d.]+) mm"
+
+
+@pytest.mark.parametrize(
+    ("page", "pattern", "count"),
+    [
+        ("README.md", f"(){BECOME}", 1),
+        ("README.md", r"\| (cup|elbow), position \| ([\d.]+) mm \| ([\d.]+) mm", 2),
+        ("docs/quickstart.md", f"(){BECOME}", 2),
+        ("docs/gallery.md", rf"(?:\*\*|A )(Bartender|Lamp|Drummer|Boxer|Rapper|Dancer|KUKA)\b[^\n]*?{BECOME}", 7),
+        ("samples/README.md", r"\| `(\w+)` \|.*\| ([\d.]+) mm \| ([\d.]+) mm", 6),
+    ],
+)
+def test_errors_on_pages_are_the_kept_ones_of_make_golden_rounded(page, pattern, count):
+    kept = json.loads((REPOSITORY / "tests" / "golden" / "golden.json").read_text())
+    found = re.findall(pattern, (REPOSITORY / page).read_text())
+    assert len(found) == count
+    for name, before, after in found:
+        errors = kept.get(name.lower(), kept["bartender"])["errors_m"].values()
+        pairs = [[_rounds_to(told, row[f"max_error_{when}_m"]) for told, when in ((before, "before"), (after, "after"))]
+                 for row in errors]  # fmt: skip
+        assert [True, True] in pairs, (name, before, after)
+
+
+def _rounds_to(told: str, metres: float) -> bool:
+    """Whether a number on a page [mm] is a length, rounded to the digits that it has."""
+    unit = 10.0 ** -len(told.partition(".")[2])
+    return abs(float(told) - 1e3 * metres) <= 0.5001 * unit
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.name != "CHANGELOG.md"], ids=lambda page: page.name)
+def test_no_page_installs_the_program_from_where_it_is_not(page):
+    assert not re.search(r"pip install '?calmotion(?![\w./-]*[-_/])", page.read_text()), "it is on no package index"
 
 
 def _exists(name: str) -> bool:

@@ -61,7 +61,7 @@ def test_the_guide_leads_from_an_empty_folder_to_an_installed_wheel(repository, 
     work.mkdir()
     script = (
         commands()
-        .replace("pip install calmotion ", f"pip install {wheel} ")
+        .replace("pip install /path/to/checkout ", f"pip install {wheel} ")
         .replace("python3 -m venv", f"{sys.executable} -m venv")
     )
     hidden = ("PYTHONPATH", "VIRTUAL_ENV", "CALMOTION_PLUGINS")

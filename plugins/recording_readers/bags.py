@@ -162,7 +162,7 @@ def _check(
 
 def _mcap(file: str) -> Iterator[Message]:
     """All messages of an MCAP file."""
-    reader = _library(lambda: __import__("mcap_ros2.reader", fromlist=["reader"]), file, "mcap-ros2-support", "mcap")
+    reader = _library(lambda: __import__("mcap_ros2.reader", fromlist=["reader"]), file, "mcap-ros2-support")
     with open(file, "rb") as stream:
         try:
             for found in reader.read_ros2_messages(stream):
@@ -173,9 +173,7 @@ def _mcap(file: str) -> Iterator[Message]:
 
 def _sqlite(file: str) -> Iterator[Message]:
     """All messages of the bag in whose folder a file lies."""
-    library = _library(
-        lambda: __import__("rosbags.highlevel", fromlist=["highlevel"]), file, "rosbags", "rosbags"
-    )  # fmt: skip
+    library = _library(lambda: __import__("rosbags.highlevel", fromlist=["highlevel"]), file, "rosbags")
     stores = __import__("rosbags.typesys", fromlist=["typesys"])
     folder = Path(os.path.abspath(file)).parent
     if not (folder / "metadata.yaml").is_file():
@@ -206,10 +204,10 @@ def _damaged(file: str, error: object) -> ShotError:
     return ShotError("this is not a bag of ROS 2, or it is damaged", path=file, found=error, remedy="Record it again")
 
 
-def _library(load: Callable[[], Any], file: str, name: str, extra: str) -> Any:
+def _library(load: Callable[[], Any], file: str, name: str) -> Any:
     try:
         return load()
     except ImportError as error:
         raise ShotError(
-            f"this recording needs the library {name}", path=file, remedy=f"Run pip install calmotion[{extra}]"
+            f"this recording needs the library {name}", path=file, remedy=f"Run pip install {name}"
         ) from error

@@ -30,7 +30,7 @@ def read_c3d(request: RecordingRequest, map_file: str) -> SensorRecording:
         from ezc3d import c3d
     except ImportError as error:
         raise ShotError(
-            "C3D files need the library ezc3d", path=file, remedy="Run pip install calmotion[c3d], or export a table"
+            "C3D files need the library ezc3d", path=file, remedy="Run pip install ezc3d, or export a table"
         ) from error
     try:
         content = c3d(file)

@@ -1,6 +1,6 @@
 """Fuzzing guided by coverage: `python tests/fuzz/guided.py TARGET SECONDS`, one target in one process.
 
-Atheris guides where it is installed (`pip install 'calmotion[fuzz]'`); elsewhere inputs are mutated at random. An input
+Atheris guides where it is installed (`pip install atheris`); elsewhere inputs are mutated at random. An input
 that raises anything but an error for users, or ends the process, or takes a minute of processor time, is written to
 `tests/fuzz/cases/TARGET/`, which tests then run for ever; an input that was only slow because other programs left it no
 processor is to be removed there. Inputs that reach new code stay in `build/fuzz/TARGET`.

@@ -100,6 +100,7 @@ def build_parser(chosen: str | None = None) -> Parser:
             command_parser = group.add_parser(name, help=text, description=f"{text[:1].upper()}{text[1:]}.")
             module.add_arguments(command_parser)
             command_parser.set_defaults(command=module.run)
+            command_parser.operators = getattr(module, "OPERATORS", ())
             add_examples(command_parser, getattr(module, "EXAMPLES", ()))
         elif not command.disabled:
             group.add_parser(name, help=command.help)

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.tables import console_on, filled
+from calmotion.cli.tables import console_on, filled, with_texts
 from calmotion.errors import ShotError, each, failure_of_machine
 from calmotion.host import Host
 from calmotion.support.memory import was_short
@@ -140,20 +140,11 @@ def conclude(
         return
     if report and show:
         names = report.get("written_names", {})
-        show(_as_written(dict(report), names) if names else dict(report), console_on(output.stream))
+        show(with_texts(dict(report), lambda text: as_written(text, names)), console_on(output.stream))
     for problem in problems:
         if problem.traceback:
             print(problem.traceback, end="", file=sys.stderr)
         tell_error(problem.error)
-
-
-def _as_written(value: Any, names: Mapping[str, str]) -> Any:
-    """A value of a report, with the names of prims in it as the author of the file wrote them."""
-    if isinstance(value, str):
-        return as_written(value, names)
-    if isinstance(value, Mapping):
-        return {key: _as_written(inner, names) for key, inner in value.items()}
-    return [_as_written(inner, names) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def tell_failed_plugins(host: Host) -> None:

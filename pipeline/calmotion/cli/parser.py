@@ -8,9 +8,12 @@ from __future__ import annotations
 import argparse
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from calmotion.support.naming import nearest, nearest_name
+
+if TYPE_CHECKING:
+    from calmotion.host import Property
 
 # Commands that are named nowhere here, of plugins of others, stand in a group of their own.
 TASKS = (
@@ -99,6 +102,25 @@ def needed(action: argparse.Action) -> str:
     return f"{action.option_strings[0]} {value}" if action.option_strings else value
 
 
+def property_text(idname: str, declared: Property) -> str:
+    """A property of an operator with its default, its range and its meaning."""
+    limits = " | ".join(declared.choices) or declared.range_text()
+    default = f"{declared.default!r} {declared.unit}".strip() + (f" ({limits})" if limits else "")
+    return f"{idname}.{declared.name} = {default}  {declared.description}"
+
+
+def _properties_of(operators: Sequence[str]) -> str:
+    """The properties of operators for a help; empty without operators. It loads the plugins."""
+    if not operators:
+        return ""
+    from calmotion.host import open_host
+
+    known = open_host([]).operators
+    texts = [property_text(name, one) for name in operators if name in known for one in known[name].properties]
+    lines = [textwrap.fill(text, WIDTH, initial_indent="  ", subsequent_indent="      ") for text in texts]
+    return "properties, each with its default, for --set NAME=VALUE:\n" + "\n".join(lines) + "\n\n"
+
+
 class _WithExamples(argparse.HelpFormatter):
     """Help whose examples and indented lists keep their lines; descriptions are wrapped."""
 
@@ -111,13 +133,16 @@ class Parser(argparse.ArgumentParser):
 
     Attributes:
         overview: The whole help, where it is not that of argparse.
+        operators: Those whose properties the help lists, since `--set` is the way to choose them.
     """
 
     overview = ""
+    operators: Sequence[str] = ()
 
     def format_help(self) -> str:
         """The help."""
-        return self.overview or super().format_help()
+        before, examples, after = (self.overview or super().format_help()).partition(_EXAMPLES)
+        return before + _properties_of(self.operators) + examples + after
 
     def error(self, message: str) -> NoReturn:
         """End with what is wrong and where help is; the list of all options would hide it."""

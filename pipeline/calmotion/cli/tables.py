@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import textwrap
-from collections.abc import Sequence
-from typing import IO, TYPE_CHECKING, Literal, TextIO
+from collections.abc import Callable, Mapping, Sequence
+from typing import IO, TYPE_CHECKING, Any, Literal, TextIO
 
 from calmotion.support.naming import distinct_names
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 _FILE_WIDTH = 200  # characters of a line in a file, where nothing needs to be folded
-_SHORTENED = "(… stands for the start of a prim path; --json has whole paths)"
+SHORTENED = "(… stands for the start of a prim path; --json has whole paths)"
 
 
 def width_of(stream: IO[str]) -> int | None:
@@ -49,6 +49,15 @@ def console_on(stream: TextIO) -> Console:
     from rich.console import Console
 
     return Console(file=stream, highlight=False, markup=False, emoji=False, width=width_of(stream) or _FILE_WIDTH)
+
+
+def with_texts(value: Any, change: Callable[[str], str]) -> Any:
+    """A value of a report with each text in it changed; the keys of its tables stay."""
+    if isinstance(value, str):
+        return change(value)
+    if isinstance(value, Mapping):
+        return {key: with_texts(inner, change) for key, inner in value.items()}
+    return [with_texts(inner, change) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def say(console: Console, text: str) -> None:
@@ -87,7 +96,7 @@ def print_table(
         table = _table(columns, short_rows, texts, console.width)
     console.print(table)
     if shorter:
-        say(console, _SHORTENED)
+        say(console, SHORTENED)
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], texts: int, width: int) -> Table:

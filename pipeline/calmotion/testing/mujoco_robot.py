@@ -195,7 +195,7 @@ def mujoco_module() -> Any:
         import mujoco
     except ImportError as error:
         raise ShotError(
-            "MuJoCo is not installed", found=str(error), remedy="Install it: pip install 'calmotion[bench]'"
+            "MuJoCo is not installed", found=str(error), remedy="Install it: pip install exudyn mujoco"
         ) from error
     return mujoco
 

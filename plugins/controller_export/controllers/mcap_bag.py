@@ -76,7 +76,7 @@ def _package() -> tuple[Any, Any]:
     except ImportError as error:
         raise ShotError(
             "the package that writes MCAP is not installed", attribute="--to", found=error.name,
-            remedy="Install it: pip install calmotion[mcap]",
+            remedy="Install it: pip install mcap-ros2-support",
         ) from error  # fmt: skip
     return Writer, read_ros2_messages
 

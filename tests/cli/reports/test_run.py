@@ -58,7 +58,7 @@ def test_the_delay_of_a_shaper_is_told_with_the_error_without_it(delay, said):
 @pytest.mark.parametrize("source", REMEDIES)
 def test_a_tolerance_that_is_not_kept_is_reported_with_what_would_help(source):
     text = printed(report(tolerance_kept=False, tolerance_missed_by=source, simulation_error_m=2e-3))
-    said = f"less accurate than the tolerance of 1 mm: its own error is about 2 mm, mostly from the {source}. "
+    said = f"does not keep the tolerance of 1 mm: its own error is about 2 mm, mostly from the {source}. "
     said += REMEDIES[source].format(step="2 ms")
     assert said in " ".join(text.split())
 

@@ -109,7 +109,7 @@ def test_without_the_package_of_bags_it_says_what_to_install(write, monkeypatch)
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(ShotError) as refused:
         write("mcap")
-    assert "calmotion[mcap]" in refused.value.remedy
+    assert "pip install mcap-ros2-support" in refused.value.remedy
 
 
 def test_small_numbers_are_floats_for_yaml_as_well(write):

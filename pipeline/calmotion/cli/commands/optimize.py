@@ -13,6 +13,8 @@ EXAMPLES = (
     ("calmotion optimize shot.usda -o calm.usda --bake simulated", "for viewers without physics"),
 )
 
+OPERATORS = ("fe.mesh", "retarget.optimize")
+
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from calmotion.cli import Output, json_option, plugin_option
 
 if TYPE_CHECKING:
-    from calmotion.host import Operator, Plugin, Property
+    from calmotion.host import Operator, Plugin
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -101,6 +101,7 @@ def _operator(cls: type[Operator]) -> dict[str, Any]:
 
 
 def _print_plugin(plugin: Plugin, output: Output, verbose: bool) -> None:
+    from calmotion.cli.parser import property_text
     from calmotion.cli.tables import filled
 
     def tell(line: str) -> None:
@@ -121,13 +122,7 @@ def _print_plugin(plugin: Plugin, output: Output, verbose: bool) -> None:
         inputs = ", ".join([k.__name__ for k in cls.requires] + [f"[{k.__name__}]" for k in cls.uses])
         tell(f"    {cls.idname}  {cls.label}: {inputs} -> {', '.join(k.__name__ for k in cls.provides)}")
         for declared in cls.properties:
-            tell(f"        {cls.idname}.{declared.name} = {_default(declared)}  {declared.description}")
-
-
-def _default(declared: Property) -> str:
-    limits = " | ".join(declared.choices) or declared.range_text()
-    text = f"{declared.default!r}" + (f" {declared.unit}" if declared.unit else "")
-    return f"{text} ({limits})" if limits else text
+            tell(f"        {property_text(cls.idname, declared)}")
 
 
 def check_plugins(args: argparse.Namespace, output: Output) -> int:

@@ -21,7 +21,11 @@ from calmotion.cli import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-EXAMPLES = (("calmotion rig skinned.usda -o robot.usda", "a robot from a UsdSkel character"),)
+EXAMPLES = (
+    ("calmotion rig skinned.usda -o robot.usda", "a robot from a UsdSkel character"),
+    ("calmotion rig skinned.usda -o robot.usda --set rig.skeleton.flexible=all", "with links that bend"),
+)
+OPERATORS = ("rig.skeleton",)
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:

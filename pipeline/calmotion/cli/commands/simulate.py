@@ -12,6 +12,8 @@ EXAMPLES = (
     ("calmotion simulate shot.usda --shaper zvd", "what would an input shaper give?"),
 )
 
+OPERATORS = ("fe.mesh",)
+
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""

@@ -21,8 +21,10 @@ from calmotion.cli.reports.verdict import (
     print_verdict,
     shakes,
 )
-from calmotion.cli.tables import print_table, say
+from calmotion.cli.tables import SHORTENED, print_table, say, with_texts
+from calmotion.support.naming import distinct_names
 
+LONG_PATH = 60  # characters of a prim path from which on sentences and tables have its last names alone
 COARSE_EFFORT = 0.05  # of the largest effort of a motor, from which on its error is told
 IDLE_EFFORT = 0.01  # of that of the strongest motor
 
@@ -154,6 +156,9 @@ def print_run(report: dict[str, Any], console: Console, verbose: bool = False) -
         console: Where it is printed.
         verbose: Whether the search, the steps, the error budget and the notes are printed as well.
     """
+    paths = [row["path"] for kind in ("targets", "limits", "efforts", "contacts") for row in report[kind]]
+    names = {path: f"…/{name}" for path, name in distinct_names(paths).items() if len(path) > LONG_PATH}
+    report = with_texts(report, lambda text: names.get(text, text))
     print_verdict(console, report)
     print_errors(console, report, verbose)
     print_remaining(console, report)
@@ -166,6 +171,8 @@ def print_run(report: dict[str, Any], console: Console, verbose: bool = False) -
         print_work(console, report)
         print_notes(console, report["notes"])
     print_left_out(console, report["left_out"], verbose)
+    if names:
+        say(console, SHORTENED)
 
 
 def print_errors(console: Console, report: dict[str, Any], verbose: bool = False) -> None:

@@ -95,7 +95,7 @@ def _print_accuracy(console: Console, report: dict[str, Any]) -> None:
         source, error = report["tolerance_missed_by"], about(report["simulation_error_m"])
         cause = f"its own error is about {error}, mostly from the {source}"
         remedy = REMEDIES[source].format(step=f"{1000 * report['step_s']:.3g} ms")
-        say(console, f"The simulation is less accurate than the tolerance of {tolerance}: {cause}. {remedy}")
+        say(console, f"The simulation does not keep the tolerance of {tolerance}: {cause}. {remedy}")
 
 
 def print_remaining(console: Console, report: dict[str, Any]) -> None:

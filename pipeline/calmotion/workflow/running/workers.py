@@ -164,9 +164,7 @@ def _client(address: str) -> Iterator[Any]:
     try:
         from distributed import Client
     except ImportError as error:
-        raise ShotError(
-            "distributed is not installed", path="distributed", remedy="pip install 'calmotion[dask]'"
-        ) from error
+        raise ShotError("distributed is not installed", path="distributed", remedy="pip install distributed") from error
     try:
         client = Client(f"tcp://{address}", timeout=_CONNECT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:

@@ -1,0 +1,96 @@
+"""What a report tells of the targets: their errors, which counts most, which stand still, and why errors remain."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from calmotion.arrays import Array
+from calmotion.model import Character, Result, Simulation
+
+_STILL = 1e-3  # of the tolerance: what moves by less stands still
+
+
+def error_norms(errors: Array) -> tuple[Array, Array]:
+    """Largest and root-mean-square error of each target.
+
+    Args:
+        errors: Of the time steps that count, [m] or [rad], shape [T, K].
+
+    Returns:
+        Two arrays of shape [K], in the unit of `errors`.
+    """
+    return np.max(errors, axis=0, initial=0.0), np.sqrt(np.mean(errors**2, axis=0))
+
+
+def target_errors(character: Character, simulation: Simulation, suffix: str) -> list[dict[str, Any]]:
+    """The errors of each target, with keys as in the contract: `max_error<suffix>_m` and so on."""
+    counted = simulation.motion.judged
+    position = error_norms(simulation.position_errors[counted])
+    rotation = error_norms(simulation.rotation_errors[counted])
+    return [
+        {
+            "path": target.path,
+            "rotation_weight": target.rotation_weight,
+            f"max_error{suffix}_m": float(position[0][k]),
+            f"rms_error{suffix}_m": float(position[1][k]),
+            f"max_rotation_error{suffix}_rad": float(rotation[0][k]),
+            f"rms_rotation_error{suffix}_rad": float(rotation[1][k]),
+            f"sag{suffix}_m": float(simulation.sag[k]) if len(simulation.sag) else None,
+            f"seam{suffix}_m": float(simulation.seam[k]) if len(simulation.seam) else None,
+        }
+        for k, target in enumerate(character.targets)
+    ]
+
+
+def still_targets(character: Character, result: Result) -> list[str]:
+    """Paths of the targets of the input that move neither as animated nor by a shake, as the origin of a link whose
+    hinge stands still; those whose rotation counts are left out."""
+    motion, least = result.before.motion, _STILL * result.tolerance_m
+    places = motion.target_positions[motion.judged]
+    moved = np.max(np.abs(places - places[:1]), axis=(0, 2), initial=0.0)
+    off = np.max(result.before.position_errors[motion.judged], axis=0, initial=0.0)
+    still = np.maximum(moved, off) < least
+    return [
+        target.path for target, at in zip(character.targets, still, strict=True) if at and not target.rotation_weight
+    ]
+
+
+def main_target(character: Character, result: Result) -> str | None:
+    """Path of the target of the largest weight; of several, that which the animation leaves farthest off."""
+    errors = np.max(result.before.position_errors[result.before.motion.judged], axis=0, initial=0.0)
+    rows = zip(character.targets, errors, strict=True)
+    main = max(rows, key=lambda row: (row[0].position_weight, row[1]), default=None)
+    return main[0].path if main else None
+
+
+def remaining_errors(character: Character, result: Result) -> list[dict[str, Any]]:
+    """The targets that the curves found leave farther off than the tolerance, and why.
+
+    Args:
+        character: With the motors that move no target marked as idle.
+        result: Of `optimize`.
+
+    Returns:
+        Rows with `path`, `max_error_m`, the number of `motors` that could change, the `directions` in which all targets
+        are followed, and `causes`: `limits` of motors that cost something, `search` that did not converge, `sag` where
+        half of the error is there at rest, `motors` where these are fewer than the directions, `weight` where other
+        targets count more, and `reach` where none of these holds, so that these motors can do no better.
+    """
+    if result.after is None:
+        return []
+    errors = result.after.position_errors
+    largest = np.max(errors[result.after.motion.judged], axis=0, initial=0.0)
+    motors = sum(motor.optimize and not motor.idle and motor.follows is None for motor in character.motors)
+    weights = [target.position_weight for target in character.targets]
+    directions = 3 * sum((t.position_weight > 0.0) + (t.rotation_weight > 0.0) for t in character.targets)
+    common = ["limits"] * any(limit.cost_m is not None for limit in result.limits)
+    common += ["search"] * (result.stopped not in ("", "converged"))
+    rows = []
+    for k in np.flatnonzero(largest > result.tolerance_m):
+        causes = [*common, *["sag"] * bool(errors[0, k] >= 0.5 * largest[k])]
+        causes += ["motors"] * (motors < directions) + ["weight"] * (0.0 < weights[k] < max(weights))
+        row = {"path": character.targets[k].path, "max_error_m": float(largest[k]), "causes": causes or ["reach"]}
+        rows.append(row | {"motors": motors, "directions": directions})
+    return rows
