@@ -14,11 +14,11 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.host import Host, SettingError, has_no_unit, open_host, parse_quantity
 from calmotion.model import Animation, Character, MotorTracks, Source
-from calmotion.rigging import Material, material_named
+from calmotion.rigging import Material, known_materials, material_named
 from calmotion.support import try_writing
 from calmotion.usd import EXTENSIONS, read_shot, refuse_input_as_output, relative_asset, write_layer
 from calmotion.version import __version__
-from calmotion.workflow import Given, Path, known_materials, problems_of, read_settings, value_of
+from calmotion.workflow import Given, Path, problems_of, read_settings, value_of
 
 from .converters import BrokenMeshes, convert, converter_python, temporary_folder
 from .descriptions import MJCF, USD, Description, read_description, repaired

@@ -212,8 +212,8 @@ class OptimizeShot(Operator):
             0,
             minimum=0,
             maximum=99,
-            description="Number of further robust curves in the report; from each to the next, the error that is allowed "
-            "on the model doubles",
+            description="Number of further robust curves in the report; from each to the next, the error that is "
+            "allowed on the model doubles",
         ),
     )
 

@@ -2,4 +2,5 @@
 
 from calmotion.rigging.materials import MATERIALS as MATERIALS
 from calmotion.rigging.materials import Material as Material
+from calmotion.rigging.materials import known_materials as known_materials
 from calmotion.rigging.materials import material_named as material_named

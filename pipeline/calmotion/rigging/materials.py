@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from calmotion.errors import ShotError, raise_all
+from calmotion.support.caching.cache_folder import configuration_folder
 from calmotion.support.naming import nearest
 from calmotion.support.reading import read_toml
 
 TABLE = Path(__file__).with_suffix(".toml")
+USERS_FILE = "materials.toml"  # in the configuration folder
 GROUPS = ("plastic", "metal", "composite", "other")
 _NUMBERS = {
     "youngs_modulus": (0.0, 2000.0),
@@ -49,6 +52,19 @@ class Material:
     group: str = "other"
     source: str = ""
     aliases: tuple[str, ...] = ()
+
+
+def known_materials(files: Iterable[str | PathLike[str]] = ()) -> dict[str, Material]:
+    """The materials of a user by name: those that are shipped, of the configuration folder, and of given files.
+
+    Args:
+        files: TOML files with a table for each material; later ones replace earlier ones of the same name.
+
+    Raises:
+        ShotError: A file cannot be read, or a material in it is not complete.
+    """
+    own = configuration_folder() / USERS_FILE
+    return materials([*([own] if own.is_file() else []), *map(str, files)])
 
 
 def materials(files: Iterable[str | Path] = ()) -> dict[str, Material]:

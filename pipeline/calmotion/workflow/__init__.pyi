@@ -3,7 +3,6 @@
 from calmotion.workflow.commands import optimize as optimize
 from calmotion.workflow.commands import simulate as simulate
 from calmotion.workflow.json_values import plain as plain
-from calmotion.workflow.materials import known_materials as known_materials
 from calmotion.workflow.outputs import refuse_layers as refuse_layers
 from calmotion.workflow.outputs import refuse_overwriting as refuse_overwriting
 from calmotion.workflow.outputs import refuse_unwritable as refuse_unwritable
