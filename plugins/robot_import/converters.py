@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -10,6 +11,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from calmotion.errors import ShotError
 from calmotion.support import cache_folder, is_own, locked
@@ -22,6 +24,7 @@ VARIABLE = "CALMOTION_CONVERTERS"  # names an environment that has them
 _MODULES = ("urdf_usd_converter", "mujoco_usd_converter")
 _PYTHONS = ((3, 10), (3, 12))  # oldest and newest version that they support
 _READY = "ready"
+_SCRIPT = Path(__file__).with_name("mujoco_values.py")
 LONGEST = 1800.0  # time of a conversion [s]
 _BROKEN_OBJ = re.compile(r'Failed to convert mesh(?: "[^"]*" from|:) (.+?\.obj)(?=:|$)', re.IGNORECASE)
 _BAD_WORDS = ("Failed to", "Cannot", "not found")  # of warnings after which a part of the robot is missing
@@ -121,6 +124,28 @@ def convert(description: Description, output: str, python: str) -> tuple[str, tu
             remedy="Correct the file: meshes are .stl, .obj or .dae, and their names relative to it",
         )  # fmt: skip
     return str(files[0]), tuple(warnings)
+
+
+def compiled_values(path: str, python: str) -> dict[str, Any]:
+    """What MuJoCo makes of an MJCF robot, see `mujoco_values`.
+
+    Args:
+        path: Its file.
+        python: Of the environment of the converters.
+
+    Raises:
+        ShotError: MuJoCo does not load it.
+    """
+    command = [python, "-I", str(_SCRIPT), os.path.abspath(path)]
+    done = subprocess.run(command, capture_output=True, text=True, env=_plain_environment(), timeout=LONGEST)
+    if done.returncode:
+        words = [line.strip() for line in done.stderr.splitlines() if line.strip()]
+        raise ShotError(
+            "MuJoCo does not load the robot", path=path, found=" ".join(words[-2:])[:300] or None,
+            remedy="Correct the file, until MuJoCo's own viewer opens it",
+        )  # fmt: skip
+    values: dict[str, Any] = json.loads(done.stdout)
+    return values
 
 
 def _make(folder: Path) -> None:

@@ -9,14 +9,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from calmotion.errors import ShotError, raise_all
-from calmotion.support import is_special, nearest, refuse_lfs_pointers, refuse_special, remedy_for
+from calmotion.support import nearest, refuse_lfs_pointers, refuse_special, remedy_for
 
-from .mjcf import (
-    refuse_curved_followers,
-    refuse_other_masses,
-    refuse_several_joints,
-    unread,
-)
+from .attributes import Element, judged
+from .mjcf import elements, locks, parts
 from .repairs import (
     PACKAGE,
     faults,
@@ -44,7 +40,9 @@ class Description:
         efforts: Largest effort of each joint of a URDF, where it is positive [N m or N].
         without_mass: Links of a URDF with geometry and without inertia.
         massless: Links of a URDF whose mass is 0, and those with neither inertia nor geometry: frames.
-        unread: What of an MJCF robot is not read, as sentences for the user.
+        unread: What of the robot is not read, as sentences for the user.
+        locks: Joints of an MJCF that an equality holds at one value [rad or m].
+        soft_limits: Narrower limits of joints of a URDF, which its safety controllers keep [rad or m].
         faults: What of a URDF is repaired in a copy before it is converted, as sentences for the user.
     """
 
@@ -56,6 +54,8 @@ class Description:
     massless: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
+    locks: Mapping[str, float] = field(default_factory=dict)
+    soft_limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 def read_description(path: str, packages: Mapping[str, str]) -> Description:
@@ -70,8 +70,8 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
     """
     root, prefixes = _root(path)
     if root.tag == "mujoco":
-        _refuse_wrong_files(root, path)
-        return Description(path, MJCF, unread=unread(root))
+        listed = elements(parts(root, path, lambda file: _root(file)[0]))
+        return Description(path, MJCF, unread=judged(MJCF, listed), locks=locks(listed))
     if root.tag != "robot":
         raise ShotError(
             "this is neither a URDF nor an MJCF robot", path=path, found=f"<{root.tag}>",
@@ -100,7 +100,7 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
     weightless = {link for link in links if _number(link.find("inertial/mass"), "value", 1.0) == 0.0}
     return Description(
         path, URDF, found, _efforts(root), _names(without & shaped), _names(weightless | (without - shaped)),
-        faults(root, prefixes),
+        faults(root, prefixes), judged(URDF, _elements(root, path)), soft_limits=_soft_limits(root),
     )  # fmt: skip
 
 
@@ -197,36 +197,24 @@ def _meshes(root: xml.Element) -> Iterator[tuple[str, str]]:
             yield link.get("name", ""), mesh.get("filename", "")
 
 
-def _refuse_wrong_files(
-    root: xml.Element, path: str, seen: frozenset[str] = frozenset(), outer: Sequence[str] = ()
-) -> None:
-    """Refuse named pipes and the like among the files of an MJCF robot, for which a converter would wait for ever,
-    pointers of Git LFS, and what `mjcf` refuses in any of them.
+def _elements(node: xml.Element, path: str, place: str = "", about: str = "") -> Iterator[Element]:
+    """The elements of a URDF; a parameter is named by its name."""
+    for child in node:
+        tag = child.get("name", "") if child.tag == "param" else str(child.tag)
+        here = f"{place}/{tag}".lstrip("/")
+        name = about or child.get("name") or child.get("reference") or ""
+        yield Element(here, name, path, child.attrib)
+        yield from _elements(child, path, here, name)
 
-    Args:
-        seen: Files that include this one.
-        outer: Folders where these look for files.
-    """
-    for refuse in (refuse_several_joints, refuse_curved_followers, refuse_other_masses):
-        refuse(root, path)
-    here = os.path.dirname(os.path.abspath(path))
-    named = ("meshdir", "texturedir", "assetdir")
-    own = [here, *(os.path.join(here, node.get(name, "")) for node in root.iter("compiler") for name in named)]
-    folders = [*own, *outer]
-    files = []
-    for node in root.iter():
-        for name in (value for key, value in node.items() if key == "file" or key.startswith("file")):
-            for file in dict.fromkeys(os.path.join(folder, name) for folder in folders):
-                if is_special(file):
-                    raise ShotError(
-                        "this is not a file but a named pipe, a socket or a device", path=path,
-                        attribute=f"{node.tag}.file", found=name, remedy="Name a file",
-                    )  # fmt: skip
-                if node.tag != "texture":  # a picture changes no motion
-                    files.append(file)
-                if node.tag == "include" and os.path.isfile(file) and file not in seen:
-                    _refuse_wrong_files(_root(file)[0], file, seen | {file}, folders)
-    refuse_lfs_pointers(files, path=path, attribute="file")
+
+def _soft_limits(root: xml.Element) -> dict[str, tuple[float, float]]:
+    found = {}
+    for joint in root.findall("joint"):
+        node = joint.find("safety_controller")
+        low, high = (_number(node, f"soft_{end}_limit", 0.0) for end in ("lower", "upper"))
+        if low < high:
+            found[joint.get("name", "")] = (low, high)
+    return found
 
 
 def _packages(root: xml.Element, path: str, given: Mapping[str, str]) -> dict[str, str]:

@@ -1,97 +1,161 @@
-"""What of an MJCF robot no shot can hold: refused where the robot would be another one, else told."""
+"""The elements of an MJCF robot: those of the files that it includes too, each with what its default class gives it."""
 
 from __future__ import annotations
 
+import os
 import xml.etree.ElementTree as xml
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from calmotion.errors import ShotError
+from calmotion.support import is_special, refuse_lfs_pointers
+
+from .attributes import Element
 
 _JOINTS = ("joint", "freejoint")
-_MASSES = {  # what gives the same masses
-    "settotalmass": "Scale the masses and densities of the file to this sum",
-    "inertiafromgeom": "Remove the <inertial> elements, which MuJoCo does not use",
-    "inertiagrouprange": 'Write mass="0" on the geoms of other groups',
-}
+_INNER = ("body", "frame", "replicate")  # what contains bodies
+_FOLDERS = ("meshdir", "texturedir", "assetdir")
+_MAIN = "main"  # the default class of what names none
+_ACTUATOR = "general"
+_ACTUATORS = (
+    "motor", "position", "velocity", "intvelocity", "damper", "cylinder", "muscle", "adhesion", "dcmotor", "pid",
+    "orientation",
+)  # fmt: skip
+_SECTIONS = {"actuator": _ACTUATOR, "equality": "equality", "tendon": "tendon"}  # tags of the defaults of what is there
+_WITH_CLASS = ("body", "body/frame", "body/replicate", "asset", "contact")
+
+Settings = dict[str, dict[str, str]]  # attributes by tag
 
 
-def refuse_several_joints(root: xml.Element, path: str) -> None:
-    """Refuse bodies with several joints: MuJoCo moves them one after the other, and a converter ties each of them to
-    the same two bodies, so that together they hold what they should move.
+@dataclass(frozen=True)
+class Part:
+    """A file of a robot: its own, or one that it includes."""
+
+    root: xml.Element
+    path: str
+
+
+def parts(root: xml.Element, path: str, parse: Callable[[str], xml.Element]) -> list[Part]:
+    """The files of a robot, each included one behind the one that includes it.
+
+    Args:
+        root: Of the robot.
+        path: Its file.
+        parse: Gives the root of another file.
 
     Raises:
-        ShotError: There is one.
+        ShotError: A named pipe or the like, for which a converter would wait for ever; a pointer of Git LFS.
     """
-    for body in root.iter("body"):
+    return list(_parts(root, path, parse, frozenset(), ()))
+
+
+def _parts(
+    root: xml.Element, path: str, parse: Callable[[str], xml.Element], seen: frozenset[str], outer: Sequence[str]
+) -> Iterator[Part]:
+    """Those of a file.
+
+    Args:
+        seen: Files that include this one.
+        outer: Folders where these look for files.
+    """
+    yield Part(root, path)
+    here = os.path.dirname(os.path.abspath(path))
+    own = [here, *(os.path.join(here, node.get(name, "")) for node in root.iter("compiler") for name in _FOLDERS)]
+    folders, files = [*own, *outer], []
+    for node in root.iter():
+        for name in (value for key, value in node.items() if key == "file" or key.startswith("file")):
+            for file in dict.fromkeys(os.path.join(folder, name) for folder in folders):
+                if is_special(file):
+                    raise ShotError(
+                        "this is not a file but a named pipe, a socket or a device", path=path,
+                        attribute=f"{node.tag}.file", found=name, remedy="Name a file",
+                    )  # fmt: skip
+                if node.tag != "texture":  # a picture changes no motion
+                    files.append(file)
+                if node.tag in ("include", "model") and os.path.isfile(file) and file not in seen:
+                    yield from _parts(parse(file), file, parse, seen | {file}, folders)
+    refuse_lfs_pointers(files, path=path, attribute="file")
+
+
+def elements(found: Sequence[Part]) -> list[Element]:
+    """The elements of a robot's files, with their defaults; equalities that are switched off have no effect.
+
+    Raises:
+        ShotError: A body with several joints.
+    """
+    classes: dict[str, Settings] = {_MAIN: {}}
+    for part in found:
+        _refuse_several_joints(part)
+        for node in part.root.findall("default"):
+            _collect(node, classes, {})
+    return [
+        element
+        for part in found
+        for section in part.root
+        if section.tag != "default"
+        for element in _below(section, "", _MAIN, classes, part.path)
+    ]
+
+
+def locks(listed: Sequence[Element]) -> dict[str, float]:
+    """Joints that an equality holds at one value [rad or m], counted from the pose of the file."""
+    return {
+        element.values["joint1"]: float((element.values.get("polycoef", "0").split() or ["0"])[0])
+        for element in listed
+        if element.place == "equality/joint" and "joint1" in element.values and not element.values.get("joint2")
+    }
+
+
+def _refuse_several_joints(part: Part) -> None:
+    """MuJoCo moves several joints of a body one after the other, and a converter ties each of them to the same two
+    bodies, so that together they hold what they should move."""
+    for body in part.root.iter("body"):
         joints = [node.get("name", node.tag) for node in body if node.tag in _JOINTS]
         if len(joints) > 1:
             raise ShotError(
-                "a body with several joints is not supported", path=path, attribute=f"body {body.get('name', '')}",
-                found=", ".join(joints),
+                "a body with several joints is not supported", path=part.path,
+                attribute=f"body {body.get('name', '')}", found=", ".join(joints),
                 remedy="Give each joint a body of its own, one inside the other, with a small mass in between",
             )  # fmt: skip
 
 
-def refuse_other_masses(root: xml.Element, path: str) -> None:
-    """Refuse settings of the compiler by which MuJoCo's masses are other ones than those that a converter reads.
+def _collect(node: xml.Element, classes: dict[str, Settings], inherited: Settings) -> None:
+    """The settings of a default class, those of the class around it included, and of the classes in it."""
+    own = classes.setdefault(node.get("class", _MAIN), {})
+    for tag, values in inherited.items():
+        own[tag] = values | own.get(tag, {})
+    for child in node:
+        if child.tag != "default":
+            tag = _ACTUATOR if child.tag in _ACTUATORS else str(child.tag)
+            own[tag] = own.get(tag, {}) | child.attrib
+    for child in node.findall("default"):
+        _collect(child, classes, own)
 
-    Raises:
-        ShotError: There is one, and it changes a mass.
+
+def _below(
+    node: xml.Element, above: str, default: str, classes: Mapping[str, Settings], file: str, about: str = ""
+) -> Iterator[Element]:
+    """An element and those in it.
+
+    Args:
+        above: Place of the element around it.
+        default: Class of those in a body that name none.
+        about: Name of the element around it.
     """
-    told = root.find(".//inertial") is not None
-    weighed = any(body.find("geom") is not None and body.find("inertial") is None for body in root.iter("body"))
-    for node in root.iter("compiler"):
-        from_geoms = node.get("inertiafromgeom") == "true"
-        changing = {
-            "settotalmass": _number(node.get("settotalmass")) > 0.0,
-            "inertiafromgeom": from_geoms and told,
-            "inertiagrouprange": (from_geoms or weighed) and _leaves_geoms_out(root, node.get("inertiagrouprange")),
-        }
-        for name in (name for name, changes in changing.items() if changes):
-            raise ShotError(
-                "this setting changes masses, and is not supported", path=path, attribute=f"compiler {name}",
-                found=node.get(name), remedy=f"{_MASSES[name]}, and remove {name}",
-            )  # fmt: skip
-
-
-def _leaves_geoms_out(root: xml.Element, text: str | None) -> bool:
-    low, high = [*map(_number, (text or "0 5").split()), 5.0, 5.0][:2]
-    return not all(low <= _number(node.get("group")) <= high for node in root.iter("geom"))
-
-
-def refuse_curved_followers(root: xml.Element, path: str) -> None:
-    """Refuse joints that follow another one by more than a line, of which a converter keeps the line.
-
-    Raises:
-        ShotError: There is one.
-    """
-    for node in root.findall("equality/joint"):
-        text = node.get("polycoef", "")
-        if any(_number(word) != 0.0 for word in text.split()[2:]):
-            raise ShotError(
-                "a joint that follows another one by a curve is not supported", path=path,
-                attribute=f"equality joint {node.get('joint1', '')} polycoef", found=text,
-                remedy="Keep its first two numbers, an offset and a ratio; or remove the equality, and give the joint "
-                "an actuator and a motion of its own",
-            )  # fmt: skip
-
-
-def unread(root: xml.Element) -> tuple[str, ...]:
-    """What is not read of a robot, as sentences for the user."""
-    found = []
-    tendons = [node.get("name", node.tag) for tendon in root.findall("tendon") for node in tendon]
-    if tendons:
-        found.append(f"tendons are not read, so that nothing couples their joints: {', '.join(tendons)}")
-    shifted = [node.get("name", "") for node in root.iter("joint") if _number(node.get("ref")) != 0.0]
-    if shifted:
-        found.append(
-            "joints whose ref is not 0 count from the pose of the file, where their value is 0 and not ref: "
-            f"{', '.join(shifted)}; so do their limits; subtract ref from their motion"
+    tag = str(node.tag)
+    place = f"{above}/{tag}".lstrip("/")
+    if tag in ("worldbody", *_INNER):
+        place = (
+            f"body/{tag}/{tag}"
+            if tag == "frame" and above == "body/frame"
+            else "body" + f"/{tag}" * (tag in _INNER[1:])
         )
-    return tuple(found)
-
-
-def _number(text: str | None) -> float:
-    try:
-        return float(text or 0.0)
-    except ValueError:
-        return 0.0
+    settings = classes.get(node.get("class", default), {})
+    values = settings.get(_SECTIONS.get(above, tag if above in _WITH_CLASS else ""), {}) | node.attrib
+    if above == "equality" and values.get("active") == "false":
+        return
+    name = node.get("name") or node.get("joint1") or node.get("joint") or about
+    yield Element(place, name, file, values)
+    for child in node:
+        inner = place if tag not in _INNER or child.tag == "frame" else "body"
+        yield from _below(child, inner, node.get("childclass", default), classes, file, name if above else "")

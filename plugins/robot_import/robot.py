@@ -6,7 +6,7 @@ import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -20,10 +20,12 @@ from calmotion.usd import EXTENSIONS, read_shot, refuse_input_as_output, relativ
 from calmotion.version import __version__
 from calmotion.workflow import Given, Path, problems_of, read_settings, value_of
 
-from .converters import BrokenMeshes, convert, converter_python, temporary_folder
+from .converters import BrokenMeshes, compiled_values, convert, converter_python, temporary_folder
 from .descriptions import MJCF, USD, Description, read_description, repaired
-from .doubts import doubts
-from .robot_layer import FlexibleLinks, RobotOptions, robot_layer
+from .masses import too_heavy
+from .options import FlexibleLinks, RobotOptions
+from .robot_layer import robot_layer
+from .robot_motors import immovable_joints
 
 FRAMES_PER_SECOND = 60.0
 _UNIFORM = (10.0, 240.0)  # rates of motions that become the rate of the frames [Hz]
@@ -128,6 +130,7 @@ def import_robot(
         links, tuple(targets), description.efforts, description.without_mass, description.massless,
         None if solid is None else material_named(solid, known)[1], tracks,
         None if is_usd and tracks is None else frames_per_second(tracks), tuple(motors), description.kind == MJCF,
+        description.locks, description.soft_limits,
     )  # fmt: skip
     if is_usd:
         return _over_usd(description.path, target, options)
@@ -194,7 +197,7 @@ def _over_usd(robot: str, layer: str, options: RobotOptions) -> ImportedRobot:
     read: list[tuple[Character, Animation]] = []
     write_layer(made, layer, lambda path: read.append(read_shot(path, still=True)[:2]))
     character, animation = read[0]
-    return ImportedRobot(layer, "", character, animation, (*notes, *doubts(character), *character.notes))
+    return ImportedRobot(layer, "", character, animation, (*notes, *_doubts(character), *character.notes))
 
 
 class _Import:
@@ -211,7 +214,10 @@ class _Import:
             converted, warnings, changes = self._converted(work, parts, python)
             FilePath(parts, _MARKER).touch()
             asset = f"./{os.path.basename(parts)}/{os.path.basename(converted)}"
-            layer, notes = robot_layer(converted, asset, self._options)
+            options = self._options
+            if options.mjcf:
+                options = replace(options, compiled=compiled_values(self._description.path, python))
+            layer, notes = robot_layer(converted, asset, options)
             layer.documentation = f"The robot of {os.path.basename(self._description.path)}, imported by Calmotion."
             draft = os.path.join(work, os.path.basename(self._layer))
             read: list[tuple[Character, Animation]] = []
@@ -220,7 +226,11 @@ class _Import:
         character, animation = read[0]
         told = (*changes, *self._description.unread, *notes, *(f"converter: {text}" for text in warnings))
         return ImportedRobot(
-            self._layer, self._folder, character, animation, (*told, *doubts(character), *character.notes)
+            self._layer,
+            self._folder,
+            character,
+            animation,
+            (*told, *_doubts(character), *character.notes),
         )
 
     def _converted(self, work: str, parts: str, python: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
@@ -264,6 +274,11 @@ class _Import:
                 path=self._folder,
                 remedy="Choose another output, or move the folder.",
             )
+
+
+def _doubts(character: Character) -> tuple[str, ...]:
+    """What can hardly be meant, as sentences for the user."""
+    return (*too_heavy(character), *immovable_joints(character))
 
 
 def _folder(parent: str, name: str) -> str:

@@ -2,77 +2,24 @@
 
 from __future__ import annotations
 
-import fnmatch
 import os
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.errors import ShotError, raise_all
-from calmotion.model import MotorTracks
-from calmotion.rigging import Material
 from calmotion.support import nearest
-from calmotion.usd import StageUnits, author_material, is_applied, is_rigid_body, open_stage, prims_of, quiet, units_of
+from calmotion.usd import StageUnits, author_material, is_rigid_body, open_stage, prims_of, quiet, units_of
 
-from .frames import refuse_moving_frames
-from .robot_motors import author_motors, named, shift_limits
-from .springs import author_springs
+from .masses import MUJOCO_DENSITY, author_masses
+from .options import RobotOptions, carried_by, geoms_of, is_named
+from .passive import author_locks, author_springs, passive_joints
+from .robot_motors import author_motors, named, narrow_limits, shift_limits
 
 if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
-_FRAME_MASS, _FRAME_INERTIA = 1e-6, 1e-10  # of links without mass [kg], [kg m^2]
-_SMALLEST_MOMENT, _RAISED = 1e-6, 1e-2  # of the largest moment of inertia of a link
-_WEIGHTLESS = 1e-9  # of a geom of mass 0 [kg]: UsdPhysics reads 0 as not authored
-_MUJOCO_DENSITY = 1000.0  # which the converter writes where the file states none [kg/m^3]
 _THICKNESS = "calm:flexible:wallThickness"
-
-
-@dataclass(frozen=True)
-class FlexibleLinks:
-    """Links that bend.
-
-    Attributes:
-        pattern: Of their names, with `*` and `?`.
-        name: Of the material.
-        material: The material.
-        thickness: Of their walls [m]; None for solid links.
-    """
-
-    pattern: str
-    name: str
-    material: Material
-    thickness: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class RobotOptions:
-    """What becomes of a converted robot.
-
-    Attributes:
-        flexible: Which links bend.
-        targets: Patterns of names of links or frames that are targets.
-        efforts: Largest effort by name of a joint [N m or N].
-        without_mass: Names of links with geometry and without inertia.
-        massless: Names of links whose mass is 0.
-        solid: Material from which links without inertia get their mass, or None.
-        motion: Of its joints, or None.
-        frames_per_second: Of the shot; None where no motion is given: that of the robot.
-        motors: Patterns of names of joints that motors drive; none: see `robot_motors`.
-        mjcf: Whether the robot is MJCF, for which the converter authors the mass of every link that has one.
-    """
-
-    flexible: tuple[FlexibleLinks, ...] = ()
-    targets: tuple[str, ...] = ()
-    efforts: Mapping[str, float] = field(default_factory=dict)
-    without_mass: tuple[str, ...] = ()
-    massless: tuple[str, ...] = ()
-    solid: Material | None = None
-    motion: MotorTracks | None = None
-    frames_per_second: float | None = 60.0
-    motors: tuple[str, ...] = ()
-    mjcf: bool = False
 
 
 def robot_layer(converted: str, asset: str, options: RobotOptions) -> tuple[Sdf.Layer, tuple[str, ...]]:
@@ -150,97 +97,18 @@ class _Author:
         return float(self._options.frames_per_second or self._robot.GetTimeCodesPerSecond())
 
     def masses(self) -> None:
-        """Densities of the links that have no inertia, and a milligram for those that have no mass."""
-        from pxr import Gf, UsdPhysics
-
-        frames = [prim for prim in self._bodies if self._is_frame(prim)]
-        if self._options.mjcf:
-            refuse_moving_frames(self._stage, frames)
-        for prim in frames:
-            api = UsdPhysics.MassAPI.Apply(prim)
-            api.CreateMassAttr(_FRAME_MASS / self._units.mass(1.0))
-            api.CreateCenterOfMassAttr(Gf.Vec3f(0.0))
-            api.CreateDiagonalInertiaAttr(Gf.Vec3f(_FRAME_INERTIA / self._units.inertia(1.0)))
-        if frames:
-            names = ", ".join(map(named, frames))
-            self.notes.append(f"links of mass 0 are frames, and get {1e6 * _FRAME_MASS:g} mg each: {names}")
-        self._raise_moments()
-        without = [prim for prim in self._bodies if named(prim) in self._options.without_mass]
-        if self._options.solid is not None:
-            without += [prim for prim in self._bodies if prim not in (*without, *frames) and _has_no_mass(prim)]
-        bending = [prim for prim in without if self._is_flexible(prim)]
-        if bending:
-            self.notes.append(f"links without inertia have that of their material: {', '.join(map(named, bending))}")
-        without = [prim for prim in without if prim not in bending]
-        if not without:
-            return
-        names = ", ".join(map(named, without))
-        solid = self._options.solid
-        if solid is None:
-            raise ShotError(
-                "links have geometry and no inertia", path=str(without[0].GetPath()), attribute="inertial", found=names,
-                remedy="Write their <inertial>, or name the material that they are made of: --solid abs",
-            )  # fmt: skip
-        for prim in without:
-            api = UsdPhysics.MassAPI.Apply(prim)
-            api.CreateDensityAttr(solid.density / self._units.density(1.0))
-        self.notes.append(f"links without inertia have that of their geometry as solid parts: {names}")
-
-    def _is_frame(self, body: Usd.Prim) -> bool:
-        """Whether a link has no mass, nor gets that of a material."""
-        without = self._options.mjcf and _has_no_mass(body) and not self._is_flexible(body)
-        return without or named(body) in self._options.massless or self._weighs_nothing(body)
-
-    def _weighs_nothing(self, body: Usd.Prim) -> bool:
-        """Whether all geoms of a rigid link of an MJCF are of mass 0; where some are, they are made weightless."""
-        from pxr import UsdPhysics
-
-        geoms = list(_geoms(body))
-        weightless = [prim for prim in geoms if _weight(prim) == 0.0]
-        if not weightless or _weight(body):
-            return False
-        if len(weightless) == len(geoms):  # a flexible one weighs what its material does
-            return not self._is_flexible(body)
-        for prim in weightless:
-            UsdPhysics.MassAPI.Apply(prim).CreateMassAttr(_WEIGHTLESS / self._units.mass(1.0))
-        return False
-
-    def _raise_moments(self) -> None:
-        """Dummy links often have inertias that no body has, with all products as large as the moments."""
-        from pxr import Gf
-
-        raised: list[str] = []
-        missing: list[str] = []
-        negative: list[str] = []
-        for prim in self._bodies:
-            attribute = prim.GetAttribute("physics:diagonalInertia")
-            moments = np.array(attribute.Get() if attribute and attribute.HasAuthoredValue() else (1.0, 1.0, 1.0))
-            if moments.max() <= 0.0:
-                attribute.Block()  # the reader takes that of the geometry, or of a ball
-                missing.append(named(prim))
-            elif moments.min() <= _SMALLEST_MOMENT * moments.max():
-                attribute.Set(Gf.Vec3f(*np.maximum(moments, _RAISED * moments.max()).tolist()))
-                (negative if moments.min() < -_RAISED * moments.max() else raised).append(named(prim))
-        if missing:
-            self.notes.append(f"links with an inertia of 0 have that of their geometry or a ball: {', '.join(missing)}")
-        if negative:
-            self.notes.append(
-                f"negative moments of inertia, which no body has, are replaced by {_RAISED:g} of the largest; correct "
-                f"the <inertia> of {', '.join(negative)}"
-            )
-        if raised:
-            self.notes.append(
-                f"moments of inertia that are 0 are raised to {_RAISED:g} of the largest: {', '.join(raised)}"
-            )
+        """Masses of all links, see `masses`."""
+        self.notes += author_masses(self._stage, self._units, self._options)
 
     def motors(self) -> None:
         """Drives, see `robot_motors`."""
         shift_limits(self._stage)
         options = self._options
-        self.notes += author_motors(
-            self._stage, self._units, options.motion, self._rate, options.efforts, options.motors
-        )
+        self.notes += narrow_limits(self._stage, self._units, options.soft_limits)
+        author_motors(self._stage, self._units, options.motion, self._rate, options.efforts, options.motors)
         self.notes += author_springs(self._stage, self._units)
+        self.notes += author_locks(self._stage, self._units, options.locks)
+        self.notes += passive_joints(self._stage, bool(options.motors or options.motion))
 
     def links(self) -> None:
         """Flexible links with their materials."""
@@ -270,9 +138,9 @@ class _Author:
 
     def _leave_out_default_density(self, body: Usd.Prim) -> None:
         """A density that MuJoCo assumes is not one that the file states: the material has a better one."""
-        for prim in _geoms(body):
+        for prim in geoms_of(body):
             density = prim.GetAttribute("physics:density")
-            if density and density.HasAuthoredValue() and self._units.density(density.Get()) == _MUJOCO_DENSITY:
+            if density and density.HasAuthoredValue() and self._units.density(density.Get()) == MUJOCO_DENSITY:
                 density.Block()
 
     def targets(self) -> None:
@@ -282,7 +150,7 @@ class _Author:
         carried = [
             prim
             for body in self._bodies
-            for prim in _below(body)
+            for prim in carried_by(body)
             if prim.IsA(UsdGeom.Xformable) and not prim.IsA(UsdGeom.Gprim) and not prim.IsInstance()
         ]
         for pattern in self._options.targets:
@@ -291,13 +159,9 @@ class _Author:
                     prim = UsdGeom.Xform.Define(self._stage, prim.GetPath().AppendChild("CalmTarget")).GetPrim()
                 prim.AddAppliedSchema("CalmTargetAPI")
 
-    def _is_flexible(self, body: Usd.Prim) -> bool:
-        """Whether a pattern of flexible links names a link, whose material then gives its mass."""
-        return any(_is_named(body, given.pattern) for given in self._options.flexible)
-
     def _matching(self, pattern: str, prims: Iterable[Usd.Prim], option: str) -> list[Usd.Prim]:
         candidates = list(prims)
-        found = [prim for prim in candidates if _is_named(prim, pattern)]
+        found = [prim for prim in candidates if is_named(prim, pattern)]
         if not found:
             names = sorted({named(prim) for prim in self._bodies})
             raise ShotError(
@@ -305,39 +169,3 @@ class _Author:
                 remedy=f"{nearest(pattern.strip('*'), names)}Its links are {', '.join(names)}",
             )  # fmt: skip
         return found
-
-
-def _is_named(prim: Usd.Prim, pattern: str) -> bool:
-    return fnmatch.fnmatchcase(named(prim).lower(), pattern.lower())
-
-
-def _has_no_mass(body: Usd.Prim) -> bool:
-    """Whether neither a mass nor a density is authored on a body or what it carries, and nothing collides."""
-    authored = (
-        attribute
-        for prim in _below(body)
-        for name in ("physics:mass", "physics:density")
-        if (attribute := prim.GetAttribute(name)) and attribute.HasAuthoredValue()
-    )
-    return not any(attribute.Get() for attribute in authored) and not any(
-        is_applied(prim, "PhysicsCollisionAPI") for prim in _below(body)
-    )
-
-
-def _geoms(body: Usd.Prim) -> Iterable[Usd.Prim]:
-    """The colliders of a link of an MJCF."""
-    return (prim for prim in _below(body) if is_applied(prim, "MjcCollisionAPI"))
-
-
-def _weight(prim: Usd.Prim) -> float | None:
-    """What is authored of the mass of a prim, else of its density; None where nothing is."""
-    attributes = (prim.GetAttribute(f"physics:{what}") for what in ("mass", "density"))
-    return next((float(a.Get()) for a in attributes if a and a.HasAuthoredValue()), None)
-
-
-def _below(body: Usd.Prim) -> Iterable[Usd.Prim]:
-    """A body and what it carries, without the bodies below it."""
-    yield body
-    for child in body.GetChildren():
-        if not is_rigid_body(child):
-            yield from _below(child)

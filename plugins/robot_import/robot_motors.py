@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.errors import ShotError, raise_all
-from calmotion.model import MotorTracks
+from calmotion.model import Character, MotorTracks
 from calmotion.support import nearest
 from calmotion.usd import (
     COUPLED,
@@ -110,10 +110,38 @@ def shift_limits(stage: Usd.Stage) -> None:
         attribute.Set(0.0)
 
 
+def narrow_limits(stage: Usd.Stage, units: StageUnits, soft: Mapping[str, tuple[float, float]]) -> list[str]:
+    """Make limits of joints narrower where safety controllers keep narrower ones.
+
+    Args:
+        stage: Where they are authored.
+        units: Of the stage.
+        soft: Lower and upper limit by name of the joint [rad or m].
+
+    Returns:
+        Notes for the user.
+    """
+    told = []
+    for prim in joint_prims(stage):
+        if named(prim) not in soft or prim.GetTypeName() not in _DRIVES:
+            continue
+        scale = 1.0 / units.length(1.0) if prim.GetTypeName() == "PhysicsPrismaticJoint" else np.degrees(1.0)
+        low, high = (prim.GetAttribute(name) for name in _LIMITS)
+        hard = [
+            end.Get() if end.HasAuthoredValue() else unlimited for end, unlimited in ((low, -np.inf), (high, np.inf))
+        ]
+        both = max(hard[0], scale * soft[named(prim)][0]), min(hard[1], scale * soft[named(prim)][1])
+        if both[0] < both[1] and not np.allclose(both, hard, rtol=1e-6):
+            low.Set(float(both[0]))
+            high.Set(float(both[1]))
+            told.append(named(prim))
+    return [f"limits are those of the safety controller: {', '.join(told)}"] if told else []
+
+
 def author_motors(
     stage: Usd.Stage, units: StageUnits, motion: MotorTracks | None, frames_per_second: float,
     efforts: Mapping[str, float], patterns: Sequence[str],
-) -> list[str]:  # fmt: skip
+) -> None:  # fmt: skip
     """Author drives of the joints that patterns name; without patterns of those that actuators or drives move, else of
     all of them; and of those in the motion. A joint that no motion moves keeps its target position, or gets that
     nearest to 0 within its limits.
@@ -125,9 +153,6 @@ def author_motors(
         frames_per_second: Time codes in a second.
         efforts: Largest effort by name of a joint [N m or N].
         patterns: Of names of joints, with `*` and `?`; `all` names all of them.
-
-    Returns:
-        Notes for the user.
 
     Raises:
         ShotError: A name that no joint has; a closed chain, all of whose joints would be motors; no joint at all that a
@@ -148,11 +173,17 @@ def author_motors(
         )  # fmt: skip
     for axis in driven:
         _author(axis, moved.get(axis.path), units, frames_per_second, efforts.get(named(axis.prim)))
-    passive = [axis for axis in _free(axes) if axis not in driven and not axis.prim.GetAttribute("mjc:stiffness").Get()]
-    if not passive or patterns or moved:
-        return []
-    names = ", ".join(axis.name for axis in passive)
-    return [f"joints that nothing in the file drives move freely: {names}; --motors all makes motors of them"]
+
+
+def immovable_joints(character: Character) -> tuple[str, ...]:
+    """A sentence for the user about motors that cannot move: a URDF joint whose limit has no range has that from 0 to
+    0."""
+    joints = (character.joints[motor.joint] for motor in character.motors)
+    held = [joint.path for joint in joints if joint.lower == joint.upper]
+    if not held:
+        return ()
+    which = f"{held[0]} and {len(held) - 1} more joints" if len(held) > 1 else held[0]
+    return (f"{which} cannot move: lower and upper limit are the same; a joint without limits is `continuous` in URDF",)
 
 
 def _author(
@@ -185,7 +216,7 @@ def _rest(axis: Axis) -> float:
 
 def _by_default(stage: Usd.Stage, axes: Sequence[Axis], moved: Mapping[str, MotorTracks]) -> list[Axis]:
     """Those that actuators or drives move; all that follow no other joint and close no chain where there are none."""
-    free = _free(axes)
+    free = free_axes(axes)
     actuated = actuated_joints(stage)
     driven = [axis for axis in free if is_driven(axis) or str(axis.prim.GetPath()) in actuated]
     if driven:
@@ -203,7 +234,7 @@ def _by_default(stage: Usd.Stage, axes: Sequence[Axis], moved: Mapping[str, Moto
     )  # fmt: skip
 
 
-def _free(axes: Sequence[Axis]) -> list[Axis]:
+def free_axes(axes: Sequence[Axis]) -> list[Axis]:
     """Those that follow no other joint and close no chain."""
     driven = {str(axis.prim.GetPath()) for axis in axes if is_driven(axis)}
     geared = set()

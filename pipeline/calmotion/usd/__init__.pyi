@@ -1,7 +1,11 @@
 """Public names of `calmotion.usd`: each is imported when it is first used."""
 
 from calmotion.usd.diagnostics import quiet as quiet
+from calmotion.usd.dialects import ARMATURE as ARMATURE
+from calmotion.usd.dialects import FRICTION as FRICTION
 from calmotion.usd.dialects import GEARS as GEARS
+from calmotion.usd.dialects import VISCOUS_FRICTION as VISCOUS_FRICTION
+from calmotion.usd.dialects import authored as authored
 from calmotion.usd.gf import to_doubles as to_doubles
 from calmotion.usd.gf import to_strings as to_strings
 from calmotion.usd.gf import vector as vector

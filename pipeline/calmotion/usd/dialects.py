@@ -6,7 +6,6 @@ mujoco-usd-converter), PhysX. usd-core does not define the schemas of the last t
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -34,7 +33,6 @@ class Spelling:
 EFFORT_LIMIT = (
     Spelling("Calmotion", "calm:motor:maxTorque"),
     Spelling("UsdPhysics", "drive:{drive}:physics:maxForce"),
-    Spelling("MuJoCo", "mjc:actuatorfrcrange:max"),
 )
 VELOCITY_LIMIT = (
     Spelling("Calmotion", "calm:motor:maxVelocity"),
@@ -136,12 +134,3 @@ def authored(prim: Usd.Prim, spelling: Spelling, drive: str) -> tuple[str, float
     name = spelling.attribute.format(drive=drive)
     value = number_of(prim, name)
     return None if value is None else (name, value)
-
-
-def first_finite(prim: Usd.Prim, spellings: tuple[Spelling, ...], drive: str) -> tuple[str, float, Spelling] | None:
-    """Name, value and spelling of the first authored attribute whose value is not infinite."""
-    for spelling in spellings:
-        limit = authored(prim, spelling, drive)
-        if limit is not None and not math.isinf(limit[1]):
-            return *limit, spelling
-    return None

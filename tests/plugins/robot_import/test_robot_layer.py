@@ -10,7 +10,8 @@ from calmotion.errors import ShotError
 from calmotion.model import MotorTracks
 from calmotion.rigging.materials import MATERIALS
 from calmotion.usd.reading.shot import read_shot
-from calmotion_plugins.robot_import.robot_layer import FlexibleLinks, RobotOptions, robot_layer
+from calmotion_plugins.robot_import.options import FlexibleLinks, RobotOptions
+from calmotion_plugins.robot_import.robot_layer import robot_layer
 from converted_arm import CONVERTED, ELBOW, FORE, MIMIC, PAN, UPPER
 
 ABS = MATERIALS["abs"]

@@ -167,17 +167,19 @@ def _newton_gains(joint: JointPrim, newton: NewtonActuator | None, units: StageU
 
 
 def _actuator_gains(joint: JointPrim, prim: Usd.Prim | None, units: StageUnits) -> Gains | None:
-    """Gains of a position actuator of a MuJoCo conversion, which acts on the joint itself: kp (ctrl - g q) - kv g q'
-    with the gear ratio g, in radians."""
+    """Gains of an actuator of a MuJoCo conversion that holds positions, and acts on the joint itself: its force is
+    gain ctrl + b_0 + b_1 g q + b_2 g q' with the gear ratio g, in radians. A positive b_2 is a damping ratio, of which
+    MuJoCo's compiler makes a gain."""
     if prim is None or not acts_on(prim, joint):
         return None
     gain, bias, gear = (numbers_of(prim, name) for name in POSITION_ACTUATOR)
-    kp, ratio = gain[0] if gain else 0.0, gear[0] if gear else 1.0
-    if not kp > 0.0 or len(bias) < 3 or bias[1] != -kp or not math.isfinite(kp * bias[2]):
+    ratio = gear[0] if gear else 1.0
+    if not gain or not gain[0] or len(bias) < 3 or not bias[1] < 0.0 or not math.isfinite(bias[1] * bias[2]):
         return None  # not one that holds positions
     to_si = _per_length(units) if joint.kind == "prismatic" else units.torque
-    names = f"{POSITION_ACTUATOR[0]} and {POSITION_ACTUATOR[1]} of {prim.GetPath()} (MuJoCo)"
-    return Gains(to_si(ratio**2 * kp), to_si(ratio**2 * max(0.0, -bias[2])), names, ON_JOINT)
+    lost = f", without its damping ratio {bias[2]:g}" if bias[2] > 0.0 else ""
+    names = f"{POSITION_ACTUATOR[0]} and {POSITION_ACTUATOR[1]} of {prim.GetPath()} (MuJoCo{lost})"
+    return Gains(to_si(-(ratio**2) * bias[1]), to_si(ratio**2 * max(0.0, -bias[2])), names, ON_JOINT)
 
 
 def _per_degree(units: StageUnits) -> Callable[[float], float]:

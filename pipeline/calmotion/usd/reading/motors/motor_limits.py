@@ -11,7 +11,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.rigging.motor_types import MotorType
 from calmotion.usd import schemas
-from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, Spelling, authored, first_finite, number_of
+from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, authored, number_of
 from calmotion.usd.reading.actuators.mujoco_actuators import acts_on, numbers_of
 from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
 from calmotion.usd.reading.joints import JointPrim
@@ -43,7 +43,7 @@ def effort_limit(
     if force is not None:
         limit = min(limit, to_si(positive(joint.prim, *force)))
     if not math.isfinite(limit):
-        limit = min(_dialect_limit(joint, EFFORT_LIMIT[2:], to_si, notes), _actuator_limit(joint, mujoco, to_si, notes))
+        limit = _mujoco_limit(joint, mujoco, to_si, notes)
     if not math.isfinite(limit) and newton is not None and 0.0 < newton.effort < math.inf:
         notes.append(f"{joint.path}: its limit is taken from {newton.path} (Newton)")
         limit = to_si(newton.effort)
@@ -63,35 +63,52 @@ def velocity_limit(joint: JointPrim, units: StageUnits, notes: list[str], kind: 
     own = authored(joint.prim, VELOCITY_LIMIT[0], joint.drive)
     named = min(kind.get("max_speed", math.inf), kind.get("no_load_speed", math.inf))
     limit = named if own is None else to_si(positive(joint.prim, *own))
-    return float(limit if math.isfinite(limit) else _dialect_limit(joint, VELOCITY_LIMIT[1:], to_si, notes))
+    return float(limit if math.isfinite(limit) else _dialect_limit(joint, to_si, notes))
 
 
-def _dialect_limit(
-    joint: JointPrim, spellings: tuple[Spelling, ...], to_si: Callable[[float], float], notes: list[str]
-) -> float:
-    found = first_finite(joint.prim, spellings, joint.drive)
-    if found is None:
-        return math.inf
-    name, value, spelling = found
-    if not value > 0.0:
-        return math.inf  # in these dialects 0 means no limit
-    notes.append(f"{joint.path}: its limit is taken from {name} ({spelling.dialect})")
-    return float(to_si(value))
+def _dialect_limit(joint: JointPrim, to_si: Callable[[float], float], notes: list[str]) -> float:
+    for spelling in VELOCITY_LIMIT[1:]:
+        found = authored(joint.prim, spelling, joint.drive)
+        if found is not None and found[1] < math.inf:
+            if not found[1] > 0.0:
+                return math.inf  # in these dialects 0 means no limit
+            notes.append(f"{joint.path}: its limit is taken from {found[0]} ({spelling.dialect})")
+            return float(to_si(found[1]))
+    return math.inf
 
 
-def _actuator_limit(
+def _mujoco_limit(
     joint: JointPrim, actuator: Usd.Prim | None, to_si: Callable[[float], float], notes: list[str]
 ) -> float:
-    """What an actuator of MuJoCo gives a joint at most: its range of forces, the narrower side, times its gear."""
-    if actuator is None or not acts_on(actuator, joint):
+    """What the joint of MuJoCo lets through, and what its actuator gives at most, times the gear of that: the range of
+    its forces, and that of its control where it is the force. The narrower side of each range counts."""
+    found = {"mjc:actuatorfrcrange": _range(joint.prim, "mjc:actuatorfrcrange")}
+    if actuator is not None and acts_on(actuator, joint):
+        ratio = abs((numbers_of(actuator, "mjc:gear") or [1.0])[0])
+        where = f" of {actuator.GetPath()}"
+        found[f"mjc:forceRange{where}"] = ratio * _range(actuator, "mjc:forceRange")
+        if all(_token(actuator, f"mjc:{what}Type") in ("", "fixed", "none") for what in ("gain", "bias", "dyn")):
+            gain = abs((numbers_of(actuator, "mjc:gainPrm") or [1.0])[0])
+            found[f"mjc:ctrlRange{where}"] = ratio * gain * _range(actuator, "mjc:ctrlRange")
+    source = min(found, key=found.__getitem__)
+    if not found[source] < math.inf:
         return math.inf
-    low, high = (number_of(actuator, f"mjc:forceRange:{end}") or 0.0 for end in ("min", "max"))
-    ratio = abs((numbers_of(actuator, "mjc:gear") or [1.0])[0])
-    limit = ratio * min(-low, high)
-    if str(actuator.GetAttribute("mjc:forceLimited").Get()) == "false" or not 0.0 < limit < math.inf:
-        return math.inf
-    notes.append(f"{joint.path}: its limit is taken from mjc:forceRange of {actuator.GetPath()} (MuJoCo)")
-    return float(to_si(limit))
+    notes.append(f"{joint.path}: its limit is taken from {source} (MuJoCo)")
+    return float(to_si(found[source]))
+
+
+def _range(prim: Usd.Prim, name: str) -> float:
+    """The narrower side of a range of MuJoCo; infinite where nothing, or one side alone, is limited."""
+    high = number_of(prim, f"{name}:max") or 0.0
+    low = number_of(prim, f"{name}:min")
+    low = -high if low is None else low
+    limited = _token(prim, name.replace("range", "limited").replace("Range", "Limited")) != "false"
+    return min(-low, high) if limited and min(-low, high) > 0.0 else math.inf
+
+
+def _token(prim: Usd.Prim, name: str) -> str:
+    attribute = prim.GetAttribute(name)
+    return str(attribute.Get() or "") if attribute else ""
 
 
 def calmotion_limit(prim: Usd.Prim, name: str) -> float:

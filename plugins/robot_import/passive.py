@@ -1,14 +1,25 @@
-"""Springs of MuJoCo joints (`stiffness`, `springref`): drives that no curve moves, which pull to one value."""
+"""Joints that no curve moves: springs of MuJoCo (`stiffness`, `springref`), those that an equality holds, free ones."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from calmotion.usd import DAMPING_ON, StageUnits, body_on, joint_prims, prims_of
+from calmotion.errors import ShotError
+from calmotion.usd import (
+    ARMATURE,
+    DAMPING_ON,
+    FRICTION,
+    VISCOUS_FRICTION,
+    StageUnits,
+    authored,
+    body_on,
+    joint_prims,
+    prims_of,
+)
 
-from .robot_motors import axes_of, is_driven, named
+from .robot_motors import Axis, axes_of, free_axes, is_driven, named
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -54,6 +65,61 @@ def author_springs(stage: Usd.Stage, units: StageUnits) -> list[str]:
     if others:
         notes.append(f"springs of ball joints and of joints in closed chains are not read: {', '.join(others)}")
     return notes
+
+
+def author_locks(stage: Usd.Stage, units: StageUnits, locks: Mapping[str, float]) -> list[str]:
+    """Make drives that hold the joints which an equality holds at one value.
+
+    Args:
+        stage: Where they are authored; motors are there already.
+        units: Of the stage.
+        locks: That value by the name of the joint [rad or m].
+
+    Returns:
+        Notes for the user.
+
+    Raises:
+        ShotError: The motion moves one.
+    """
+    from pxr import Sdf, UsdPhysics
+
+    held = [axis for prim in joint_prims(stage) if named(prim) in locks for axis in axes_of(prim)]
+    for axis in held:
+        target = UsdPhysics.DriveAPI.Apply(axis.prim, axis.drive).CreateTargetPositionAttr()
+        if target.GetNumTimeSamples():
+            raise ShotError(
+                "the motion moves a joint that an equality holds", path=axis.path, attribute=target.GetName(),
+                found=f"{locks[axis.name]:g}", remedy="Leave it out of the motion, or remove the equality",
+            )  # fmt: skip
+        target.Set(locks[axis.name] / units.length(1.0) if axis.linear else float(np.degrees(locks[axis.name])))
+        axis.prim.AddAppliedSchema("CalmMotorAPI")
+        axis.prim.CreateAttribute("calm:motor:optimize", Sdf.ValueTypeNames.Bool).Set(False)
+    return [f"joints that an equality holds: {', '.join(axis.name for axis in held)}"] if held else []
+
+
+def passive_joints(stage: Usd.Stage, chosen: bool) -> list[str]:
+    """Notes about joints that nothing drives, nor a spring or an equality holds.
+
+    Args:
+        stage: The robot with its motors.
+        chosen: Whether the user has named motors, or given a motion.
+    """
+    axes = [axis for prim in joint_prims(stage) for axis in axes_of(prim)]
+    free = [axis for axis in free_axes(axes) if not is_driven(axis)]
+    notes = []
+    if free and not chosen:
+        names = ", ".join(axis.name for axis in free)
+        notes.append(f"joints that nothing in the file drives move freely: {names}; --motors all makes motors of them")
+    rough = [axis.name for axis in axes if not is_driven(axis) and _is_rough(axis)]
+    if rough:
+        notes.append(f"damping, friction and rotors of joints without motors are not simulated: {', '.join(rough)}")
+    return notes
+
+
+def _is_rough(axis: Axis) -> bool:
+    spellings = (*ARMATURE, *FRICTION, *VISCOUS_FRICTION)
+    found = (authored(axis.prim, spelling, axis.drive) for spelling in spellings)
+    return any(value is not None and value[1] > 0.0 for value in found)
 
 
 def _author(prim: Usd.Prim, radians: bool, units: StageUnits) -> None:

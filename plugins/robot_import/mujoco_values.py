@@ -1,0 +1,90 @@
+"""What MuJoCo's compiler makes of an MJCF robot, as JSON on stdout; run in the environment of the converters.
+
+A converter writes what the file says. Masses that settings of the compiler change, springs given by their time constant
+(`springdamper`), damping ratios of actuators and limits that are inherited are known after compilation alone.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+import mujoco
+
+LEAST = 1e-12  # of masses and inertias of frames that move, which a flexible link or a fixed one may still have
+
+
+def compiled(path: str) -> tuple[Any, Any]:
+    """The model of a file, without pictures, and its specification."""
+    for least in (0.0, LEAST):
+        spec = mujoco.MjSpec.from_file(path)
+        for made in (*spec.geoms, *spec.sites, *spec.tendons):
+            made.material = ""
+        for unused in (*spec.materials, *spec.textures, *spec.skins, *spec.sensors, *spec.keys):
+            spec.delete(unused)
+        spec.compiler.fusestatic = False
+        spec.compiler.boundmass = max(least, spec.compiler.boundmass)
+        spec.compiler.boundinertia = max(least, spec.compiler.boundinertia)
+        try:
+            return spec.compile(), spec
+        except ValueError as error:
+            if least or "mass and inertia" not in str(error):
+                raise
+    raise AssertionError
+
+
+def values(path: str) -> dict[str, Any]:
+    """Bodies in the order of the file, each with its joints; actuators by name, and the names of those that are off."""
+    model, spec = compiled(path)
+    bodies = []
+    for body in range(1, model.nbody):
+        start = model.body_jntadr[body]
+        joints = [_joint(model, start + k) for k in range(model.body_jntnum[body])]
+        bodies.append(
+            {
+                "name": model.body(body).name,
+                "mass": float(model.body_mass[body]),
+                "center": model.body_ipos[body].tolist(),
+                "axes": model.body_iquat[body].tolist(),
+                "moments": model.body_inertia[body].tolist(),
+                "joints": [joint for joint in joints if joint],
+            }
+        )
+    names = [actuator.name or f"Actuator_{actuator.id}" for actuator in spec.actuators]
+    off = [
+        name
+        for index, name in enumerate(names)
+        if 0 <= (group := model.actuator_group[index]) <= 30 and model.opt.disableactuator >> group & 1
+    ]
+    actuators = {name: _actuator(model, index) for index, name in enumerate(names)}
+    totalled = spec.compiler.settotalmass > 0.0
+    return {"bodies": bodies, "actuators": actuators, "off": off, "totalled": totalled}
+
+
+def _joint(model: Any, joint: int) -> dict[str, Any]:
+    kind = int(model.jnt_type[joint])
+    if kind not in (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)):
+        return {}
+    return {
+        "angle": kind == int(mujoco.mjtJoint.mjJNT_HINGE),
+        "mjc:stiffness": float(model.jnt_stiffness[joint]),
+        "newton:damping": float(model.dof_damping[model.jnt_dofadr[joint]]),
+        "mjc:actuatorfrclimited": "true" if model.jnt_actfrclimited[joint] else "false",
+    }
+
+
+def _actuator(model: Any, index: int) -> dict[str, Any]:
+    low, high = model.actuator_ctrlrange[index].tolist()
+    return {
+        "mjc:gainPrm": model.actuator_gainprm[index].tolist(),
+        "mjc:biasPrm": model.actuator_biasprm[index].tolist(),
+        "mjc:forceLimited": "true" if model.actuator_forcelimited[index] else "false",
+        "mjc:ctrlLimited": "true" if model.actuator_ctrllimited[index] else "false",
+        "mjc:ctrlRange:min": low,
+        "mjc:ctrlRange:max": high,
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps(values(sys.argv[1])))

@@ -1,0 +1,197 @@
+"""Masses, springs, gains and limits of an imported MJCF robot are those that MuJoCo compiles."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+from calmotion.errors import ShotError
+from calmotion.usd.transforms import rotation_from_quaternion
+from calmotion_plugins.robot_import import import_robot
+from calmotion_plugins.robot_import.converters import VARIABLE, environment_folder
+
+mujoco = pytest.importorskip("mujoco")
+pytestmark = pytest.mark.skipif(
+    not os.environ.get(VARIABLE) and not (environment_folder() / "ready").is_file(),
+    reason="the converters are not here",
+)
+
+ROBOT = """<mujoco model="m">{head}<worldbody><body name="post"><geom type="box" size="0.05 0.05 0.1" mass="2"/>
+<body name="arm" pos="0 0 0.1"><joint name="lift" axis="0 -1 0" {joint}/>{arm}
+<body name="hand" pos="0.4 0 0"><joint name="grip" type="slide" axis="1 0 0" range="-0.1 0.2" {grip}/>{hand}</body>
+</body></body></worldbody>{tail}</mujoco>"""
+BOX = '<geom type="box" size="0.2 0.01 0.01" pos="0.2 0 0" {}/>'
+BALL = '<geom size="0.02" {}/>'
+
+
+def robot(arm='mass="0.17"', hand='mass="0.2"', **parts):
+    """Geometry, or attributes of one geom, of both links."""
+    arm, hand = (text if "<" in text else geom.format(text) for text, geom in ((arm, BOX), (hand, BALL)))
+    return ROBOT.format(**{"head": "", "joint": "", "grip": "", "tail": ""} | parts, arm=arm, hand=hand)
+
+
+INERTIAL = '<inertial pos="0.1 0 0" mass="0.4" {}/>'
+MASSES = {
+    "boundmass": robot(head='<compiler boundmass="0.3"/>'),
+    "boundinertia": robot(head='<compiler boundinertia="0.002"/>'),
+    "balanceinertia": robot(
+        INERTIAL.format('diaginertia="0.001 0.002 0.01"'), head='<compiler balanceinertia="true"/>'
+    ),
+    "settotalmass": robot(head='<compiler settotalmass="3"/>'),
+    "inertiafromgeom": robot(INERTIAL.format("") + BOX.format('mass="0.5"'), head='<compiler inertiafromgeom="true"/>'),
+    "inertiagrouprange": robot(
+        BOX.format('mass="0.1" group="1"') + BOX.format('mass="0.3" group="3"'),
+        head='<compiler inertiagrouprange="0 2"/>',
+    ),
+    "shown_mass": robot(BOX.format('mass="0.1"') + BOX.format('mass="0.3" contype="0" conaffinity="0"')),
+    "shell": robot(hand=BALL.format('density="700" shellinertia="true"')),
+    "class_mass": robot(
+        BOX.format('class="heavy"'), head='<default><default class="heavy"><geom mass="0.7"/></default></default>'
+    ),
+    "childclass_density": robot(head='<default><geom density="300"/></default>', arm=BOX.format("")),
+    "turned": robot(INERTIAL.format('diaginertia="0.001 0.002 0.0025" euler="0 30 40"')),
+    "full": robot(INERTIAL.format('fullinertia="0.002 0.003 0.0035 0.0004 0.0002 -0.0003"')),
+    "weightless_geom": robot(BOX.format('mass="0"') + BOX.format('mass="0.3"')),
+    "in_frame": robot(f'<frame pos="0 0 0.1" euler="0 20 0">{BOX.format("")}</frame>'),
+    "visual_discarded": robot(
+        BOX.format('mass="0.2" contype="0" conaffinity="0"'), head='<compiler discardvisual="true"/>'
+    ),
+}
+
+
+def imported(tmp_path, text, **options):
+    (tmp_path / "robot.xml").write_text(text)
+    made = import_robot(tmp_path / "robot.xml", layer=tmp_path / "robot.usda", **options)
+    return made, mujoco.MjModel.from_xml_path(str(tmp_path / "robot.xml"))
+
+
+@pytest.mark.parametrize("name", MASSES)
+def test_masses_and_inertias_are_those_of_mujoco(tmp_path, name):
+    made, model = imported(tmp_path, MASSES[name])
+    bodies = {body.path.rsplit("/", 1)[-1]: body.mass for body in made.character.bodies}
+    for k in range(1, model.nbody):
+        mass, turn = bodies[model.body(k).name], rotation_from_quaternion(model.body_iquat[k])
+        inertia = turn @ np.diag(model.body_inertia[k]) @ turn.T
+        assert mass.mass == pytest.approx(model.body_mass[k], rel=1e-6)
+        np.testing.assert_allclose(mass.center, model.body_ipos[k], atol=1e-7)
+        np.testing.assert_allclose(mass.inertia, inertia, atol=1e-6 * np.abs(inertia).max())
+
+
+def test_a_robot_in_two_files_has_the_masses_of_both(tmp_path):
+    (tmp_path / "arm.xml").write_text(f'<mujoco><include file="parts/bar.xml"/>{MASSES["turned"][18:]}')
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "bar.xml").write_text('<mujoco><compiler boundmass="0.5"/></mujoco>')
+    made, _ = imported(tmp_path, '<mujoco model="m"><include file="arm.xml"/></mujoco>')
+    assert sorted(body.mass.mass for body in made.character.bodies) == pytest.approx([0.5, 0.5, 2.0])
+
+
+@pytest.mark.parametrize(
+    ("arm", "head", "mass"),
+    [
+        (BOX.format('mass="0.5"'), "", 0.5),
+        (BOX.format('density="700"'), "", 0.112),
+        (BOX.format(""), '<default><geom density="700"/></default>', 0.112),
+        (BOX.format('mass="0.5"'), '<compiler settotalmass="5.4"/>', 1.0),
+        (INERTIAL.format('diaginertia="0.001 0.002 0.0025"'), '<compiler boundmass="1.5"/>', 1.5),
+    ],
+)
+def test_a_stated_mass_of_a_flexible_link_is_that_of_mujoco(tmp_path, arm, head, mass):
+    shape = BOX.format('contype="0" conaffinity="0" mass="0"') if "inertial" in arm else ""
+    made, _ = imported(tmp_path, robot(arm + shape, head=head), flexible=["arm=abs"])
+    (link,) = (body for body in made.character.bodies if body.flexible is not None)
+    assert link.mass.mass == pytest.approx(mass, rel=1e-6)
+
+
+POSITION = '<actuator><position name="p" joint="lift" kp="50" {}/></actuator>'
+SERVOS = {
+    "dampratio": robot(tail=POSITION.format('dampratio="0.7"')),
+    "class_dampratio": robot(
+        head='<default><position dampratio="1"/></default>', tail=POSITION.format('inheritrange="0"')
+    ),
+    "gear": robot(tail=POSITION.format('kv="2" gear="3"')),
+    "scaled": robot(
+        tail='<actuator><general joint="lift" biastype="affine" gainprm="20" biasprm="0 -40 -3"/></actuator>'
+    ),
+    "general_defaults": robot(
+        head='<default><general biastype="affine" gainprm="80" biasprm="0 -80 -3"/></default>',
+        tail='<actuator><general joint="lift"/></actuator>',
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SERVOS)
+def test_gains_are_those_of_the_compiled_actuator(tmp_path, name):
+    made, model = imported(tmp_path, SERVOS[name])
+    (motor,) = made.character.motors
+    gear = model.actuator_gear[0, 0] ** 2
+    _, stiffness, damping = -gear * model.actuator_biasprm[0, :3]
+    assert (motor.position_gain, motor.velocity_gain) == pytest.approx((stiffness, damping), rel=1e-6)
+
+
+MOTOR = '<actuator><motor joint="lift" {}/></actuator>'
+LIMITS = {
+    "ctrlrange": (robot(tail=MOTOR.format('ctrlrange="-2 2" gear="30"')), 60.0),
+    "ctrl_not_limited": (robot(tail=MOTOR.format('ctrlrange="-2 2" ctrllimited="false"')), np.inf),
+    "forcerange": (robot(tail=POSITION.format('forcerange="-9 12" gear="2"')), 18.0),
+    "force_not_limited": (robot(tail=POSITION.format('forcerange="-9 9" forcelimited="false"')), np.inf),
+    "actuatorfrcrange": (robot(joint='actuatorfrcrange="-7 7"', tail=POSITION.format('forcerange="-9 9"')), 7.0),
+    "narrower_side": (robot(joint='actuatorfrcrange="-3 7"', tail=POSITION.format("")), 3.0),
+    "class_forcerange": (
+        robot(head='<default><motor forcerange="-0.4 0.4"/></default>', tail=MOTOR.format('ctrlrange="-1 1" gear="5"')),
+        2.0,
+    ),
+    "gain": (
+        robot(tail='<actuator><general joint="lift" gainprm="3" ctrlrange="-1 1"/></actuator>'), 3.0
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_limits_of_effort_are_those_of_joint_and_actuator(tmp_path, name):
+    text, limit = LIMITS[name]
+    made, _ = imported(tmp_path, text)
+    (motor,) = made.character.motors
+    assert motor.max_torque == pytest.approx(limit)
+
+
+def test_a_spring_that_is_given_by_its_time_constant_is_the_compiled_one(tmp_path):
+    made, model = imported(tmp_path, robot(grip='springdamper="0.2 0.5"', tail=POSITION.format("")))
+    spring = made.character.motors[1]
+    assert spring.position_gain == pytest.approx(model.jnt_stiffness[1], rel=1e-6)
+    assert spring.velocity_gain == pytest.approx(model.dof_damping[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("joint", ["lift", "grip"])
+@pytest.mark.parametrize("ref", [0.0, 0.05])
+def test_an_equality_without_a_second_joint_holds_the_first(tmp_path, joint, ref):
+    lock = f'<equality><joint joint1="{joint}" polycoef="0.08 0 0 0 0"/></equality>'
+    made, _ = imported(tmp_path, robot(head='<compiler angle="radian"/>', grip=f'ref="{ref}"', tail=lock))
+    track = made.animation.tracks[[motor.path.endswith(joint) for motor in made.character.motors].index(True)]
+    np.testing.assert_allclose(track.values, 0.08, rtol=1e-6)
+    assert any(note == f"joints that an equality holds: {joint}" for note in made.notes)
+
+
+def test_a_motion_of_a_joint_that_an_equality_holds_is_refused(tmp_path):
+    (tmp_path / "wave.csv").write_text("time_s,lift\n0,0\n0.1,0.2\n")
+    lock = '<equality><joint joint1="lift"/></equality>'
+    with pytest.raises(ShotError, match="an equality holds"):
+        imported(tmp_path, robot(tail=lock), motion=tmp_path / "wave.csv")
+
+
+def test_actuators_of_a_group_that_is_switched_off_make_no_motors(tmp_path):
+    other = '<motor joint="grip" group="2"/>'
+    tail = MOTOR.format("").replace("</actuator>", f"{other}</actuator>")
+    made, _ = imported(tmp_path, robot(head='<option actuatorgroupdisable="2"/>', tail=tail))
+    assert [motor.path.rsplit("/", 1)[-1] for motor in made.character.motors] == ["lift"]
+    assert any("move freely: grip" in note for note in made.notes)
+
+
+def test_friction_of_a_joint_without_a_motor_is_noted(tmp_path):
+    made, _ = imported(tmp_path, robot(grip='damping="0.3"', tail=MOTOR.format("")))
+    assert any("joints without motors are not simulated: grip" in note for note in made.notes)
+
+
+def test_what_mujoco_does_not_load_is_refused_in_its_words(tmp_path):
+    with pytest.raises(ShotError, match="A \\+ B >= C"):
+        imported(tmp_path, robot(INERTIAL.format('diaginertia="0.001 0.002 0.01"')))
