@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 from calmotion.arrays import Array, IntArray
@@ -15,7 +15,6 @@ from calmotion.multibody.integrators.pieces import integrate_in_pieces
 from calmotion.multibody.integrators.trajectory import Trajectory
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, start_angles
-from calmotion.multibody.model.system import State
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.delays import CommandDelay
@@ -44,10 +43,7 @@ class ForwardRun:
 
 def reactions_at(model: Model, run: ForwardRun, instants: IntArray | slice) -> Reactions:
     """What the joints transmit at some instants of a run."""
-    whole = run.trajectory
-    states = State(*[part[instants] for part in whole.states])
-    there = replace(whole, states=states, world=whole.world[instants])
-    return reactions(model.system, there, run.joint_angles[instants], run.joint_rates[instants])
+    return reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates, instants)
 
 
 def run_forward(

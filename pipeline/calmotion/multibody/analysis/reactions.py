@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from calmotion.arrays import Array
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.integrators.trajectory import Inputs, Trajectory, instant_of
 from calmotion.multibody.kernels.joints import joint_kinematics
 from calmotion.multibody.kernels.sliders import slides_freely
@@ -68,22 +68,49 @@ def _reactions(system: System, states: State, inputs: Inputs, work: Work, out: R
                     frames[n, joint, i, k] = axes[i, k]
 
 
-def reactions(system: System, trajectory: Trajectory, angles: Array, rates: Array) -> Reactions:
-    """Reactions of all joints at all instants.
+_OSCILLATING = ("newmark", "generalized-alpha")  # integrators whose multipliers do
+_SMOOTH = np.array([-1.0, 4.0, 10.0, 4.0, -1.0]) / 16.0  # exact for cubics; nothing of what alternates is left
+_NEXT, _FIRST = np.array([1.0, 2.0, 1.0]) / 4.0, np.array([3.0, 2.0, -1.0]) / 4.0  # the same for lines, at the ends
+
+
+def multipliers(trajectory: Trajectory) -> Array:
+    """The multipliers of all instants, shape [T, J, 6], without what alternates from one to the next.
+
+    Newmark's method and generalised-alpha hold the joints together in velocity: their multipliers oscillate with the
+    step about the right ones after each change of the accelerations, and this hardly dies away where steps are coarse.
+    Source: Arnold, Bruels, Cardona, Error analysis of generalized-alpha Lie group time integration methods for
+    constrained mechanical systems, 2015.
+    """
+    lam = trajectory.states.lam
+    if trajectory.integrator not in _OSCILLATING or len(lam) < len(_SMOOTH):
+        return lam
+    out = sum(share * lam[k : len(lam) - 4 + k] for k, share in enumerate(_SMOOTH))
+    ends = [(lam[:3], _FIRST), (lam[:3], _NEXT), (lam[-3:], _NEXT), (lam[-3:], _FIRST[::-1])]
+    first, second, last_but_one, last = (np.tensordot(weights, rows, 1)[None] for rows, weights in ends)
+    return np.concatenate([first, second, out, last_but_one, last])
+
+
+def reactions(
+    system: System, trajectory: Trajectory, angles: Array, rates: Array, instants: IntArray | slice = slice(None)
+) -> Reactions:
+    """Reactions of all joints at all instants, or some.
 
     Where constraints are redundant (a planar mechanism of hinges) loads between them are not determined by rigid-body
     mechanics: the multipliers are those of least norm.
 
     Args:
         angles, rates: The joint angles (or lengths) and rates that were simulated, shape [T, J].
+        instants: Those that are wanted.
     """
+    states = State(*[part[instants] for part in trajectory.states._replace(lam=multipliers(trajectory))])
+    angles, rates = angles[instants], rates[instants]
     total, joints = len(angles), len(system.rows)
     work: Work = allocate_work(system)
     result = Reactions(
         np.zeros((total, joints, 3)), np.zeros((total, joints, 3)), np.zeros((total, joints)),
         np.zeros((total, joints, 3, 3)),
     )  # fmt: skip
-    _reactions(system, trajectory.states, Inputs(angles, rates, trajectory.world), work, result)
+    _reactions(system, states, Inputs(angles, rates, trajectory.world[instants]), work, result)
     return result
 
 
