@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -215,12 +215,14 @@ def _rest(axis: Axis) -> float:
 
 
 def _by_default(stage: Usd.Stage, axes: Sequence[Axis], moved: Mapping[str, MotorTracks]) -> list[Axis]:
-    """Those that actuators or drives move; all that follow no other joint and close no chain where there are none."""
+    """Those that actuators or drives move, and those that lead others; where there are none, all that follow no other
+    joint and close no chain."""
     free = free_axes(axes)
     actuated = actuated_joints(stage)
     driven = [axis for axis in free if is_driven(axis) or str(axis.prim.GetPath()) in actuated]
     if driven:
-        return driven
+        leading = {leader for leader, _ in (*_mimic_pairs(axes), *_coupled_pairs(stage))}
+        return driven + [axis for axis in free if axis not in driven and str(axis.prim.GetPath()) in leading]
     loop = _loop(stage)
     if loop is None:
         return free
@@ -235,19 +237,40 @@ def _by_default(stage: Usd.Stage, axes: Sequence[Axis], moved: Mapping[str, Moto
 
 
 def free_axes(axes: Sequence[Axis]) -> list[Axis]:
-    """Those that follow no other joint and close no chain."""
-    driven = {str(axis.prim.GetPath()) for axis in axes if is_driven(axis)}
-    geared = set()
-    for prim in coupling_prims(axes[0].prim.GetStage()) if axes else ():
-        first, second = (coupled(prim, name) for name in COUPLED[str(prim.GetTypeName())])
-        geared.add(first if second in driven and first not in driven else second)
+    """Those that close no chain, and that nothing moves which is coupled to them: of joints that are coupled, the
+    driven ones, or where none is, those that lead."""
+    if not axes:
+        return []
+    stage = axes[0].prim.GetStage()
+    moved = {str(axis.prim.GetPath()) for axis in axes if is_driven(axis)} | actuated_joints(stage).keys()
+    pairs = [*_mimic_pairs(axes), *_coupled_pairs(stage)]
+    dependent = {follower for leader, follower in pairs if leader in moved or follower not in moved}
+    reached = set(moved)
+    while more := {path for pair in pairs if reached.intersection(pair) for path in pair} - reached:
+        reached |= more
+        dependent |= more
     return [
         axis
         for axis in axes
-        if not any(axis.prim.GetRelationship(spelling.leader).HasAuthoredTargets() for spelling in GEARS)
-        and str(axis.prim.GetPath()) not in geared
+        if str(axis.prim.GetPath()) not in dependent
         and not axis.prim.GetAttribute("physics:excludeFromArticulation").Get()
     ]
+
+
+def _mimic_pairs(axes: Sequence[Axis]) -> Iterator[tuple[str, str]]:
+    """Leaders and followers."""
+    for prim in dict.fromkeys(axis.prim for axis in axes):
+        for spelling in GEARS:
+            relationship = prim.GetRelationship(spelling.leader)
+            targets = relationship.GetForwardedTargets() if relationship else []
+            if targets and not (spelling.enabled and prim.GetAttribute(spelling.enabled).Get() is False):
+                yield str(targets[0]), str(prim.GetPath())
+
+
+def _coupled_pairs(stage: Usd.Stage) -> Iterator[tuple[str, str]]:
+    for prim in coupling_prims(stage):
+        first, second = (coupled(prim, name) for name in COUPLED[str(prim.GetTypeName())])
+        yield first, second
 
 
 def is_driven(axis: Axis) -> bool:

@@ -179,6 +179,41 @@ def test_a_motion_of_a_joint_that_an_equality_holds_is_refused(tmp_path):
         imported(tmp_path, robot(tail=lock), motion=tmp_path / "wave.csv")
 
 
+FOLLOWS = '<equality><joint joint1="{}" joint2="{}" polycoef="0 0.1 0 0 0" {}/>{}</equality>'
+COUPLINGS = {  # motors, those that follow behind the one that leads
+    "leader_driven": (("grip", "lift", "", ""), "lift", [["lift", "grip"]]),
+    "follower_driven": (("grip", "lift", "", ""), "grip", [["grip", "lift"]]),
+    "both_driven": (("grip", "lift", "", ""), "lift grip", [["lift", "grip"]]),
+    "none_driven": (("grip", "lift", "", ""), "", [["lift", "grip"], ["toe"]]),
+    "others_driven": (("grip", "lift", "", ""), "toe", [["lift", "grip"], ["toe"]]),
+    "not_active": (("grip", "lift", 'active="false"', ""), "lift grip", [["lift"], ["grip"]]),
+    "last_of_train": (("grip", "lift", "", '<joint joint1="toe" joint2="grip"/>'), "toe", [["toe", "lift", "grip"]]),
+    "middle_of_train": (("grip", "lift", "", '<joint joint1="toe" joint2="grip"/>'), "grip", [["grip", "lift", "toe"]]),
+    "two_followers": (("grip", "lift", "", '<joint joint1="toe" joint2="lift"/>'), "toe", [["toe", "lift", "grip"]]),
+}
+
+
+@pytest.mark.parametrize("name", COUPLINGS)
+def test_of_coupled_joints_the_driven_one_leads(tmp_path, name):
+    coupling, driven, expected = COUPLINGS[name]
+    actuators = "".join(f'<motor joint="{joint}"/>' for joint in driven.split())
+    toe = '<body name="foot" pos="0 0.1 0"><joint name="toe" axis="0 0 1"/><geom size="0.02" mass="0.1"/></body>'
+    text = robot(
+        arm=BOX.format('mass="0.17"') + toe, tail=f"<actuator>{actuators}</actuator>{FOLLOWS.format(*coupling)}"
+    )
+    made, _ = imported(tmp_path, text)
+    names = [motor.path.rsplit("/", 1)[-1] for motor in made.character.motors]
+    groups = {name: [name] for name, motor in zip(names, made.character.motors, strict=True) if motor.follows is None}
+    for name, motor in zip(names, made.character.motors, strict=True):
+        if motor.follows is not None:
+            groups[names[motor.follows.leader]].append(name)
+    assert sorted(map(in_order, groups.values())) == sorted(map(in_order, expected))
+
+
+def in_order(group):
+    return [group[0], *sorted(group[1:])]
+
+
 def test_actuators_of_a_group_that_is_switched_off_make_no_motors(tmp_path):
     other = '<motor joint="grip" group="2"/>'
     tail = MOTOR.format("").replace("</actuator>", f"{other}</actuator>")

@@ -23,7 +23,7 @@ from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.reading.joints import JointPrim, refuse_unsupported
 from calmotion.usd.reading.motors.free_ranges import may_change
 from calmotion.usd.reading.motors.gears.gear_joints import gears_of_joints
-from calmotion.usd.reading.motors.gears.gearing import Gear, read_gear, resolve
+from calmotion.usd.reading.motors.gears.gearing import Gear, led_by_driven, read_gear, resolve
 from calmotion.usd.reading.motors.motor_limits import calmotion_limit, effort_limit, velocity_limit
 from calmotion.usd.reading.motors.tracks import sample_codes
 from calmotion.usd.reading.motors.undriven_joints import note_or_refuse_no_motors
@@ -73,6 +73,7 @@ class Drive:
         skel_joint: The joint of the skeleton.
         gear: How it follows another motor.
         actuator: Path of the actuator that drives it, of a MuJoCo conversion or of Newton, or empty.
+        note: What holds it where nothing animates it, for the user.
     """
 
     joint: JointPrim
@@ -81,6 +82,7 @@ class Drive:
     skel_joint: str = ""
     gear: Gear | None = None
     actuator: str = ""
+    note: str = ""
 
     def attribute(self, stage: Usd.Stage) -> Any:
         """The target position of its drive, on a stage; invalid where the joint has no drive."""
@@ -141,10 +143,14 @@ def read_drives(
                 drives[joint.path] = replace(drive, actuator=actuated.get(joint.path, ""))
     with reading.collecting_problems():
         gears |= gears_of_joints(reading, joints, {*drives, *gears})
+        gears = led_by_driven(resolve(gears), drives)
         _add_geared_motors(drives, resolve(gears), {joint.path: joint for joint in joints}, reading)
     with reading.collecting_problems():
         refuse_unused_animation(reading, joints, drives, given)
     found = [drives[joint.path] for joint in joints if joint.path in drives]
+    for drive in found:
+        if drive.note:
+            reading.note(f"{drive.joint.path}: {drive.note}")
     if reading.problems:
         return found
     if not found:
@@ -292,16 +298,15 @@ def _drive(
             raise ShotError(
                 "is not finite", path=joint.path, attribute=name, found=constant, remedy="Correct the value"
             )
-        reading.note(f"{joint.path}: its drive is not animated and holds {constant:g} {unit}")
-        return Drive(joint, CONSTANT, constant=constant * to_si(joint.kind, reading.units))
+        note = f"its drive is not animated and holds {constant:g} {unit}"
+        return Drive(joint, CONSTANT, constant=constant * to_si(joint.kind, reading.units), note=note)
     if ours or joint.path in actuated:
         what = "an actuator drives it" if joint.path in actuated else "it is a motor"
-        reading.note(f"{joint.path}: {what}, nothing animates it, and it holds the pose of its bodies")
-        return Drive(joint, CONSTANT)
+        return Drive(joint, CONSTANT, note=f"{what}, nothing animates it, and it holds the pose of its bodies")
     stiffness = prim.GetAttribute(f"drive:{drive}:physics:stiffness").Get()
     if stiffness:
-        reading.note(f"{joint.path}: its drive has a stiffness but no target position and holds 0 {unit}")
-        return Drive(joint, CONSTANT, constant=0.0)
+        note = f"its drive has a stiffness but no target position and holds 0 {unit}"
+        return Drive(joint, CONSTANT, constant=0.0, note=note)
     reading.note(f"{joint.path}: its drive has neither a target position nor a stiffness, so the joint moves freely")
     return None
 

@@ -104,6 +104,20 @@ def test_the_animation_of_a_geared_joint_is_ignored_with_a_note(tmp_path):
     assert any(ELBOW in note and "not used" in note for note in character.notes)
 
 
+def test_the_joint_that_leads_follows_where_only_the_other_is_driven(tmp_path):
+    def edit(stage):
+        newton(stage)
+        stage.GetPrimAtPath(SHOULDER).RemoveAppliedSchema("PhysicsDriveAPI:angular")
+        stage.GetPrimAtPath(SHOULDER).GetAttribute(TARGET_POSITION).Clear()
+
+    character, animation, _ = read(tmp_path, edit)
+    shoulder, elbow = character.motors
+    assert elbow.follows is None and shoulder.follows.ratio == pytest.approx(-2.0)
+    led = animation.tracks[1]
+    assert np.allclose(led.values, 10.0 * RADIANS - 0.5 * animation.tracks[0].values, atol=1e-8)
+    assert np.ptp(led.values) > 0.1
+
+
 def test_a_leader_that_no_motor_drives_is_refused(tmp_path):
     def edit(stage):
         newton(stage)

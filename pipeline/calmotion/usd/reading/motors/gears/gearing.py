@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -89,6 +90,30 @@ def _number(prim: Usd.Prim, name: str, fallback: float) -> float:
     if not math.isfinite(value):
         raise ShotError("is not finite", path=prim.GetPath(), attribute=name, found=value, remedy="Correct the value")
     return value
+
+
+def led_by_driven(gears: dict[str, Gear], driven: Collection[str]) -> dict[str, Gear]:
+    """Gears turned over where the joint that follows is driven, and the one that leads is not: either moves the other.
+
+    Args:
+        gears: By path of the joint that follows.
+        driven: Paths of joints that have a motor of their own.
+    """
+    turned = dict(gears)
+    while True:
+        found = next(
+            (
+                (path, gear)
+                for path, gear in turned.items()
+                if gear.leader not in (*driven, *turned) and path in driven and gear.ratio
+            ),
+            None,
+        )
+        if found is None:
+            return turned
+        path, gear = found
+        del turned[path]
+        turned[gear.leader] = Gear(path, 1.0 / gear.ratio, -gear.offset / gear.ratio)
 
 
 def resolve(gears: dict[str, Gear]) -> dict[str, Gear]:
