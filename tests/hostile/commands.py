@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from hostile import DONE, USAGE, Case, arm
-from motions import EITHER
+from hostile import DONE, EITHER, USAGE, Case, arm
 from shot_edits import flexible
 
 SHOT = arm()

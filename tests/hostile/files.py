@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from commands import words
-from hostile import DONE, USAGE, Case, Edit, arm, layer, simulate
-from motions import EITHER
+from hostile import DONE, EITHER, REFUSED, USAGE, Case, Edit, arm, layer, simulate
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdUtils, Vt
 from shot_edits import flexible, mesh, mesh_file, tet_mesh
 from small_shots import BASE, ELBOW, FORE, HAND, SHOULDER, UPPER, make_target
@@ -182,38 +181,32 @@ CASES: dict[str, Case] = {
     "a name with an at sign": named("a@b.usda", statuses=EITHER),
     "a name with a backslash": named("a\\b.usda", statuses=EITHER),
     "a name without a suffix": Case(arm(), ("simulate", "shot", "--json"), (1,), ("shot",)),
-    "prims in other scripts": simulate("手先", make=arm(unicode_target), statuses=DONE),
+    "prims in other scripts": simulate(DONE, unicode_target, "手先"),
     # places
-    "a shot through a link": simulate(make=linked, statuses=DONE),
+    "a shot through a link": simulate(DONE, make=linked),
     "a link to nothing": words(
         "simulate shot.usda --json", "shot.usda", make=lambda f: (f / "shot.usda").symlink_to("gone.usda")
     ),
     "a link to itself": words(
         "simulate shot.usda --json", "shot.usda", make=lambda f: (f / "shot.usda").symlink_to("shot.usda")
     ),
-    "an output through a link": simulate(
-        make=then(lambda f: (f / "out.usda").symlink_to("elsewhere.usda")), statuses=(0, 1, 2)
-    ),
+    "an output through a link": simulate((0, 1, 2), make=then(lambda f: (f / "out.usda").symlink_to("elsewhere.usda"))),
     "an output that links to the shot": simulate(
-        "never overwritten", make=then(lambda f: (f / "out.usda").symlink_to("shot.usda")), statuses=(1, 2)
+        (1, 2), "never overwritten", make=then(lambda f: (f / "out.usda").symlink_to("shot.usda"))
     ),
     "an output that links to a device": simulate(
-        make=then(lambda f: (f / "out.usda").symlink_to("/dev/full")), statuses=(0, 1, 2)
+        (0, 1, 2), make=then(lambda f: (f / "out.usda").symlink_to("/dev/full"))
     ),
-    "an output that is a pipe": simulate(
-        "out.usda", make=then(lambda f: os.mkfifo(f / "out.usda")), statuses=(0, 1, 2)
-    ),
-    "a folder in place of the output": simulate(
-        "out.usda", make=then(lambda f: (f / "out.usda").mkdir()), statuses=(1, 2)
-    ),
+    "an output that is a pipe": simulate((0, 1, 2), "out.usda", make=then(lambda f: os.mkfifo(f / "out.usda"))),
+    "a folder in place of the output": simulate((1, 2), "out.usda", make=then(lambda f: (f / "out.usda").mkdir())),
     "a folder in place of the root layer": simulate(
-        "out_root.usda", make=then(lambda f: (f / "out_root.usda").mkdir()), statuses=(1, 2)
+        (1, 2), "out_root.usda", make=then(lambda f: (f / "out_root.usda").mkdir())
     ),
     "a root layer of somebody else": simulate(
-        "out_root.usda", make=then(lambda f: (f / "out_root.usda").write_text("#usda 1.0\n")), statuses=(1, 2)
+        (1, 2), "out_root.usda", make=then(lambda f: (f / "out_root.usda").write_text("#usda 1.0\n"))
     ),
     "an output that is no USD file": simulate(
-        make=then(lambda f: (f / "out.usda").write_text("a shopping list")), statuses=(0, 1, 2)
+        (0, 1, 2), make=then(lambda f: (f / "out.usda").write_text("a shopping list"))
     ),
     "a checkpoint that is a folder": Case(
         then(lambda f: (f / ".out.usda.checkpoint.npz").mkdir()),
@@ -234,142 +227,134 @@ CASES: dict[str, Case] = {
     "an empty package": words(
         "simulate shot.usdz --json", "shot.usdz", make=lambda f: zipfile.ZipFile(f / "shot.usdz", "w").close()
     ),
-    "a shot that is referenced": simulate(make=referenced, statuses=DONE),
-    "a shot that is referenced in centimetres": simulate(make=in_centimetres, statuses=EITHER),
-    "a robot that is there twice": simulate(make=twice, statuses=EITHER),
-    "a robot that is an instance": simulate(make=instanced, statuses=EITHER),
-    "fifty layers deep": simulate(make=deep(50), statuses=DONE),
+    "a shot that is referenced": simulate(DONE, make=referenced),
+    "a shot that is referenced in centimetres": simulate(EITHER, make=in_centimetres),
+    "a robot that is there twice": simulate(EITHER, make=twice),
+    "a robot that is an instance": simulate(EITHER, make=instanced),
+    "fifty layers deep": simulate(DONE, make=deep(50)),
     "a payload": simulate(
-        make=layer(payload, more='#usda 1.0\ndef "More"\n{\n    def Xform "x"\n    {\n    }\n}\n'), statuses=DONE
+        DONE, make=layer(payload, more='#usda 1.0\ndef "More"\n{\n    def Xform "x"\n    {\n    }\n}\n')
     ),
     "a payload of another type": simulate(
-        make=layer(payload, more='#usda 1.0\ndef Cube "More"\n{\n    double size = 3\n}\n'), statuses=EITHER
+        EITHER, make=layer(payload, more='#usda 1.0\ndef Cube "More"\n{\n    double size = 3\n}\n')
     ),
-    "a payload that is missing at a prim": simulate("payload|more.usda", make=layer(payload)),
+    "a payload that is missing at a prim": simulate(REFUSED, "payload|more.usda", make=layer(payload)),
     "a sublayer that is muted by its offset": simulate(
+        DONE,
         make=layer(
             partial(shifted, offset=1000.0, scale=2.0),
             more='#usda 1.0\nover "Arm"\n{\n    float calm:x = 1\n}\n',
         ),
-        statuses=DONE,
     ),
     "a sublayer on a scale of zero": simulate(
+        EITHER,
         make=layer(
             partial(shifted, offset=0.0, scale=0.0),
             more="#usda 1.0\n",
         ),
-        statuses=EITHER,
     ),
     "a sublayer that is a folder": simulate(
-        "down", make=then(lambda f: (f / "down").mkdir(), lambda f: _sublayer(f, "./down"))
+        REFUSED, "down", make=then(lambda f: (f / "down").mkdir(), lambda f: _sublayer(f, "./down"))
     ),
     "a sublayer that is no USD file": simulate(
-        "more.txt", make=then(lambda f: (f / "more.txt").write_text("no"), lambda f: _sublayer(f, "./more.txt"))
+        REFUSED,
+        "more.txt",
+        make=then(lambda f: (f / "more.txt").write_text("no"), lambda f: _sublayer(f, "./more.txt")),
     ),
     "a sublayer of the network": simulate(
-        "example.com", make=then(lambda f: _sublayer(f, "https://example.com/a.usda"))
+        REFUSED, "example.com", make=then(lambda f: _sublayer(f, "https://example.com/a.usda"))
     ),
-    "a sublayer that is a device": simulate("/dev/zero", make=then(lambda f: _sublayer(f, "/dev/zero"))),
-    "a body that is inactive": simulate("elbow|fore", make=arm(inactive(FORE), target=False), statuses=EITHER),
-    "a joint that is inactive": simulate(make=arm(inactive(ELBOW)), statuses=EITHER),
-    "a target that is inactive": simulate(make=arm(inactive(HAND)), statuses=EITHER),
-    "everything is inactive": simulate("shot.usda", make=arm(inactive("/Arm"))),
-    "everything is invisible": simulate(make=arm(hidden), statuses=DONE),
-    "a flexible mesh that is a guide": simulate(make=arm(flexible(guide)), statuses=EITHER),
+    "a sublayer that is a device": simulate(REFUSED, "/dev/zero", make=then(lambda f: _sublayer(f, "/dev/zero"))),
+    "a body that is inactive": simulate(EITHER, inactive(FORE), "elbow|fore", target=False),
+    "a joint that is inactive": simulate(EITHER, inactive(ELBOW)),
+    "a target that is inactive": simulate(EITHER, inactive(HAND)),
+    "everything is inactive": simulate(REFUSED, inactive("/Arm"), "shot.usda"),
+    "everything is invisible": simulate(DONE, hidden),
+    "a flexible mesh that is a guide": simulate(EITHER, flexible(guide)),
     "a root layer that says nothing of units": simulate(
-        "metersPerUnit", "upAxis", make=then(lambda f: _above(f)), statuses=EITHER
+        EITHER, "metersPerUnit", "upAxis", make=then(lambda f: _above(f))
     ),
     "a robot below a transform that turns it": simulate(
-        "do not meet",
-        make=arm(lambda s: UsdGeom.Xformable(s.GetPrimAtPath("/Arm")).AddRotateXOp().Set(90)),
-        statuses=DONE,
+        DONE, lambda s: UsdGeom.Xformable(s.GetPrimAtPath("/Arm")).AddRotateXOp().Set(90), "do not meet"
     ),
     "a robot that is mirrored": simulate(
-        "do not meet",
-        make=arm(lambda s: UsdGeom.Xformable(s.GetPrimAtPath("/Arm")).AddScaleOp().Set(Gf.Vec3f(1, -1, 1))),
-        statuses=EITHER,
+        EITHER, lambda s: UsdGeom.Xformable(s.GetPrimAtPath("/Arm")).AddScaleOp().Set(Gf.Vec3f(1, -1, 1)), "do not meet"
     ),
     "a collider of a type without a volume": simulate(
-        "gives no mass",
-        make=arm(lambda s: UsdPhysics.CollisionAPI.Apply(s.DefinePrim(f"{UPPER}/p", "Plane"))),
-        statuses=DONE,
+        DONE, lambda s: UsdPhysics.CollisionAPI.Apply(s.DefinePrim(f"{UPPER}/p", "Plane")), "gives no mass"
     ),
     "a joint that breaks": simulate(
-        "breakForce",
-        make=arm(lambda s: UsdPhysics.Joint(s.GetPrimAtPath(ELBOW)).CreateBreakForceAttr(1.0)),
-        statuses=DONE,
+        DONE, lambda s: UsdPhysics.Joint(s.GetPrimAtPath(ELBOW)).CreateBreakForceAttr(1.0), "breakForce"
     ),
     "a body that moves at the start": simulate(
+        DONE,
+        lambda s: UsdPhysics.RigidBodyAPI(s.GetPrimAtPath(FORE)).CreateAngularVelocityAttr((0, 500, 0)),
         "angularVelocity",
-        make=arm(lambda s: UsdPhysics.RigidBodyAPI(s.GetPrimAtPath(FORE)).CreateAngularVelocityAttr((0, 500, 0))),
-        statuses=DONE,
     ),
-    "a variant that is not there": simulate(make=arm(variants), statuses=EITHER),
+    "a variant that is not there": simulate(EITHER, variants),
     "joints of which two have one name": simulate(
-        make=layer(lambda own: Sdf.CopySpec(own, SHOULDER, own, f"{UPPER}/shoulder")), statuses=EITHER
+        EITHER, make=layer(lambda own: Sdf.CopySpec(own, SHOULDER, own, f"{UPPER}/shoulder"))
     ),
     "a class in place of a robot": simulate(
-        "shot.usda|/Arm", make=layer(lambda own: setattr(own.GetPrimAtPath("/Arm"), "specifier", Sdf.SpecifierClass))
+        REFUSED,
+        "shot.usda|/Arm",
+        make=layer(lambda own: setattr(own.GetPrimAtPath("/Arm"), "specifier", Sdf.SpecifierClass)),
     ),
     "an over in place of a body": simulate(
-        make=layer(lambda own: setattr(own.GetPrimAtPath(BASE), "specifier", Sdf.SpecifierOver)), statuses=EITHER
+        EITHER, make=layer(lambda own: setattr(own.GetPrimAtPath(BASE), "specifier", Sdf.SpecifierOver))
     ),
-    "a default prim that is not there": simulate(
-        make=layer(lambda own: setattr(own, "defaultPrim", "Gone")), statuses=EITHER
-    ),
+    "a default prim that is not there": simulate(EITHER, make=layer(lambda own: setattr(own, "defaultPrim", "Gone"))),
     "ten thousand prims more": simulate(
-        make=arm(lambda s: [UsdGeom.Xform.Define(s, f"/Set/p{k}") for k in range(10_000)]), statuses=DONE, seconds=60
+        DONE, lambda s: [UsdGeom.Xform.Define(s, f"/Set/p{k}") for k in range(10_000)], seconds=60
     ),
-    "a prim 400 levels deep": simulate(make=arm(lambda s: UsdGeom.Xform.Define(s, "/Set" + "/x" * 400)), statuses=DONE),
+    "a prim 400 levels deep": simulate(DONE, lambda s: UsdGeom.Xform.Define(s, "/Set" + "/x" * 400)),
     # meshes
-    "a flexible body without a mesh": simulate("a beam of", make=arm(flexible(no_mesh)), statuses=DONE),
+    "a flexible body without a mesh": simulate(DONE, flexible(no_mesh), "a beam of"),
     "a mesh that is open": simulate(
-        make=arm(faces((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4))),
-        statuses=EITHER,
-        seconds=60,
+        EITHER, faces((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4)), seconds=60
     ),
-    "a mesh of one triangle": simulate("skin|fore", make=arm(faces((0, 1, 2))), seconds=60),
+    "a mesh of one triangle": simulate(REFUSED, faces((0, 1, 2)), "skin|fore", seconds=60),
     "a mesh inside out": simulate(
-        make=arm(faces((2, 3, 1, 0), (5, 7, 6, 4), (1, 5, 4, 0), (6, 7, 3, 2), (4, 6, 2, 0), (3, 7, 5, 1))),
-        statuses=EITHER,
-        seconds=60,
+        EITHER, faces((2, 3, 1, 0), (5, 7, 6, 4), (1, 5, 4, 0), (6, 7, 3, 2), (4, 6, 2, 0), (3, 7, 5, 1)), seconds=60
     ),
     "a mesh of every face twice": simulate(
-        make=arm(faces(*2 * [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])),
-        statuses=EITHER,
+        EITHER,
+        faces(*2 * [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]),
         seconds=60,
     ),
-    "a mesh that is flat": simulate("skin|fore", make=arm(points(box_points(z=0.0))), statuses=EITHER, seconds=60),
-    "a mesh of a point": simulate("skin|fore", make=arm(points(np.zeros((8, 3)))), seconds=60),
-    "a mesh of micrometres": simulate(make=arm(points(1e-6 * box_points())), statuses=EITHER, seconds=60),
-    "a mesh of kilometres": simulate(make=arm(points(1e3 * box_points())), statuses=EITHER, seconds=60),
-    "a mesh that is a needle": simulate(make=arm(points(box_points(y=1e-5, z=1e-5))), statuses=EITHER, seconds=120),
-    "a mesh that is a sheet": simulate(make=arm(points(box_points(z=1e-5))), statuses=EITHER, seconds=120),
+    "a mesh that is flat": simulate(EITHER, points(box_points(z=0.0)), "skin|fore", seconds=60),
+    "a mesh of a point": simulate(REFUSED, points(np.zeros((8, 3))), "skin|fore", seconds=60),
+    "a mesh of micrometres": simulate(EITHER, points(1e-6 * box_points()), seconds=60),
+    "a mesh of kilometres": simulate(EITHER, points(1e3 * box_points()), seconds=60),
+    "a mesh that is a needle": simulate(EITHER, points(box_points(y=1e-5, z=1e-5)), seconds=120),
+    "a mesh that is a sheet": simulate(EITHER, points(box_points(z=1e-5)), seconds=120),
     "a mesh far from its body": simulate(
-        FORE, "far from all of its joints", make=arm(points(box_points() + [0.0, 0.0, 50.0])), seconds=60
+        REFUSED, points(box_points() + [0.0, 0.0, 50.0]), FORE, "far from all of its joints", seconds=60
     ),
     "a mesh that cuts itself": simulate(
-        make=arm(points(box_points() * np.where(np.arange(8) == 7, -1.0, 1.0)[:, None])), statuses=EITHER, seconds=120
+        EITHER, points(box_points() * np.where(np.arange(8) == 7, -1.0, 1.0)[:, None]), seconds=120
     ),
     "an infinite point": simulate(
-        SKIN, "points", make=arm(points(np.where(np.arange(24).reshape(8, 3) == 4, np.inf, box_points())))
+        REFUSED, points(np.where(np.arange(24).reshape(8, 3) == 4, np.inf, box_points())), SKIN, "points"
     ),
-    "faces of two corners": simulate("a beam of", make=arm(faces(*[(0, 1)] * 6)), statuses=DONE, seconds=60),
-    "tetrahedra that are inside out": simulate(make=arm(tet_mesh(TETS, [(0, 1, 3, 2)])), statuses=EITHER, seconds=60),
+    "faces of two corners": simulate(DONE, faces(*[(0, 1)] * 6), "a beam of", seconds=60),
+    "tetrahedra that are inside out": simulate(EITHER, tet_mesh(TETS, [(0, 1, 3, 2)]), seconds=60),
     "tetrahedra that share no face": simulate(
+        EITHER,
+        tet_mesh([*TETS, *(p + Gf.Vec3f(5, 0, 0) for p in TETS)], [(0, 1, 2, 3), (4, 5, 6, 7)]),
         "tets",
-        make=arm(tet_mesh([*TETS, *(p + Gf.Vec3f(5, 0, 0) for p in TETS)], [(0, 1, 2, 3), (4, 5, 6, 7)])),
-        statuses=EITHER,
         seconds=60,
     ),
-    "one tetrahedron": simulate(make=arm(tet_mesh(TETS, [(0, 1, 2, 3)])), statuses=EITHER, seconds=60),
-    "a mesh file of words": simulate("a.msh", make=mesh_beside("hello", "a.msh")),
-    "a mesh file of a trillion nodes": simulate("a.msh", make=mesh_beside(GMSH, "a.msh")),
-    "a mesh file that is empty": simulate("a.msh", make=mesh_beside("", "a.msh")),
-    "a mesh file of another kind": simulate("a.docx", make=mesh_beside("PK", "a.docx")),
-    "a mesh file that is the shot": simulate("shot.usda", make=arm(mesh_file("./shot.usda"))),
-    "an OBJ of nothing": simulate("a.obj", make=mesh_beside("# nothing\n", "a.obj")),
-    "an STL that says it is huge": simulate("a.stl", make=mesh_beside(bytes(80) + b"\xff\xff\xff\x7f", "a.stl")),
+    "one tetrahedron": simulate(EITHER, tet_mesh(TETS, [(0, 1, 2, 3)]), seconds=60),
+    "a mesh file of words": simulate(REFUSED, "a.msh", make=mesh_beside("hello", "a.msh")),
+    "a mesh file of a trillion nodes": simulate(REFUSED, "a.msh", make=mesh_beside(GMSH, "a.msh")),
+    "a mesh file that is empty": simulate(REFUSED, "a.msh", make=mesh_beside("", "a.msh")),
+    "a mesh file of another kind": simulate(REFUSED, "a.docx", make=mesh_beside("PK", "a.docx")),
+    "a mesh file that is the shot": simulate(REFUSED, mesh_file("./shot.usda"), "shot.usda"),
+    "an OBJ of nothing": simulate(REFUSED, "a.obj", make=mesh_beside("# nothing\n", "a.obj")),
+    "an STL that says it is huge": simulate(
+        REFUSED, "a.stl", make=mesh_beside(bytes(80) + b"\xff\xff\xff\x7f", "a.stl")
+    ),
 }
 
 

@@ -16,13 +16,14 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import small_shots as shots
 from pxr import Sdf, Usd
 
 Edit = Callable[[Usd.Stage], None]
-DONE, REFUSED, USAGE = (0,), (1,), (2,)
+DONE, REFUSED, USAGE, EITHER = (0,), (1,), (2,), (0, 1)
 SHOT = "{shot}"  # stands for the file that a case has made
 SECONDS = 30.0  # processor time that a case may take, kernels read from the cache
 
@@ -92,18 +93,28 @@ def layer(*changes: Callable[[Sdf.Layer], None], **files: str) -> Callable[[Path
     return make
 
 
-def simulate(*told: str, make: Callable[[Path], None], args: str = "", statuses: tuple[int, ...] = REFUSED,
-             seconds: float = SECONDS, judge: Callable[[dict], str] | None = None) -> Case:  # fmt: skip
-    """`calmotion simulate` on what is made."""
-    words = ("simulate", "shot.usda", "-o", "out.usda", "--json", *args.split())
-    return Case(make, words, statuses, told, seconds=seconds, judge=judge)
+def simulate(
+    statuses: tuple[int, ...], *parts: Edit | str, command: str = "simulate",
+    make: Callable[[Path], None] | None = None,
+    target: bool = True, args: str = "", seconds: float = SECONDS, judge: Callable[[dict], str] | None = None,
+) -> Case:  # fmt: skip
+    """`calmotion simulate` on the arm.
+
+    Args:
+        statuses: Those that are right.
+        parts: Edits of the arm, and texts that must be told.
+        command: Another command.
+        make: Makes the shot in place of the arm.
+        target: Whether the arm has a target.
+        args: Further words of the command line.
+        seconds, judge: See `Case`.
+    """
+    edits, told = ([part for part in parts if isinstance(part, str) == text] for text in (False, True))
+    words = (command, "shot.usda", "-o", "out.usda", "--json", *args.split())
+    return Case(make or arm(*edits, target=target), words, statuses, tuple(told), seconds=seconds, judge=judge)
 
 
-def optimize(*told: str, make: Callable[[Path], None], args: str = "", statuses: tuple[int, ...] = REFUSED,
-             seconds: float = 2 * SECONDS, judge: Callable[[dict], str] | None = None) -> Case:  # fmt: skip
-    """`calmotion optimize` on what is made."""
-    words = ("optimize", "shot.usda", "-o", "out.usda", "--json", *args.split())
-    return Case(make, words, statuses, told, seconds=seconds, judge=judge)
+optimize = partial(simulate, command="optimize", seconds=2 * SECONDS)
 
 
 def state(folder: Path) -> dict[str, str]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from hostile import DONE, Case, Edit, arm, optimize, simulate
-from motions import CODES, EITHER, SWING, track
+from hostile import DONE, EITHER, REFUSED, Case, Edit, optimize, simulate
+from motions import CODES, SWING, track
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 from shot_edits import applied, attribute, both, flexible, material, number, retarget, stage_metadata, target, vector
 from small_shots import BASE, ELBOW, FORE, HAND, LENGTH, PLASTIC, SHOULDER, UPPER, make_target
@@ -121,206 +121,173 @@ SOFT = "physics:youngsModulus|soft|modulus"
 
 CASES: dict[str, Case] = {
     # stiffness
-    "a modulus of 1e3": simulate(SOFT, make=arm(modulus(1e3))),
-    "a modulus of 1e4": simulate(SOFT, make=arm(modulus(1e4))),
-    "a modulus of 1e5": simulate(SOFT, make=arm(modulus(1e5))),
-    "a modulus of 1e7": simulate(make=arm(modulus(1e7)), statuses=EITHER, seconds=SLOW),
-    "a modulus of 1e8": simulate(make=arm(modulus(1e8)), statuses=DONE, seconds=SLOW),
-    "a modulus of 1e10": simulate(make=arm(modulus(1e10)), statuses=DONE),
-    "a modulus of 1e12": simulate(make=arm(modulus(1e12)), statuses=DONE),
-    "a modulus of 1e20": simulate(make=arm(modulus(1e20)), statuses=EITHER),
-    "a modulus of the largest float": simulate(make=arm(modulus(3.4e38)), statuses=EITHER),
-    "a modulus in GPa by mistake": simulate(SOFT, make=arm(modulus(2.0))),
-    "an infinite modulus": simulate(PLASTIC, "youngsModulus", make=arm(modulus(math.inf))),
-    "a ratio of 0.4999": simulate(make=arm(material(poissonsRatio=0.4999)), statuses=EITHER),
-    "a ratio of -0.99": simulate(make=arm(material(poissonsRatio=-0.99)), statuses=EITHER),
-    "a ratio of -1": simulate(PLASTIC, "poissonsRatio", make=arm(material(poissonsRatio=-1.0))),
-    "a density of 1e-6": simulate(make=arm(material(density=1e-6)), statuses=EITHER),
-    "a density of 1e9": simulate("density is", make=arm(material(density=1e9)), statuses=DONE),
-    "a density in g/cm3 by mistake": simulate(make=arm(material(density=1.1)), statuses=DONE),
-    "an infinite density": simulate(PLASTIC, "density", make=arm(material(density=math.inf))),
-    "no damping": simulate(make=arm(damping(ratio=0.0)), statuses=DONE),
-    "damping of nearly 1": simulate(make=arm(damping(ratio=0.99)), statuses=DONE),
-    "negative damping": simulate(PLASTIC, "calm:damping:ratio", make=arm(damping(ratio=-0.1))),
-    "damping that is no number": simulate(PLASTIC, "calm:damping", make=arm(damping(rayleighMass=math.nan))),
-    "damping of 1e9 by mass": simulate(make=arm(damping(rayleighMass=1e9)), statuses=EITHER),
-    "damping of 1e9 by stiffness": simulate(make=arm(damping(rayleighStiffness=1e9)), statuses=EITHER),
-    "no modes": simulate(make=arm(flexible(attribute(FORE, "calm:flexible:modeCount", "Int", 0))), statuses=EITHER),
+    "a modulus of 1e3": simulate(REFUSED, modulus(1e3), SOFT),
+    "a modulus of 1e4": simulate(REFUSED, modulus(1e4), SOFT),
+    "a modulus of 1e5": simulate(REFUSED, modulus(1e5), SOFT),
+    "a modulus of 1e7": simulate(EITHER, modulus(1e7), seconds=SLOW),
+    "a modulus of 1e8": simulate(DONE, modulus(1e8), seconds=SLOW),
+    "a modulus of 1e10": simulate(DONE, modulus(1e10)),
+    "a modulus of 1e12": simulate(DONE, modulus(1e12)),
+    "a modulus of 1e20": simulate(EITHER, modulus(1e20)),
+    "a modulus of the largest float": simulate(EITHER, modulus(3.4e38)),
+    "a modulus in GPa by mistake": simulate(REFUSED, modulus(2.0), SOFT),
+    "an infinite modulus": simulate(REFUSED, modulus(math.inf), PLASTIC, "youngsModulus"),
+    "a ratio of 0.4999": simulate(EITHER, material(poissonsRatio=0.4999)),
+    "a ratio of -0.99": simulate(EITHER, material(poissonsRatio=-0.99)),
+    "a ratio of -1": simulate(REFUSED, material(poissonsRatio=-1.0), PLASTIC, "poissonsRatio"),
+    "a density of 1e-6": simulate(EITHER, material(density=1e-6)),
+    "a density of 1e9": simulate(DONE, material(density=1e9), "density is"),
+    "a density in g/cm3 by mistake": simulate(DONE, material(density=1.1)),
+    "an infinite density": simulate(REFUSED, material(density=math.inf), PLASTIC, "density"),
+    "no damping": simulate(DONE, damping(ratio=0.0)),
+    "damping of nearly 1": simulate(DONE, damping(ratio=0.99)),
+    "negative damping": simulate(REFUSED, damping(ratio=-0.1), PLASTIC, "calm:damping:ratio"),
+    "damping that is no number": simulate(REFUSED, damping(rayleighMass=math.nan), PLASTIC, "calm:damping"),
+    "damping of 1e9 by mass": simulate(EITHER, damping(rayleighMass=1e9)),
+    "damping of 1e9 by stiffness": simulate(EITHER, damping(rayleighStiffness=1e9)),
+    "no modes": simulate(EITHER, flexible(attribute(FORE, "calm:flexible:modeCount", "Int", 0))),
     "a million modes": simulate(
-        "modeCount",
-        make=arm(flexible(attribute(FORE, "calm:flexible:modeCount", "Int", 10**6))),
-        statuses=EITHER,
-        seconds=SLOW,
+        EITHER, flexible(attribute(FORE, "calm:flexible:modeCount", "Int", 10**6)), "modeCount", seconds=SLOW
     ),
-    "modes up to 1e-3 Hz": simulate(
-        make=arm(flexible(number(FORE, "calm:flexible:maxFrequency", 1e-3))), statuses=EITHER
-    ),
+    "modes up to 1e-3 Hz": simulate(EITHER, flexible(number(FORE, "calm:flexible:maxFrequency", 1e-3))),
     "everything is flexible": simulate(
-        make=arm(flexible(both(applied(UPPER, "CalmFlexibleBodyAPI"), applied(BASE, "CalmFlexibleBodyAPI")))),
-        statuses=EITHER,
+        EITHER, flexible(both(applied(UPPER, "CalmFlexibleBodyAPI"), applied(BASE, "CalmFlexibleBodyAPI")))
     ),
     # masses
-    "a mass of 1e-9": simulate(make=arm(mass(FORE, 1e-9)), statuses=EITHER),
-    "a mass of 1e6 on one of 1": simulate(make=arm(mass(FORE, 1e6)), statuses=DONE),
-    "a mass of 1e-6 between others": simulate(make=arm(mass(UPPER, 1e-6)), statuses=EITHER),
-    "a mass of 1e30": simulate(make=arm(mass(FORE, 1e30)), statuses=EITHER),
-    "a heavy tip on a soft link": simulate(
-        make=arm(both(chain(1), modulus(2e9), mass("/Arm/link0", 1e4))), statuses=EITHER, seconds=SLOW
-    ),
-    "an inertia of zero": simulate(make=arm(vector(FORE, "physics:diagonalInertia", 0, 0, 0)), statuses=EITHER),
+    "a mass of 1e-9": simulate(EITHER, mass(FORE, 1e-9)),
+    "a mass of 1e6 on one of 1": simulate(DONE, mass(FORE, 1e6)),
+    "a mass of 1e-6 between others": simulate(EITHER, mass(UPPER, 1e-6)),
+    "a mass of 1e30": simulate(EITHER, mass(FORE, 1e30)),
+    "a heavy tip on a soft link": simulate(EITHER, both(chain(1), modulus(2e9), mass("/Arm/link0", 1e4)), seconds=SLOW),
+    "an inertia of zero": simulate(EITHER, vector(FORE, "physics:diagonalInertia", 0, 0, 0)),
     "an inertia that breaks the triangle": simulate(
-        "diagonalInertia|inertia", make=arm(vector(FORE, "physics:diagonalInertia", 1, 1, 100)), statuses=EITHER
+        EITHER, vector(FORE, "physics:diagonalInertia", 1, 1, 100), "diagonalInertia|inertia"
     ),
-    "an inertia of one axis": simulate(make=arm(vector(FORE, "physics:diagonalInertia", 0, 1e-3, 0)), statuses=EITHER),
-    "an inertia of a planet": simulate(
-        make=arm(vector(FORE, "physics:diagonalInertia", 1e20, 1e20, 1e20)), statuses=EITHER
-    ),
-    "a centre of mass far away": simulate(make=arm(vector(FORE, "physics:centerOfMass", 1e6, 0, 0)), statuses=EITHER),
+    "an inertia of one axis": simulate(EITHER, vector(FORE, "physics:diagonalInertia", 0, 1e-3, 0)),
+    "an inertia of a planet": simulate(EITHER, vector(FORE, "physics:diagonalInertia", 1e20, 1e20, 1e20)),
+    "a centre of mass far away": simulate(EITHER, vector(FORE, "physics:centerOfMass", 1e6, 0, 0)),
     "a centre of mass that is no number": simulate(
-        FORE, "centerOfMass", make=arm(vector(FORE, "physics:centerOfMass", math.nan, 0, 0))
+        REFUSED, vector(FORE, "physics:centerOfMass", math.nan, 0, 0), FORE, "centerOfMass"
     ),
     "axes of inertia of length zero": simulate(
-        make=arm(lambda s: UsdPhysics.MassAPI(s.GetPrimAtPath(FORE)).CreatePrincipalAxesAttr(Gf.Quatf(0))),
-        statuses=EITHER,
+        EITHER, lambda s: UsdPhysics.MassAPI(s.GetPrimAtPath(FORE)).CreatePrincipalAxesAttr(Gf.Quatf(0))
     ),
     # gravity and units
-    "no gravity": simulate(make=arm(gravity(0.0)), statuses=DONE),
-    "gravity of the sun": simulate(make=arm(gravity(274.0)), statuses=DONE),
-    "gravity of a neutron star": simulate(make=arm(both(gravity(1e12), modulus(2e9))), statuses=EITHER),
-    "gravity upwards": simulate(make=arm(gravity(9.81, 0, 0, 1)), statuses=DONE),
-    "gravity in no direction": simulate(make=arm(gravity(9.81, 0, 0, 0)), statuses=EITHER),
-    "gravity in a direction that is no number": simulate("/Arm/scene", make=arm(gravity(9.81, math.nan, 0, 0))),
-    "negative gravity": simulate(make=arm(gravity(-9.81)), statuses=EITHER),
-    "an arm of kilometres": simulate(make=arm(stage_metadata("metersPerUnit", 1000.0)), statuses=EITHER),
-    "an arm of micrometres": simulate(make=arm(stage_metadata("metersPerUnit", 1e-6)), statuses=EITHER),
-    "units of 1e-30 m": simulate("metersPerUnit", make=arm(stage_metadata("metersPerUnit", 1e-30)), statuses=EITHER),
-    "an infinite unit of length": simulate("metersPerUnit", make=arm(stage_metadata("metersPerUnit", math.inf))),
-    "kilograms of 1e20": simulate(make=arm(stage_metadata("kilogramsPerUnit", 1e20)), statuses=EITHER),
-    "grams": simulate(make=arm(stage_metadata("kilogramsPerUnit", 1e-3)), statuses=DONE),
+    "no gravity": simulate(DONE, gravity(0.0)),
+    "gravity of the sun": simulate(DONE, gravity(274.0)),
+    "gravity of a neutron star": simulate(EITHER, both(gravity(1e12), modulus(2e9))),
+    "gravity upwards": simulate(DONE, gravity(9.81, 0, 0, 1)),
+    "gravity in no direction": simulate(EITHER, gravity(9.81, 0, 0, 0)),
+    "gravity in a direction that is no number": simulate(REFUSED, gravity(9.81, math.nan, 0, 0), "/Arm/scene"),
+    "negative gravity": simulate(EITHER, gravity(-9.81)),
+    "an arm of kilometres": simulate(EITHER, stage_metadata("metersPerUnit", 1000.0)),
+    "an arm of micrometres": simulate(EITHER, stage_metadata("metersPerUnit", 1e-6)),
+    "units of 1e-30 m": simulate(EITHER, stage_metadata("metersPerUnit", 1e-30), "metersPerUnit"),
+    "an infinite unit of length": simulate(REFUSED, stage_metadata("metersPerUnit", math.inf), "metersPerUnit"),
+    "kilograms of 1e20": simulate(EITHER, stage_metadata("kilogramsPerUnit", 1e20)),
+    "grams": simulate(DONE, stage_metadata("kilogramsPerUnit", 1e-3)),
     # motors
-    "a drive of no stiffness": simulate(
-        make=arm(motor(model="drive"), drive(stiffness=0.0, damping=1.0)), statuses=EITHER
-    ),
-    "a drive of no stiffness and no damping": simulate(
-        make=arm(motor(model="drive"), drive(stiffness=0.0, damping=0.0)), statuses=EITHER
-    ),
-    "a drive that is much too soft": simulate(
-        make=arm(motor(model="drive"), drive(stiffness=1e-3, damping=1e-4)), statuses=EITHER
-    ),
-    "a drive that is much too stiff": simulate(
-        make=arm(motor(model="drive"), drive(stiffness=1e12, damping=1e6)), statuses=EITHER
-    ),
+    "a drive of no stiffness": simulate(EITHER, motor(model="drive"), drive(stiffness=0.0, damping=1.0)),
+    "a drive of no stiffness and no damping": simulate(EITHER, motor(model="drive"), drive(stiffness=0.0, damping=0.0)),
+    "a drive that is much too soft": simulate(EITHER, motor(model="drive"), drive(stiffness=1e-3, damping=1e-4)),
+    "a drive that is much too stiff": simulate(EITHER, motor(model="drive"), drive(stiffness=1e12, damping=1e6)),
     "a drive with negative stiffness": simulate(
-        SHOULDER, "stiffness", make=arm(motor(model="drive"), drive(stiffness=-5.0, damping=1.0))
+        REFUSED, motor(model="drive"), drive(stiffness=-5.0, damping=1.0), SHOULDER, "stiffness"
     ),
     "a drive with negative damping": simulate(
-        SHOULDER, "damping", make=arm(motor(model="drive"), drive(stiffness=500.0, damping=-1.0))
+        REFUSED, motor(model="drive"), drive(stiffness=500.0, damping=-1.0), SHOULDER, "damping"
     ),
-    "a drive of infinite stiffness": simulate(
-        make=arm(motor(model="drive"), drive(stiffness=math.inf, damping=1.0)), statuses=EITHER
-    ),
-    "a drive without gains": simulate(SHOULDER, make=arm(motor(model="drive")), statuses=EITHER),
-    "a motor of a model that is none": simulate(SHOULDER, "calm:motor:model", make=arm(motor(model="rocket"))),
-    "a motor of a type that is none": simulate(SHOULDER, "calm:motor:type", make=arm(motor(type="XM9999"))),
-    "a servo without anything": simulate(SHOULDER, make=arm(motor(model="servo")), statuses=EITHER),
+    "a drive of infinite stiffness": simulate(EITHER, motor(model="drive"), drive(stiffness=math.inf, damping=1.0)),
+    "a drive without gains": simulate(EITHER, motor(model="drive"), SHOULDER),
+    "a motor of a model that is none": simulate(REFUSED, motor(model="rocket"), SHOULDER, "calm:motor:model"),
+    "a motor of a type that is none": simulate(REFUSED, motor(type="XM9999"), SHOULDER, "calm:motor:type"),
+    "a servo without anything": simulate(EITHER, motor(model="servo"), SHOULDER),
     "a servo that is delayed by ten seconds": simulate(
-        make=arm(motor(model="servo", positionGain=100.0, velocityGain=1.0, delay=10.0)), statuses=EITHER
+        EITHER, motor(model="servo", positionGain=100.0, velocityGain=1.0, delay=10.0)
     ),
     "a servo that is unstable": simulate(
-        make=arm(motor(model="servo", positionGain=1e4, velocityGain=0.0, delay=0.05)), statuses=EITHER, seconds=SLOW
+        EITHER, motor(model="servo", positionGain=1e4, velocityGain=0.0, delay=0.05), seconds=SLOW
     ),
     "a servo with a torque of zero": simulate(
-        SHOULDER, make=arm(motor(model="servo", positionGain=100.0, maxTorque=0.0))
+        REFUSED, motor(model="servo", positionGain=100.0, maxTorque=0.0), SHOULDER
     ),
-    "backlash of a turn": simulate(make=arm(motor(backlash=360.0)), statuses=EITHER),
-    "negative backlash": simulate(SHOULDER, "backlash", make=arm(motor(backlash=-1.0))),
+    "backlash of a turn": simulate(EITHER, motor(backlash=360.0)),
+    "negative backlash": simulate(REFUSED, motor(backlash=-1.0), SHOULDER, "backlash"),
     "negative friction": simulate(
-        SHOULDER, "friction", make=arm(motor(model="servo", positionGain=100.0, velocityGain=1.0, friction=-1.0))
+        REFUSED, motor(model="servo", positionGain=100.0, velocityGain=1.0, friction=-1.0), SHOULDER, "friction"
     ),
     "a friction that holds everything": simulate(
-        make=arm(motor(model="drive", friction=1e6), drive(stiffness=100.0, damping=1.0)), statuses=EITHER, seconds=SLOW
+        EITHER, motor(model="drive", friction=1e6), drive(stiffness=100.0, damping=1.0), seconds=SLOW
     ),
-    "a gear of no stiffness": simulate(make=arm(motor(gearStiffness=0.0)), statuses=EITHER),
-    "an armature of 1e6": simulate(
-        make=arm(motor(model="drive", armature=1e6), drive(stiffness=100.0, damping=1.0)), statuses=EITHER
-    ),
+    "a gear of no stiffness": simulate(EITHER, motor(gearStiffness=0.0)),
+    "an armature of 1e6": simulate(EITHER, motor(model="drive", armature=1e6), drive(stiffness=100.0, damping=1.0)),
     # limits
     "a limit of acceleration that nothing keeps": optimize(
-        "exceed|limit|narrow|accel", make=arm(motor(maxAcceleration=1.0)), statuses=EITHER, seconds=SLOW
+        EITHER, motor(maxAcceleration=1.0), "exceed|limit|narrow|accel", seconds=SLOW
     ),
-    "a limit of speed that nothing keeps": optimize(
-        "exceed|limit", make=arm(motor(maxVelocity=0.5)), statuses=EITHER, seconds=SLOW
-    ),
+    "a limit of speed that nothing keeps": optimize(EITHER, motor(maxVelocity=0.5), "exceed|limit", seconds=SLOW),
     "a limit of torque below the weight": optimize(
-        "exceed|maxTorque|weight", make=arm(motor(maxTorque=0.1)), statuses=EITHER, seconds=SLOW
+        EITHER, motor(maxTorque=0.1), "exceed|maxTorque|weight", seconds=SLOW
     ),
-    "a limit of speed that is no number": optimize(SHOULDER, "maxVelocity", make=arm(motor(maxVelocity=math.nan))),
-    "a negative limit of acceleration": optimize(SHOULDER, "maxAcceleration", make=arm(motor(maxAcceleration=-5.0))),
+    "a limit of speed that is no number": optimize(REFUSED, motor(maxVelocity=math.nan), SHOULDER, "maxVelocity"),
+    "a negative limit of acceleration": optimize(REFUSED, motor(maxAcceleration=-5.0), SHOULDER, "maxAcceleration"),
     "joint limits of no width": simulate(
-        "limit",
-        make=arm(both(number(SHOULDER, "physics:lowerLimit", 5.0), number(SHOULDER, "physics:upperLimit", 5.0))),
-        statuses=EITHER,
+        EITHER, both(number(SHOULDER, "physics:lowerLimit", 5.0), number(SHOULDER, "physics:upperLimit", 5.0)), "limit"
     ),
     "joint limits of no width, optimised": optimize(
-        make=arm(both(number(SHOULDER, "physics:lowerLimit", 5.0), number(SHOULDER, "physics:upperLimit", 5.0))),
-        statuses=EITHER,
+        EITHER,
+        both(number(SHOULDER, "physics:lowerLimit", 5.0), number(SHOULDER, "physics:upperLimit", 5.0)),
         seconds=SLOW,
     ),
     # structure
-    "thirty links": simulate(make=arm(chain(28)), statuses=DONE, seconds=60),
-    "a pendulum of five limp links": simulate(make=arm(chain(4, animated=False)), statuses=DONE, seconds=60),
-    "a limp elbow": simulate(make=arm(limp(ELBOW)), statuses=DONE, seconds=60),
+    "thirty links": simulate(DONE, chain(28), seconds=60),
+    "a pendulum of five limp links": simulate(DONE, chain(4, animated=False), seconds=60),
+    "a limp elbow": simulate(DONE, limp(ELBOW), seconds=60),
     "a loop that is closed twice": simulate(
-        make=arm(closing_joint(FORE, UPPER, (0, 0, 0), (LENGTH, 0, 0), UsdPhysics.SphericalJoint)), statuses=EITHER
+        EITHER, closing_joint(FORE, UPPER, (0, 0, 0), (LENGTH, 0, 0), UsdPhysics.SphericalJoint)
     ),
     "a linkage that does not close": simulate(
-        "closing", make=arm(closing_joint("", FORE, (5, 5, 5), (0, 0, 0), UsdPhysics.SphericalJoint)), statuses=EITHER
+        EITHER, closing_joint("", FORE, (5, 5, 5), (0, 0, 0), UsdPhysics.SphericalJoint), "closing"
     ),
     "a hand that is nailed to the world": simulate(
-        "closing|elbow|shoulder", make=arm(closing_joint("", FORE, (0.8, 0, 1), (0.4, 0, 0), UsdPhysics.FixedJoint))
+        REFUSED, closing_joint("", FORE, (0.8, 0, 1), (0.4, 0, 0), UsdPhysics.FixedJoint), "closing|elbow|shoulder"
     ),
     "a joint that holds a body to the world twice": simulate(
-        make=arm(closing_joint("", BASE, (0, 0, 1), (0, 0, 0), UsdPhysics.FixedJoint)), statuses=EITHER
+        EITHER, closing_joint("", BASE, (0, 0, 1), (0, 0, 0), UsdPhysics.FixedJoint)
     ),
     "a body on the joint of another robot": simulate(
-        "elbow", make=arm(lambda s: UsdPhysics.Joint(s.GetPrimAtPath(ELBOW)).GetBody1Rel().SetTargets(["/Other/body"]))
+        REFUSED, lambda s: UsdPhysics.Joint(s.GetPrimAtPath(ELBOW)).GetBody1Rel().SetTargets(["/Other/body"]), "elbow"
     ),
     # targets and tolerances
-    "no target": simulate(make=arm(target=False), statuses=EITHER),
-    "no target, optimised": optimize("CalmTargetAPI|target", make=arm(target=False), statuses=EITHER),
-    "a target that is a kilometre away": simulate(make=arm(far_target(1000.0)), statuses=DONE, seconds=60),
-    "a target at 1e12": simulate(make=arm(far_target(1e12)), statuses=EITHER),
-    "two hundred targets": simulate(make=arm(many_targets(200)), statuses=DONE),
-    "a weight of 1e30": simulate(make=arm(target(positionWeight=1e30), target=False), statuses=EITHER),
-    "an infinite weight": simulate(HAND, "positionWeight", make=arm(target(positionWeight=math.inf), target=False)),
+    "no target": simulate(EITHER, target=False),
+    "no target, optimised": optimize(EITHER, "CalmTargetAPI|target", target=False),
+    "a target that is a kilometre away": simulate(DONE, far_target(1000.0), seconds=60),
+    "a target at 1e12": simulate(EITHER, far_target(1e12)),
+    "two hundred targets": simulate(DONE, many_targets(200)),
+    "a weight of 1e30": simulate(EITHER, target(positionWeight=1e30), target=False),
+    "an infinite weight": simulate(REFUSED, target(positionWeight=math.inf), HAND, "positionWeight", target=False),
     "a tolerance of 1e-12": simulate(
-        "tolerance", make=arm(flexible(retarget("tolerance", "Float", 1e-12))), statuses=EITHER, seconds=SLOW
+        EITHER, flexible(retarget("tolerance", "Float", 1e-12)), "tolerance", seconds=SLOW
     ),
-    "a tolerance of zero": simulate("/Arm", "calm:retarget:tolerance", make=arm(retarget("tolerance", "Float", 0.0))),
-    "a tolerance of a kilometre": simulate("tolerance", make=arm(flexible(retarget("tolerance", "Float", 1000.0)))),
-    "an infinite tolerance": simulate("/Arm", "tolerance", make=arm(retarget("tolerance", "Float", math.inf))),
-    "a step of a nanosecond": simulate("timeStep", make=arm(retarget("timeStep", "Float", 1e-9))),
-    "a step longer than the shot": simulate(make=arm(retarget("timeStep", "Float", 100.0)), statuses=EITHER),
-    "knots a nanosecond apart": optimize(
-        make=arm(flexible(retarget("knotSpacing", "Float", 1e-9))), statuses=EITHER, seconds=SLOW
-    ),
-    "a smoothness of 1e30": optimize(
-        make=arm(flexible(retarget("smoothness", "Float", 1e30))), statuses=EITHER, seconds=SLOW
-    ),
+    "a tolerance of zero": simulate(REFUSED, retarget("tolerance", "Float", 0.0), "/Arm", "calm:retarget:tolerance"),
+    "a tolerance of a kilometre": simulate(REFUSED, flexible(retarget("tolerance", "Float", 1000.0)), "tolerance"),
+    "an infinite tolerance": simulate(REFUSED, retarget("tolerance", "Float", math.inf), "/Arm", "tolerance"),
+    "a step of a nanosecond": simulate(REFUSED, retarget("timeStep", "Float", 1e-9), "timeStep"),
+    "a step longer than the shot": simulate(EITHER, retarget("timeStep", "Float", 100.0)),
+    "knots a nanosecond apart": optimize(EITHER, flexible(retarget("knotSpacing", "Float", 1e-9)), seconds=SLOW),
+    "a smoothness of 1e30": optimize(EITHER, flexible(retarget("smoothness", "Float", 1e30)), seconds=SLOW),
     "a smoothness that is no number": optimize(
-        "/Arm", "smoothness", make=arm(retarget("smoothness", "Float", math.nan))
+        REFUSED, retarget("smoothness", "Float", math.nan), "/Arm", "smoothness"
     ),
-    "a soft arm that swings fast": simulate(make=arm(modulus(2e8), FAST), statuses=DONE, seconds=SLOW),
-    "a modulus of 1e6": simulate(make=arm(modulus(1e6)), statuses=EITHER, seconds=2.0 * SLOW),
-    "an uncertainty of 100": optimize(  # its softest robot, of a hundred-thousandth of the modulus, stands
-        make=arm(flexible(retarget("uncertainty:modulus", "Float", 100.0))),
-        args="--robust",
-        statuses=EITHER,
-        seconds=SLOW,
+    "a soft arm that swings fast": simulate(DONE, modulus(2e8), FAST, seconds=SLOW),
+    "a modulus of 1e6": simulate(EITHER, modulus(1e6), seconds=2.0 * SLOW),
+    "an uncertainty of 100": optimize(
+        EITHER, flexible(retarget("uncertainty:modulus", "Float", 100.0)), args="--robust", seconds=SLOW
     ),
     "an uncertainty of 10000": optimize(
+        REFUSED,
+        flexible(retarget("uncertainty:modulus", "Float", 10000.0)),
         "uncertainty",
-        make=arm(flexible(retarget("uncertainty:modulus", "Float", 10000.0))),
         args="--robust",
         seconds=SLOW,
     ),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import posed_shots
-from hostile import DONE, Case, Edit, arm, simulate
+from hostile import DONE, REFUSED, Case, Edit, arm, simulate
 from pxr import Gf, Sdf, Ts, Usd, UsdGeom, UsdPhysics, UsdSkel, Vt
 from shot_edits import applied, attribute, both, flexible, targets
 from small_shots import BASE, ELBOW, FORE, PLASTIC, SHOULDER, TARGET_POSITION, UPPER, make_flexible
@@ -135,60 +135,60 @@ BELOW = "    subLayers = [@./robot.usda@]\n"
 CASES: dict[str, Case] = {
     # composition
     "a robot in another time behind a reference": simulate(
-        make=above(REFERENCE % " (offset = 10; scale = 2)", start=10.0, end=58.0), statuses=DONE
+        DONE, make=above(REFERENCE % " (offset = 10; scale = 2)", start=10.0, end=58.0)
     ),
     "joints that are relocated": simulate(
-        make=above(REFERENCE % "", "    relocates = { </Arm/joints>: </Arm/motors> }\n"), statuses=DONE
+        DONE, make=above(REFERENCE % "", "    relocates = { </Arm/joints>: </Arm/motors> }\n")
     ),
     "a body that a reference does not reach": simulate(
-        ELBOW, "outside of what is referenced", make=above(REFERENCE % "", "", 0.0, 24.0, fore_beside, target=False)
+        REFUSED,
+        ELBOW,
+        "outside of what is referenced",
+        make=above(REFERENCE % "", "", 0.0, 24.0, fore_beside, target=False),
     ),
     "schemas that a stronger layer lists anew": simulate(
-        FORE, "no rigid body", make=above(OVER % 'apiSchemas = ["PhysicsMassAPI"]', BELOW, target=False)
+        REFUSED, FORE, "no rigid body", make=above(OVER % 'apiSchemas = ["PhysicsMassAPI"]', BELOW, target=False)
     ),
     "a body that a stronger layer takes away": simulate(
-        f"{FORE}/hand", make=above(OVER % 'delete apiSchemas = ["PhysicsRigidBodyAPI"]', BELOW)
+        REFUSED, f"{FORE}/hand", make=above(OVER % 'delete apiSchemas = ["PhysicsRigidBodyAPI"]', BELOW)
     ),
-    "a target position by a connection": simulate(ELBOW, "connection", make=arm(connected)),
+    "a target position by a connection": simulate(REFUSED, connected, ELBOW, "connection"),
     # animation
-    "a base that a spline moves": simulate("moves the root", make=arm(moved_base), statuses=DONE),
-    "a limit by a spline": simulate(
-        "it is animated", make=arm(spline(ELBOW, "physics:upperLimit", (0, 50), (24, 90))), statuses=DONE
-    ),
-    "animated bodies without an order of operations": simulate("xformOpOrder", make=arm(without_order)),
-    "a second drive that moves nothing": simulate("drive:linear", make=arm(second_drive), statuses=DONE),
+    "a base that a spline moves": simulate(DONE, moved_base, "moves the root"),
+    "a limit by a spline": simulate(DONE, spline(ELBOW, "physics:upperLimit", (0, 50), (24, 90)), "it is animated"),
+    "animated bodies without an order of operations": simulate(REFUSED, without_order, "xformOpOrder"),
+    "a second drive that moves nothing": simulate(DONE, second_drive, "drive:linear"),
     "a skeleton with too few rotations": simulate(
-        posed_shots.ANIMATION, "time code 5", make=arm(rotations(lambda own: own[:1]))
+        REFUSED, rotations(lambda own: own[:1]), posed_shots.ANIMATION, "time code 5"
     ),
-    "rotations of length two": simulate("unit length", make=arm(rotations(lambda own: [2.0 * one for one in own]))),
-    "a skeleton without its animation": simulate("has no animation", make=arm(unbound), statuses=DONE),
+    "rotations of length two": simulate(REFUSED, rotations(lambda own: [2.0 * one for one in own]), "unit length"),
+    "a skeleton without its animation": simulate(DONE, unbound, "has no animation"),
     # bodies and joints
     "all bodies kinematic and animated": simulate(
-        "physics:kinematicEnabled", make=arm(posed_shots.posed, kinematic(BASE, UPPER, FORE))
+        REFUSED, posed_shots.posed, kinematic(BASE, UPPER, FORE), "physics:kinematicEnabled"
     ),
-    "a kinematic forearm": simulate(FORE, "physics:kinematicEnabled", make=arm(kinematic(FORE))),
+    "a kinematic forearm": simulate(REFUSED, kinematic(FORE), FORE, "physics:kinematicEnabled"),
     "a joint on a material": simulate(
-        PLASTIC, "no transform", make=arm(flexible(targets(ELBOW, "physics:body1", PLASTIC)))
+        REFUSED, flexible(targets(ELBOW, "physics:body1", PLASTIC)), PLASTIC, "no transform"
     ),
-    "a joint on another joint": simulate("no transform", make=arm(targets(ELBOW, "physics:body1", SHOULDER))),
-    "bodies of a joint in the other order": simulate(make=arm(swapped), statuses=DONE),
-    "a body that is a unit cube": simulate(make=arm(flexible(unit_cube)), statuses=DONE),
+    "a joint on another joint": simulate(REFUSED, targets(ELBOW, "physics:body1", SHOULDER), "no transform"),
+    "bodies of a joint in the other order": simulate(DONE, swapped),
+    "a body that is a unit cube": simulate(DONE, flexible(unit_cube)),
     "a body that gravity does not pull": simulate(
-        "gravity acts on the body",
-        make=arm(attribute(FORE, "physxRigidBody:disableGravity", "Bool", True)),
-        statuses=DONE,
+        DONE, attribute(FORE, "physxRigidBody:disableGravity", "Bool", True), "gravity acts on the body"
     ),
     # schemas
     "the schema of flexible bodies on a mesh": simulate(
-        f"{FORE}/skin", "no effect", make=arm(schema_elsewhere(f"{FORE}/skin")), statuses=DONE
+        DONE, schema_elsewhere(f"{FORE}/skin"), f"{FORE}/skin", "no effect"
     ),
-    "the schema of flexible bodies on the robot": simulate(
-        "no effect", make=arm(schema_elsewhere("/Arm")), statuses=DONE
-    ),
+    "the schema of flexible bodies on the robot": simulate(DONE, schema_elsewhere("/Arm"), "no effect"),
     "a flexible mesh that is subdivided": simulate(
+        DONE,
+        flexible(
+            lambda stage: (
+                UsdGeom.Mesh(stage.GetPrimAtPath(f"{FORE}/skin")).GetSubdivisionSchemeAttr().Set("catmullClark")
+            )
+        ),
         "catmullClark",
-        make=arm(flexible(lambda stage: UsdGeom.Mesh(stage.GetPrimAtPath(f"{FORE}/skin"))
-                          .GetSubdivisionSchemeAttr().Set("catmullClark"))),
-        statuses=DONE,
     ),
-}  # fmt: skip
+}

@@ -17,12 +17,12 @@ from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
-from calmotion.testing import simulate_lumped
 from calmotion.tolerance.motors.motor_effects import with_gains_used
 from calmotion.usd.reading import read_shot
 from motor_runs import pitch, run
 from scipy.interpolate import CubicSpline
 
+simulate_lumped = pytest.importorskip("calmotion_plugins.benchmarks.motors.lumped_robot").simulate_lumped
 K, D, ARMATURE, LENGTH, MASS, END = 60.0, 2.0, 0.03, 0.4, 1.0, 0.8
 LINK = f'<inertial pos="{LENGTH} 0 0" mass="{MASS}" diaginertia="1e-9 1e-9 1e-9"/>'
 MODEL = f"""<mujoco>

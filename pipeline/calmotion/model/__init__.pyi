@@ -44,6 +44,7 @@ from calmotion.model.model_choice import run_settings as run_settings
 from calmotion.model.model_choice import simplified_character as simplified_character
 from calmotion.model.model_choice import with_choices as with_choices
 from calmotion.model.motor import DRIVE as DRIVE
+from calmotion.model.motor import ON_ERROR as ON_ERROR
 from calmotion.model.motor import PRESCRIBED as PRESCRIBED
 from calmotion.model.motor import SERVO as SERVO
 from calmotion.model.motor import Follows as Follows

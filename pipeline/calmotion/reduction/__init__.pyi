@@ -5,6 +5,7 @@ from calmotion.reduction.cache import recomputed as recomputed
 from calmotion.reduction.damping import modal_damping as modal_damping
 from calmotion.reduction.discretization_error import clamped_modes as clamped_modes
 from calmotion.reduction.discretization_error import frequency_errors as frequency_errors
+from calmotion.reduction.elements.assembly import FEModel as FEModel
 from calmotion.reduction.elements.assembly import assemble as assemble
 from calmotion.reduction.inertia import inertia_integrals as inertia_integrals
 from calmotion.reduction.load_envelope import LoadEnvelope as LoadEnvelope

@@ -5,14 +5,8 @@ from calmotion.testing.beam_arms import beam_mesh as beam_mesh
 from calmotion.testing.beam_arms import quintic as quintic
 from calmotion.testing.beam_arms import shot_of as shot_of
 from calmotion.testing.caches import fresh_cache as fresh_cache
-from calmotion.testing.exudyn_arm import ExudynArm as ExudynArm
 from calmotion.testing.link_trees import branched_links as branched_links
 from calmotion.testing.link_trees import link_chain as link_chain
-from calmotion.testing.mujoco_robot import MUJOCO_STEP as MUJOCO_STEP
-from calmotion.testing.mujoco_robot import PlayedMotion as PlayedMotion
-from calmotion.testing.mujoco_robot import lumped_mjcf as lumped_mjcf
-from calmotion.testing.mujoco_robot import mujoco_module as mujoco_module
-from calmotion.testing.mujoco_robot import simulate_lumped as simulate_lumped
 from calmotion.testing.plugins import check_plugin as check_plugin
 from calmotion.testing.plugins import host_with as host_with
 from calmotion.testing.plugins import run_operator as run_operator

@@ -27,10 +27,10 @@ from calmotion.errors import ShotError
 from calmotion.model import Animation, Character, Result, RunSettings, Track
 from calmotion.retargeting import optimize_shot
 from calmotion.simulation import CompiledShot, compile_shot
-from calmotion.testing import MUJOCO_STEP, simulate_lumped
 from calmotion.tolerance import with_gains_used
 
 from ..common.parsers import bench_parser, output_options
+from .lumped_robot import MUJOCO_STEP, simulate_lumped
 from .original import simulate_original
 
 ALLOWED = 0.1  # of the error of commands for ideal motors

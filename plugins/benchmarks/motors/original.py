@@ -12,8 +12,9 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Character
-from calmotion.testing import MUJOCO_STEP, PlayedMotion, mujoco_module
 from scipy.interpolate import CubicSpline
+
+from .lumped_robot import MUJOCO_STEP, PlayedMotion, mujoco_module
 
 _SETTLES = 20.0  # longest time in which the robot comes to rest at its first commands [s]
 _REST = 1e-6  # [rad/s or m/s]

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.testing import ExudynArm as Arm
 from calmotion.testing import beam_arm, quintic, shot_of
 
 from ..integrators.integrators import Scene
+from ..scenes.exudyn_arm import ExudynArm as Arm
 
 DURATION, SAMPLES = 1.0, 24
 STEPS, FINE = (240, 480, 960, 1920), 15360

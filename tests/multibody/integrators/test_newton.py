@@ -49,16 +49,6 @@ def test_what_is_not_a_number_is_not_a_state():
     assert code != newton.CONVERGED and component == 0
 
 
-def test_worst_component_is_the_first_that_is_not_a_number():
-    model = compiled(chain(3))
-    x = np.zeros((3, model.system.size))
-    x[2, 1] = 5.0
-    assert newton.worst_component(model.system, x) == 2
-    x[1, 3] = np.nan
-    assert newton.worst_component(model.system, x) == 1
-    assert np.isnan(newton.largest_entry(model.system, x))
-
-
 def valley_run(stiffness, h, steps, rate=2.0):
     """A clamped body whose second coordinate is held to the square of the first by a stiff spring, as a patch that
     turns holds its shape, swings freely: (residuals, first coordinate at the end)."""

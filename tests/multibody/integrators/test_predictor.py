@@ -1,7 +1,7 @@
 """The start of a step: Taylor's formula and what it missed."""
 
 import numpy as np
-from calmotion.multibody.integrators.predictor import JUMP, MISSED, predict, remember_missed
+from calmotion.multibody.integrators.predictor import MISSED, predict, remember_missed
 from calmotion.multibody.model.system import allocate_state
 from particles import particle_system
 
@@ -47,18 +47,3 @@ def test_a_cubic_motion_is_predicted_exactly():
     assert np.abs(memory[MISSED]).max() > 1e-8
     for one, other in ((found.c, then.c), (found.u, then.u), (found.turn, turned)):
         assert np.abs(one - other).max() < 1e-15 * max(1.0, np.abs(other).max()) * 4
-
-
-def test_what_a_jump_misses_is_not_expected_again():
-    """One component that turns far in a step: the others jump with it."""
-    rng = np.random.default_rng(1)
-    system, _ = particle_system(rng, [-1, 0], [1, 2])
-    at = cubic(system, rng)
-    before, now = at(-H)[0], at(0.0)[0]
-    now.turn[1, 2] = before.V[1, 5] * H + 1.01 * JUMP
-    memory = np.zeros((4, len(system.parent), system.size))
-    remember_missed(system, H, before, now, memory)
-    assert not memory[MISSED].any()
-    now.turn[1, 2] = before.V[1, 5] * H + 0.99 * JUMP
-    remember_missed(system, H, before, now, memory)
-    assert memory[MISSED, 1, 5] > 0.98 * JUMP

@@ -102,7 +102,7 @@ def test_the_cycle_closes_and_is_the_limit_of_a_long_simulation(looping):
     assert np.abs(case.warmed(2)[1].c - here.c[1]).max() > 1e-5, "two loops are not enough"
 
 
-def sweep_cases_from_a_memory_are_transposes(looping):
+def test_sweeps_from_a_memory_are_transposes(looping):
     case, found, lin, _ = looping
     rng = np.random.default_rng(1)
     system, total = case.system, len(TIMES)

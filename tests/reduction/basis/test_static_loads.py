@@ -48,11 +48,6 @@ def test_wrenches_of_a_patch_bound_those_of_its_interfaces_together():
     assert np.allclose(np.concatenate([patches.force[0], patches.moment[0]]), largest)
 
 
-def test_the_lever_arm_is_zero_unless_it_is_given():
-    item = LoadEnvelope(*np.ones((3, 3)), np.ones((2, 3)), np.ones((2, 3)))
-    assert np.array_equal(item.lever_arm, np.zeros(2))
-
-
 def test_a_rotated_body_gets_components_of_every_load_in_all_directions():
     force, moment = np.array([[3.0, 4.0, 0.0]]), np.array([[0.0, 0.0, 2.0]])
     item = LoadEnvelope(np.array([0.0, 9.81, 0.0]), np.zeros(3), np.array([0.0, 5.0, 0.0]), force, moment)

@@ -9,7 +9,6 @@ from calmotion.reduction.elements.elastic_forms import (
     GradientRule,
     lame_constants,
     linear_stress,
-    pair_index,
     second_order_force,
     strain_gram,
 )
@@ -87,8 +86,3 @@ def test_the_linear_stress_is_hookes():
     stress = linear_stress(G, LAME, MU)
     assert stress[0, 0] == pytest.approx((LAME + 2 * MU) * 1e-3)
     assert stress[1, 1] == stress[2, 2] == pytest.approx(LAME * 1e-3)
-
-
-def test_pairs_are_numbered_row_by_row():
-    index = pair_index(3)
-    assert index[0].tolist() == [3, 4, 5] and index[1, 2] == index[2, 1] == 7 and index[2, 2] == 8

@@ -23,15 +23,6 @@ def test_squares_are_the_second_order_of_a_rotation():
     assert np.allclose(second, expected, rtol=0, atol=2e-3 * np.abs(second).max())
 
 
-def test_squares_of_pairs_are_symmetric_products():
-    rng = np.random.default_rng(1)
-    rotation = rng.normal(size=(2, 3, 3))
-    pairs = squares(rotation)
-    assert pairs.shape == (2, 6, 6)
-    product = 0.5 * (np.outer(rotation[1, :, 0], rotation[1, :, 2]) + np.outer(rotation[1, :, 2], rotation[1, :, 0]))
-    assert np.allclose(pairs[1, :, 2], product[ENTRIES])
-
-
 def test_springs_of_a_plane_patch_resist_what_the_nodes_move():
     rng = np.random.default_rng(2)
     nodes = 0.01 * rng.normal(size=(12, 3))
@@ -45,36 +36,6 @@ def test_springs_of_a_plane_patch_resist_what_the_nodes_move():
     products = np.einsum("ai,ij,bj->ab", arms, strain, arms)  # X^T E Y of all pairs of points
     expected = patch_rotation.STIFF * 2e9 * squared.max() ** 1.5 * np.sum(products**2) / squared.sum() ** 2
     assert np.sum((root @ strain[ENTRIES]) ** 2) == pytest.approx(expected, rel=1e-10)
-
-
-def test_springs_of_other_patches_are_equally_stiff_for_all_changes_of_shape():
-    nodes = np.random.default_rng(3).normal(size=(40, 3)) * [0.01, 0.01, 0.009]
-    root, S = springs(nodes, [np.arange(40)], 2e9)[0], shape_changes(nodes - nodes.mean(axis=0))
-    matrices = np.zeros((S.shape[1], 3, 3))
-    matrices[:, ENTRIES[0], ENTRIES[1]] = matrices[:, ENTRIES[1], ENTRIES[0]] = S.T
-    strains = matrices - np.trace(matrices, axis1=1, axis2=2)[:, None, None] * np.eye(3)
-    stretched = root @ strains[:, ENTRIES[0], ENTRIES[1]].T
-    farthest = np.linalg.norm(nodes - nodes.mean(axis=0), axis=1).max()
-    stiffness = 0.25 * patch_rotation.STIFF_DEEP * 2e9 * farthest**3
-    assert S.shape[1] == 6 and np.allclose(stretched.T @ stretched, stiffness * np.eye(6), atol=1e-9 * stiffness)
-
-
-def test_all_six_entries_change_the_shape_of_a_body_and_three_that_of_a_plane():
-    arms = np.random.default_rng(4).normal(size=(90, 3))
-    assert shape_changes(arms).shape == (6, 6)
-    arms[:, 0] = 0.0
-    found = shape_changes(arms)
-    assert found.shape == (6, 3)
-    # the entries 02 and 01 turn a plane across the first axis as a whole, and 00 does what 11 and 22 do
-    assert np.allclose(found[4:], 0.0, atol=1e-12)
-    assert shape_changes(np.zeros((1, 3))).shape == (6, 0)
-
-
-@pytest.mark.parametrize(("depth", "count"), [(0.002, 3), (0.2, 6)])
-def test_three_entries_change_the_shape_of_a_slightly_curved_patch_and_six_that_of_a_curved_one(depth, count):
-    arms = np.random.default_rng(5).normal(size=(40, 3))
-    arms[:, 0] = depth * (arms[:, 1] ** 2 - arms[:, 2])
-    assert shape_changes(arms).shape[1] == count
 
 
 def test_where_the_center_of_a_patch_is_does_not_change_its_shape():
@@ -123,19 +84,13 @@ def excess_of(model, support, plastic):
     return np.linalg.eigvalsh((response - exact) / np.outer(scale, scale)).max()
 
 
-@pytest.mark.parametrize(("stiff", "softer"), [(patch_rotation.STIFF, 0.0), (0.1, 1e-2)])
-def test_a_link_is_not_softer_for_the_derivatives_of_its_modes(plastic, monkeypatch, stiff, softer):
-    """A reduction is never softer than the mesh with rigid patches, unless its springs are soft."""
-    monkeypatch.setattr(patch_rotation, "STIFF", stiff)
+def test_a_link_is_not_softer_for_the_derivatives_of_its_modes(plastic):
+    """A reduction is never softer than the mesh with rigid patches."""
     points, tets = box_tets((6, 3, 3), (0.12, 0.04, 0.04), (0.0, -0.02, -0.02))
     model = assemble(points, tets, plastic)
     x, tip = model.mesh.nodes[:, 0], np.array([0.12, 0.0, 0.0])
     support = Support(np.flatnonzero(x < 1e-9), [np.flatnonzero(x > 0.12 - 1e-9)], [tip])
-    excess = excess_of(model, support, plastic)
-    if softer:
-        assert excess > softer
-    else:
-        assert excess < 2e-3
+    assert excess_of(model, support, plastic) < 2e-3
 
 
 def on_faces(mesh, held):

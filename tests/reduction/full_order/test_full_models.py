@@ -10,7 +10,6 @@ import pytest
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.tetrahedra import measure_quality
 from calmotion.model import Body, FEMesh, FlexibleSettings, MassProperties
-from calmotion.reduction.full_order import full_models as module
 from calmotion.reduction.full_order.full_models import FullModels, Member
 
 
@@ -67,13 +66,6 @@ def test_a_model_is_kept_until_the_last_link_has_it(member):
     assert models.of(alike(member)) is first and models.known(member) is None
     models.of(other)
     assert models.known(other) is None, "it has no other link"
-
-
-def test_no_more_are_kept_than_fit(member, monkeypatch):
-    models, other = FullModels(keeps=True), with_flexible(member, interface_radius=0.01)
-    monkeypatch.setattr(module, "_KEPT", models.of(member).entries)
-    models.of(other)
-    assert models.known(member) is not None and models.known(other) is None
 
 
 def test_threads_that_need_one_model_make_it_once(member, monkeypatch):

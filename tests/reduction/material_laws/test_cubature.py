@@ -13,7 +13,6 @@ from calmotion.reduction.elements.elastic_forms import GradientRule, lame_consta
 from calmotion.reduction.material_laws import cubature
 from calmotion.reduction.material_laws.cubature import (
     LEAST_VOLUME,
-    greedy_cubature,
     linear_tangent,
     neohookean_cubature,
     neohookean_stress,
@@ -65,14 +64,6 @@ def test_few_cubature_points_deflect_the_arm_as_all_do(arm):
     assert np.linalg.norm(tips[0] - tips[1]) < 0.01 * np.linalg.norm(tips[1])
 
 
-def test_large_meshes_are_sampled(arm, monkeypatch):
-    model, basis, material = arm
-    monkeypatch.setattr(cubature, "_CANDIDATES", 200)
-    monkeypatch.setattr(cubature, "ERROR", 1e-3)
-    _, points = neohookean_cubature(model, basis, material)
-    assert 0 < points <= 200
-
-
 def test_a_body_that_no_points_fit_is_refused(arm, monkeypatch):
     model, basis, material = arm
     monkeypatch.setattr(cubature, "_MOST", 5)
@@ -98,14 +89,3 @@ def test_the_stress_is_that_of_the_compiled_law_also_where_an_element_is_inside_
         F = np.eye(3) + (G @ u).reshape(3, 3)
         force, _ = reduced(9, data, 1, 2.0, 0.7, u)
         assert np.allclose(force, G.T @ neohookean_stress(F, 2.0, 0.7).ravel(), rtol=1e-10)
-
-
-def test_greedy_weights_are_non_negative_and_meet_the_target():
-    rng = np.random.default_rng(4)
-    columns = rng.normal(size=(20, 200))
-    target = columns[:, :50] @ rng.uniform(size=50)
-    chosen, weights, error = greedy_cubature(columns, target, 1e-6, 100)
-    assert (weights > 0.0).all() and len(set(chosen.tolist())) == len(chosen)
-    assert error == pytest.approx(np.linalg.norm(columns[:, chosen] @ weights - target) / np.linalg.norm(target))
-    assert error <= 1e-6
-    assert greedy_cubature(columns, np.zeros(20), 1e-6, 100)[2] == 0.0

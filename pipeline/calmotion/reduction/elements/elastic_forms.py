@@ -6,8 +6,6 @@ the undeformed state as P = C:sym(G) + P''[G, G]/2 + ..., where P''[A, B] is sym
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from calmotion.arrays import Array
@@ -164,11 +162,3 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
         green_fields(G, H, np.sqrt(rule.weights[elements].ravel()), shear, bulk, fields)
         dsyrk(1.0, fields.reshape(size, -1).T, beta=1.0, c=A, trans=1, overwrite_c=1)
     return np.ascontiguousarray(A + np.triu(A, 1).T)
-
-
-def pair_index(r: int) -> Any:
-    """Position of each pair of modes in z(u), shape [r, r], symmetric."""
-    first, second = np.triu_indices(r)
-    index = np.zeros((r, r), dtype=np.int64)
-    index[first, second] = index[second, first] = r + np.arange(len(first))
-    return index

@@ -12,7 +12,6 @@ from calmotion.recordings import ACCELEROMETER, MARKER, Channel, SensorRecording
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
-from calmotion.testing import ExudynArm as Arm
 from calmotion.testing import beam_arm
 from calmotion.testing.beam_arms import IDENTITY
 from calmotion_plugins.calibration.identification.calibrate import CalibrationSettings, calibrate_shot
@@ -21,6 +20,7 @@ from calmotion_plugins.calibration.identification.signals import signals_of
 from calmotion_plugins.calibration.model.estimates import HIGHER_MODES
 from scipy.interpolate import make_interp_spline
 
+Arm = pytest.importorskip("calmotion_plugins.benchmarks.scenes.exudyn_arm").ExudynArm
 MESH = (24, 4, (2.0, 1.5))  # of the model: elements of the arm along and across, and their grading
 OTHER_MESH = (20, 3, (2.0, 1.5))  # of the arm in Exudyn
 SECONDS, AFTER, RATE = 1.5, 0.8, 1920

@@ -12,11 +12,11 @@ from calmotion.model.run import RunSettings
 from calmotion.recordings import ANGLE, MARKER, Channel, SensorRecording
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
-from calmotion.testing import simulate_lumped
 from calmotion_plugins.calibration.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion_plugins.calibration.identification.robots import robot_with
 from calmotion_plugins.calibration.identification.signals import signals_of
 
+simulate_lumped = pytest.importorskip("calmotion_plugins.benchmarks.motors.lumped_robot").simulate_lumped
 SECONDS, AFTER, LENGTH = 1.5, 0.8, 0.3
 NOISE = {ANGLE: 3e-4, MARKER: 3e-4}  # [rad], [m]
 GAINS, DAMPING, LOAD = (1.3, 0.75, 1.2), (0.6, 1.5, 1.3), 1.15  # of the real robot over those of the shot

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
 from calmotion.arrays import Array
 from calmotion.model import ElasticMaterial
-from calmotion.reduction.elements.assembly import FEModel, assemble
-from calmotion.testing.beam_arms import beam_mesh
+from calmotion.reduction import FEModel, assemble
+from calmotion.testing import beam_mesh
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from calmotion.model.motor import Follows, Rotor
 from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
-from calmotion.testing import lumped_mjcf, simulate_lumped
+from calmotion_plugins.benchmarks.motors.lumped_robot import lumped_mjcf, simulate_lumped
 
 FRAMES = np.arange(25) / 24.0
 ROTOR = Rotor(0.05, np.inf, 0.0, 0.4, 0.3, 0.5)

@@ -14,13 +14,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
-
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model.character import WORLD, Character, Frame, Joint
-from calmotion.model.motor import ON_ERROR, PRESCRIBED, Motor
+from calmotion.model import ON_ERROR, PRESCRIBED, WORLD, Character, Frame, Joint, Motor
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
 MUJOCO_STEP = 1e-4  # of its implicit integrator [s]
 _KINDS = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}
