@@ -257,3 +257,15 @@ def plugin_commands(environment: Mapping[str, str] | None = None) -> dict[str, P
             elif not command.disabled:
                 found[entry.name] = replace(other, rival=command)
     return found
+
+
+def plugin_function(name: str) -> object | None:
+    """What a plugin that brings a command of this name offers in Python under it; None where there is no such thing.
+
+    Raises:
+        PluginError: The plugin cannot be imported.
+    """
+    command = plugin_commands().get(name.replace("_", "-"))
+    if command is None or command.disabled:
+        return None
+    return getattr(import_plugin(command.manifest.id, command.location), name, None)

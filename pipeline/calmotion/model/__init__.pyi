@@ -20,6 +20,7 @@ from calmotion.model.character import RetargetSettings as RetargetSettings
 from calmotion.model.character import SurfaceMesh as SurfaceMesh
 from calmotion.model.character import Target as Target
 from calmotion.model.character import TetGeometry as TetGeometry
+from calmotion.model.character import contact_joints as contact_joints
 from calmotion.model.character import motors_give as motors_give
 from calmotion.model.character import with_ideal_motors as with_ideal_motors
 from calmotion.model.character import with_settings as with_settings
@@ -49,6 +50,7 @@ from calmotion.model.motor import PRESCRIBED as PRESCRIBED
 from calmotion.model.motor import SERVO as SERVO
 from calmotion.model.motor import Follows as Follows
 from calmotion.model.motor import Motor as Motor
+from calmotion.model.motor import Rotor as Rotor
 from calmotion.model.motor import measure_of as measure_of
 from calmotion.model.outputs import CsvFile as CsvFile
 from calmotion.model.outputs import Figures as Figures

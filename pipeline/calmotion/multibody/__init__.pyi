@@ -3,7 +3,10 @@
 from calmotion.model.character import WORLD as WORLD
 from calmotion.multibody.analysis.kinematics import rigid_poses as rigid_poses
 from calmotion.multibody.analysis.kinematics import rigid_state as rigid_state
+from calmotion.multibody.analysis.pose_model import PoseModel as PoseModel
+from calmotion.multibody.analysis.pose_model import pose_model as pose_model
 from calmotion.multibody.analysis.reactions import reactions as reactions
+from calmotion.multibody.analysis.velocity_forces import VelocityForces as VelocityForces
 from calmotion.multibody.failure import NOWHERE as NOWHERE
 from calmotion.multibody.failure import Reason as Reason
 from calmotion.multibody.failure import SimulationFailure as SimulationFailure

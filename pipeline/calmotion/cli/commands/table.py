@@ -57,6 +57,7 @@ BROUGHT_BY: dict[str, str] = {
     "bench": "benchmarks",
     "import": "robot_import",
     "calibrate": "calibration",
+    "live": "live",
     "excite": "calibration",
     "refine": "calibration",
 }

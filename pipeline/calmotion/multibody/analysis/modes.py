@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.linalg import cholesky, eigh, null_space, solve_triangular, svd
 
@@ -11,7 +13,7 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.sliders import LENGTH, slides_freely
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.model.phases import system_held
-from calmotion.multibody.model.system import State, System
+from calmotion.multibody.model.system import VELOCITY_GAIN, State, System
 from calmotion.multibody.statics.equilibrium import equilibrium, linearize
 
 _SINGULAR = 1e8  # condition of the rows of a joint for its child, beyond which they do not tell all six coordinates
@@ -64,7 +66,8 @@ def elastic_modes(model: Model) -> tuple[Array, list[Array]]:
     """
     system = model.system._replace(gravity=np.zeros(3))
     angles = model.rest_angles
-    K, M, _, allowed = _matrices(system, rigid_state(model, angles), angles, Workspace.for_system(system))
+    found = matrices_at(system, rigid_state(model, angles), angles, Workspace.for_system(system))
+    K, M, allowed = found.stiffness, found.mass, found.allowed
     ends = np.cumsum(6 + system.elastic)
     parts = [slice(end - r, end) for end, r in zip(ends, system.elastic, strict=True)]
     size = allowed.shape[1]
@@ -94,19 +97,38 @@ def _natural_modes(
 
 def _squares(system: System, state: State, joint_angles: Array, workspace: Workspace) -> tuple[Array, Array, Array]:
     """Squares of the angular frequencies [1/s^2], negative where the pose is unstable, and the rest of the same."""
-    K, M, C, allowed = _matrices(system, state, joint_angles, workspace)
-    if not allowed.shape[1]:
-        return np.zeros(0), allowed, C
-    stiffness = allowed.T @ K @ allowed
-    # symmetric but for a part from the axes of the moments, which vanishes on allowed motions
-    values, shapes = eigh(0.5 * (stiffness + stiffness.T), allowed.T @ M @ allowed)
-    return values, allowed @ shapes, C
+    found = matrices_at(system, state, joint_angles, workspace)
+    return *found.modes(), found.damping
 
 
-def _matrices(
-    system: System, state: State, joint_angles: Array, workspace: Workspace
-) -> tuple[Array, Array, Array, Array]:
-    """Stiffness, mass and damping in all coordinates, shape [N, N], and the motions that joints allow, [N, n]."""
+class Matrices(NamedTuple):
+    """The equations of small motions about an equilibrium, in all N coordinates of the components.
+
+    Attributes:
+        stiffness, mass, damping: Shape [N, N].
+        allowed: A basis of the motions that joints allow while their motors hold, shape [N, n].
+        rows: Rows of all joints, by which those motions are zero, shape [6 J, N].
+    """
+
+    stiffness: Array
+    mass: Array
+    damping: Array
+    allowed: Array
+    rows: Array
+
+    def modes(self) -> tuple[Array, Array]:
+        """Squares of the angular frequencies [1/s^2], ascending, and modes of mass one, shape [N, n]."""
+        allowed = self.allowed
+        if not allowed.shape[1]:
+            return np.zeros(0), allowed
+        stiffness = allowed.T @ self.stiffness @ allowed
+        # symmetric but for a part from the axes of the moments, which vanishes on allowed motions
+        values, shapes = eigh(0.5 * (stiffness + stiffness.T), allowed.T @ self.mass @ allowed)
+        return values, allowed @ shapes
+
+
+def matrices_at(system: System, state: State, joint_angles: Array, workspace: Workspace) -> Matrices:
+    """The equations of small motions about a state; what the motors do is left in the blocks of the workspace."""
     linearize(system, state, joint_angles, workspace)
     blocks = workspace.blocks
     offset = np.concatenate([[0], np.cumsum(6 + system.elastic)])
@@ -132,8 +154,12 @@ def _matrices(
                 K[parent] -= np.outer(blocks.Lp[joint, :m, LENGTH], H[6 * joint + LENGTH])
         if free:
             H[6 * joint + LENGTH] = 0.0
+    for joint in system.servos:
+        # statics know no rates: the gain on the rotor's speed
+        rotor = offset[system.side[joint, 1]] + 6 + system.rotor[joint]
+        C[rotor, rotor] += system.servo[joint, VELOCITY_GAIN]
     allowed = _tree_motions(system, H, offset)
-    return K, M, C, null_space(H) if allowed is None else allowed
+    return Matrices(K, M, C, null_space(H) if allowed is None else allowed, H)
 
 
 def _tree_motions(system: System, H: Array, offset: IntArray) -> Array | None:

@@ -1,0 +1,86 @@
+"""Centrifugal and Coriolis forces, and Coulomb friction, of a robot that follows its inputs without vibration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.arrays import Array
+from calmotion.multibody.analysis.kinematics import rigid_poses, set_rotors
+from calmotion.multibody.integrators.coefficients import IMPLICIT
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.kernels.assembly import assemble
+from calmotion.multibody.kernels.so3 import logarithm, matrix_of
+from calmotion.multibody.model.model import Model, moves_freely
+from calmotion.multibody.model.system import VELOCITY_GAIN, State, allocate_state
+from calmotion.support.compilation import allocating_kernel
+
+
+@allocating_kernel
+def _turns(before: Array, now: Array, out: Array) -> None:
+    """Rotation vectors from one set of quaternions to another, in the axes of the first, shape [B, 3]."""
+    A, B, E = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    for b in range(len(before)):
+        matrix_of(before[b], A)
+        matrix_of(now[b], B)
+        for i in range(3):
+            for j in range(3):
+                E[i, j] = A[0, i] * B[0, j] + A[1, i] * B[1, j] + A[2, i] * B[2, j]
+        logarithm(E, out[b])
+
+
+class VelocityForces:
+    """What a robot needs besides the terms that are linear in its inputs' rates and accelerations (`PoseModel`).
+
+    Bodies move rigidly, as a tree whose joints are all driven; with free joints or closed chains the forces are
+    taken as zero, and `known` is False.
+
+    Args:
+        world: Moving roots where they stand, shape [W, 18].
+    """
+
+    DISTANCE_S = 1e-3  # of the poses from whose differences velocities follow
+
+    def __init__(self, model: Model, world: Array | None = None):
+        system, self._model = model.system, model
+        self.known = len(system.rows) == len(system.parent) and not np.any(moves_freely(model))
+        undamped = np.where(np.arange(system.servo.shape[1]) == VELOCITY_GAIN, 0.0, system.servo)
+        self._system = system._replace(damping=np.zeros_like(system.damping), servo=undamped)
+        self._workspace, self._world = Workspace.for_system(system), world
+        if world is not None:
+            self._workspace.work.world[:] = world
+        self._sizes = 6 + system.elastic
+
+    def at(self, values: Array, rates: Array) -> Array:
+        """The forces, shape [N], in the coordinates of `PoseModel`.
+
+        Args:
+            values, rates: Of the motors' inputs [rad or m], shape [M] each.
+        """
+        if not self.known:
+            return np.zeros(int(self._sizes.sum()))
+        model, h = self._model, self.DISTANCE_S
+        joints = model.joint_angles(values + h * np.array([-1.0, 0.0, 1.0])[:, None] * rates)
+        world = None if self._world is None else np.repeat(self._world[None], 3, axis=0)
+        c, q = rigid_poses(model, joints, world)
+        state, speeds = allocate_state(model.system), model.joint_angles(rates)
+        state.c[:], state.q[:] = c[1], q[1]
+        set_rotors(model.system, state, joints[1])
+        rest = self._residual(state, np.zeros_like(state.V), joints[1], np.zeros_like(speeds))
+        back, ahead = np.zeros((2, len(c[1]), 3))
+        _turns(q[1], q[0], back)
+        _turns(q[1], q[2], ahead)
+        accelerations = np.zeros_like(state.V)
+        state.V[:, :3], state.V[:, 3:6] = (c[2] - c[0]) / (2.0 * h), (ahead - back) / (2.0 * h)
+        accelerations[:, :3], accelerations[:, 3:6] = (c[2] - 2.0 * c[1] + c[0]) / h**2, (ahead + back) / h**2
+        for joint in model.system.servos:
+            state.V[model.system.side[joint, 1], 6 + model.system.rotor[joint]] = speeds[joint]
+        moving = self._residual(state, accelerations, joints[1], speeds) - rest
+        return np.concatenate([part[:size] for part, size in zip(moving, self._sizes, strict=True)])
+
+    def _residual(self, state: State, accelerations: Array, angles: Array, rates: Array) -> Array:
+        ws, moving = self._workspace, IMPLICIT["bdf2"](1.0)
+        ws.scratch.Hv[:] = 0.0
+        assemble(
+            self._system, moving, state, accelerations, angles, rates, ws.scratch.Hv, False, ws.work, ws.blocks
+        )  # fmt: skip
+        return np.array(ws.blocks.res)

@@ -1,0 +1,8 @@
+"""Calm commands from a stream of joint angles: the command `live`, and the same in Python."""
+
+from calmotion.host import registration
+from calmotion.public_names import public_names
+
+register, unregister = registration()
+
+__getattr__, __dir__ = public_names(__name__)

@@ -1,0 +1,16 @@
+"""Public names of `calmotion_plugins.live`: each is imported when it is first used."""
+
+from collections.abc import Callable
+
+from calmotion.host import Host
+
+from .gains import Gains as Gains
+from .gains import Weighting as Weighting
+from .gains import gains_at as gains_at
+from .opening import live as live
+from .session import Live as Live
+from .session import LiveSettings as LiveSettings
+from .stream import Stream as Stream
+
+register: Callable[[Host], None]
+unregister: Callable[[Host], None]

@@ -1,0 +1,150 @@
+"""`calmotion live`: calm a stream of joint angles while it is played."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import stat
+import sys
+from typing import TYPE_CHECKING
+
+from calmotion.cli import Output, assignments, notice, opened_shot, progress_display, quantity, shot_arguments
+
+if TYPE_CHECKING:
+    from ..lines import Sink, Source
+    from ..session import Live
+
+EXAMPLES = (
+    ("calmotion live robot.usda --rate 250 --lookahead 120 < samples.jsonl > commands.jsonl", "JSON lines"),
+    ("calmotion live robot.usda --in osc://127.0.0.1:9000 --out osc://127.0.0.1:9001", "faders over OSC"),
+    ("calmotion live robot.usda --replay calm.usda > commands.jsonl", "play the motion of a shot as a stream"),
+)
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    shot_arguments(command)
+    command.add_argument(
+        "--rate", metavar="HZ", type=quantity("Hz"), default=250.0, help="commands a second (default: 250)"
+    )
+    command.add_argument(
+        "--lookahead", metavar="MS", type=_milliseconds, default=0.12,
+        help="how late the robot may answer, in ms or with a unit (default: 120)",
+    )  # fmt: skip
+    command.add_argument(
+        "--sender-rate", metavar="HZ", type=quantity("Hz"),
+        help="samples a second of a sender that is slower than --rate; its motion is played two samples later",
+    )  # fmt: skip
+    command.add_argument(
+        "--uncertainty", metavar="SHARE", type=_share, default=0.0,
+        help="share by which the robot's frequencies are not known, such as 0.1: calm for slower and faster ones too",
+    )  # fmt: skip
+    command.add_argument(
+        "--in", dest="source", metavar="PLACE", default="-",
+        help="where samples come from: - (JSON lines on standard input, default) or osc://HOST:PORT",
+    )  # fmt: skip
+    command.add_argument(
+        "--out", dest="sink", metavar="PLACE", default="-",
+        help="where commands go: - (JSON lines on standard output, default) or osc://HOST:PORT",
+    )  # fmt: skip
+    command.add_argument("--replay", metavar="LAYER", help="play the animation of a shot or a layer as the stream")
+    command.add_argument(
+        "--clock", choices=("wall", "stamps"),
+        help="what ticks follow: the wall's clock (default of a pipe and of OSC), or the time stamps of the samples, "
+        "as fast as they can be read (default of a file and of --replay)",
+    )  # fmt: skip
+    command.add_argument("--seconds", metavar="S", type=quantity("s", positive=True), help="stop after this time")
+
+
+def _milliseconds(text: str) -> float:
+    """A time without a unit is in milliseconds."""
+    try:
+        return float(text) * 1e-3
+    except ValueError:
+        return quantity("s")(text)
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value <= 0.5:
+        raise argparse.ArgumentTypeError(f"{text} is not a share from 0 to 0.5")
+    return value
+
+
+def run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.host import SettingError
+    from calmotion.workflow import Hooks
+
+    from ..lines import LineSink, OscSink, osc_place
+    from ..opening import live
+    from ..session import LiveSettings
+
+    listens, sends = osc_place(args.source, "--in"), osc_place(args.sink, "--out")
+    if args.json and not sends:
+        raise SettingError(
+            "standard output holds the commands", path="--json", remedy="Send them elsewhere: --out osc://HOST:PORT."
+        )
+    stamps = args.clock == "stamps" or (args.clock is None and listens is None and (args.replay or _is_file()))
+    shot = opened_shot(args)
+    settings = LiveSettings(sender_rate=args.sender_rate, uncertainty=args.uncertainty, background=not stamps)
+    with progress_display(args) as display:
+        robot = live(
+            shot, lookahead=args.lookahead, rate=args.rate, settings=settings, operators=assignments(args),
+            hooks=Hooks(progress=display, on_operator=display.done),
+        )  # fmt: skip
+    sink: Sink = OscSink(*sends) if sends else LineSink(sys.stdout)
+    with robot:
+        for note in robot.notes:
+            notice(note)
+        notice(f"commands are {1e3 * robot.latency_s:.0f} ms behind the samples")
+        source = _play(robot, args, stamps, listens, sink)
+        _tell(robot, source)
+        if args.json:
+            print(json.dumps(robot.report()))
+    return 0
+
+
+def _play(
+    robot: Live, args: argparse.Namespace, stamps: bool, listens: tuple[str, int] | None, sink: Sink
+) -> Source:  # fmt: skip
+    from ..lines import Lines, OscSource, Samples
+    from ..playing import play_clock, play_stamps, samples_of_animation
+
+    source: Source
+    if args.replay:
+        from calmotion.workflow import Shot, with_shot
+
+        source = Samples(samples_of_animation(robot, Shot(with_shot(args.replay)).animation))
+    elif listens:
+        source = OscSource(*listens)
+    else:
+        source = Lines(sys.stdin, waits=not stamps)
+    if stamps:
+        play_stamps(robot, source.samples(), sink)
+    else:
+        play_clock(robot, source, sink, args.seconds)
+    return source
+
+
+def _is_file() -> bool:
+    """Whether standard input is a file, whose samples are all there."""
+    try:
+        return stat.S_ISREG(os.fstat(sys.stdin.fileno()).st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+def _tell(robot: Live, source: Source) -> None:
+    """What happened, in a few words on standard error."""
+    report = robot.report()
+    events = ", ".join(f"{count} {name}" for name, count in sorted(report["events"].items()))
+    notice(f"{report['ticks']} ticks; samples: {events or 'all in time'}")
+    if source.fault:
+        notice(f"{source.faults} messages were left out; the first: {source.fault}")
+    for path, count in report["unknown_joints"].items():
+        notice(f"{path} came {count} times, and the robot has no such motor")
+    for path, count in report["limited"].items():
+        notice(f"{path} was at a limit for {count} ticks")
+    spent = report["tick_s"]
+    notice(f"a tick took {1e3 * spent['median']:.2f} ms, 99% of them less than {1e3 * spent['p99']:.2f} ms")

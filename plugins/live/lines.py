@@ -1,0 +1,219 @@
+"""Samples and commands as JSON lines, and as messages of OSC."""
+
+from __future__ import annotations
+
+import json
+import queue
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Mapping
+from typing import IO, Any
+from urllib.parse import urlsplit
+
+from calmotion.host import SettingError
+
+from .session import Live
+
+IN, OUT = "/calm/in", "/calm/out"
+Sample = tuple[float, dict[str, float]]
+
+
+class Source(ABC):
+    """Where samples come from.
+
+    Attributes:
+        fault: What was wrong with the first message that was no sample, or None.
+        faults: How many were none.
+    """
+
+    fault: str | None = None
+    faults: int = 0
+
+    def _refuse(self, error: SettingError) -> None:
+        self.fault, self.faults = self.fault or str(error), self.faults + 1
+
+    @abstractmethod
+    def arrived(self) -> list[Sample] | None:
+        """Those that arrived since the last call; None once there will be no more."""
+
+    def samples(self) -> Iterator[Sample]:
+        """All of them, of a source in which they are there already."""
+        raise NotImplementedError
+
+    def close(self) -> None:  # noqa: B027
+        """Stop listening; most have nothing to close."""
+
+
+class Sink(ABC):
+    """Where commands go."""
+
+    @abstractmethod
+    def send(self, time_s: float, commands: Mapping[str, float], live: Live) -> None:
+        """One tick's commands [rad or m], by the paths of the joints."""
+
+
+def sample_of(line: str) -> Sample:
+    """A sample from a line such as `{"t": 0.1, "joints": {"/Arm/Elbow": 0.3}}`.
+
+    Raises:
+        SettingError: It is no such line.
+    """
+    try:
+        found = json.loads(line)
+        return float(found["t"]), {str(path): float(value) for path, value in found["joints"].items()}
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise SettingError(
+            "a line of the stream is no sample", path="--in", found=line.strip()[:80],
+            remedy='Send lines such as {"t": 0.1, "joints": {"/Arm/Elbow": 0.3}}, in s and rad (m of sliders).',
+        ) from error  # fmt: skip
+
+
+class Lines(Source):
+    """JSON lines; a line that is no sample is left out.
+
+    Args:
+        lines: A file.
+        waits: Whether a thread of its own reads them as they come; else all are there.
+    """
+
+    def __init__(self, lines: IO[str], waits: bool = True):
+        self._queue: queue.SimpleQueue[Sample | None] = queue.SimpleQueue()
+        self._lines, self._ended = lines, False
+        if waits:
+            threading.Thread(target=self._read, daemon=True).start()
+
+    def samples(self) -> Iterator[Sample]:
+        """Those of the file, in its order; empty lines count for nothing."""
+        for line in self._lines:
+            try:
+                if line.strip():
+                    yield sample_of(line)
+            except SettingError as error:
+                self._refuse(error)
+
+    def _read(self) -> None:
+        for sample in self.samples():
+            self._queue.put(sample)
+        self._queue.put(None)
+
+    def arrived(self) -> list[Sample] | None:
+        """Those that the thread has read."""
+        found: list[Sample] = []
+        while not (self._ended or self._queue.empty()):
+            item = self._queue.get()
+            self._ended = item is None
+            found += [] if item is None else [item]
+        return None if self._ended and not found else found
+
+
+class Samples(Source):
+    """Samples that are known, each of which arrives at the time of its stamp after the first call."""
+
+    def __init__(self, samples: Iterable[Sample]):
+        self._samples = iter(samples)
+        self._next = next(self._samples, None)
+        self._begin: float | None = None
+
+    def samples(self) -> Iterator[Sample]:
+        """Those that have not arrived."""
+        while self._next is not None:
+            found, self._next = self._next, next(self._samples, None)
+            yield found
+
+    def arrived(self) -> list[Sample] | None:
+        """Those whose time has come."""
+        if self._next is None:
+            return None
+        now = time.perf_counter()
+        self._begin = self._begin if self._begin is not None else now - self._next[0]
+        found: list[Sample] = []
+        while self._next is not None and self._next[0] <= now - self._begin:
+            found.append(self._next)
+            self._next = next(self._samples, None)
+        return found
+
+
+class OscSource(Source):
+    """Messages `/calm/in/<joint path>` with one float each, stamped when they arrive."""
+
+    def __init__(self, host: str, port: int):
+        from pythonosc.dispatcher import Dispatcher
+        from pythonosc.osc_server import ThreadingOSCUDPServer
+
+        self._lock, self._values = threading.Lock(), dict[str, float]()
+        dispatcher = Dispatcher()
+        dispatcher.map(f"{IN}/*", self._given)
+        self._server = ThreadingOSCUDPServer((host, port), dispatcher)
+        threading.Thread(target=self._server.serve_forever, daemon=True).start()
+
+    def _given(self, address: str, *values: Any) -> None:
+        if values and isinstance(values[0], int | float):
+            with self._lock:
+                self._values[address[len(IN) :]] = float(values[0])
+
+    def arrived(self) -> list[Sample]:
+        """At most one sample, with all faders that moved."""
+        with self._lock:
+            values, self._values = self._values, {}
+        return [(time.monotonic(), values)] if values else []
+
+    def close(self) -> None:
+        """Close the port."""
+        self._server.shutdown()
+        self._server.server_close()
+
+
+class LineSink(Sink):
+    """Lines such as `{"t": 0.22, "joints": {...}, "late": 0, "limited": []}`."""
+
+    def __init__(self, file: IO[str]):
+        self._file = file
+
+    def send(self, time_s: float, commands: Mapping[str, float], live: Live) -> None:
+        """Write and flush a line."""
+        line = {"t": round(time_s, 9), "joints": commands, "late": live.late, "limited": list(live.limited)}
+        self._file.write(json.dumps(line) + "\n")
+        self._file.flush()
+
+
+class OscSink(Sink):
+    """Messages `/calm/out/<joint path>` with one float each."""
+
+    def __init__(self, host: str, port: int):
+        from pythonosc.udp_client import SimpleUDPClient
+
+        self._client = SimpleUDPClient(host, port)
+
+    def send(self, time_s: float, commands: Mapping[str, float], live: Live) -> None:
+        """One message for each joint."""
+        for path, value in commands.items():
+            self._client.send_message(f"{OUT}{path}", value)
+
+
+def osc_place(text: str, option: str) -> tuple[str, int] | None:
+    """Host and port of `osc://HOST:PORT`; the host is this machine where none is given. None for `-`.
+
+    Raises:
+        SettingError: It is neither, or python-osc is not installed.
+    """
+    if text == "-":
+        return None
+    place = urlsplit(text)
+    try:
+        port = place.port
+    except ValueError:
+        port = None
+    if place.scheme != "osc" or not port:
+        raise SettingError(
+            "this is no place of a stream", path=option, found=text,
+            remedy="Use - for standard input and output, or osc://127.0.0.1:9000.",
+        )  # fmt: skip
+    try:
+        import pythonosc  # noqa: F401
+    except ImportError as error:
+        raise SettingError(
+            "OSC needs python-osc, which is not installed", path=option, found=text,
+            remedy='Install it: pip install "python-osc>=1.9,<2".',
+        ) from error  # fmt: skip
+    return place.hostname or "127.0.0.1", port

@@ -1,0 +1,98 @@
+"""A stream from its source to its sink: by the clock of its stamps, or by that of the wall."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.model import Animation
+
+from .lines import Sample, Sink, Source
+from .session import Live
+
+REST_S = 2.0  # after the end of a stream, until the robot rests
+SPIN_S = 2e-3  # before a tick, in which waiting does not sleep
+
+
+def play_stamps(live: Live, samples: Iterable[Sample], sink: Sink) -> None:
+    """Each tick with the samples whose stamps have come, as fast as they can be read: no clock changes the result."""
+    start, ticks, waiting = None, 0, iter(samples)
+    upcoming = next(waiting, None)
+    while upcoming is not None:
+        start = upcoming[0] if start is None else start
+        now = start + ticks * live.tick_s
+        while upcoming is not None and not upcoming[0] > now + 1e-3 * live.tick_s:
+            _give(live, *upcoming)
+            upcoming = next(waiting, None)
+        _tick(live, sink, now)
+        ticks += 1
+    live.end()
+    for _ in range(_ticks_to_rest(live)):
+        if start is not None:
+            _tick(live, sink, start + ticks * live.tick_s)
+            ticks += 1
+
+
+def play_clock(live: Live, source: Source, sink: Sink, seconds: float | None = None) -> None:
+    """A tick each 1/rate of the wall's clock, until the source ends or `seconds` are over, and then to rest."""
+    begin, ticks, left = time.perf_counter(), 0, None
+    try:
+        while left is None or left > 0:
+            arrived = source.arrived() if left is None else []
+            for sample in arrived or ():
+                _give(live, *sample)
+            _tick(live, sink, ticks * live.tick_s)
+            ticks += 1
+            if arrived is None:
+                live.end()
+            over = arrived is None or (seconds is not None and ticks * live.tick_s >= seconds)
+            left = (_ticks_to_rest(live) if over else None) if left is None else left - 1
+            _wait(begin + ticks * live.tick_s)
+    finally:
+        source.close()
+
+
+def samples_of_animation(live: Live, animation: Animation) -> Iterator[Sample]:
+    """The animation of a shot as a stream, at the rate of the player."""
+    from scipy.interpolate import CubicSpline
+
+    end = float(animation.frame_times[-1])
+    curves = [CubicSpline(t.times, t.values) if len(t.times) > 1 else None for t in animation.current]
+
+    def at(instant: float) -> Array:
+        return np.array(
+            [
+                float(curve(np.clip(instant, track.times[0], track.times[-1]))) if curve else float(track.values[0])
+                for curve, track in zip(curves, animation.current, strict=True)
+            ]
+        )
+
+    for tick in range(int(end / live.tick_s) + 1):
+        instant = tick * live.tick_s
+        yield instant, dict(zip(live.joints, at(instant).tolist(), strict=True))
+
+
+def _give(live: Live, time_s: float, joints: dict[str, float]) -> None:
+    """A sample; joints that the robot does not have are left out, and counted."""
+    known = {path: value for path, value in joints.items() if path in live.joints}
+    live.unknown.update(joints.keys() - known.keys())
+    live.give(time_s, known)
+
+
+def _tick(live: Live, sink: Sink, now: float) -> None:
+    commands = live.advance()
+    sink.send(now, dict(zip(live.joints, commands.tolist(), strict=True)), live)
+
+
+def _ticks_to_rest(live: Live) -> int:
+    return round((live.latency_s + live.settings.lookahead + REST_S) * live.settings.rate)
+
+
+def _wait(until: float) -> None:
+    left = until - time.perf_counter()
+    if left > SPIN_S:
+        time.sleep(left - SPIN_S)
+    while time.perf_counter() < until:
+        pass

@@ -1,0 +1,100 @@
+"""Commands whose motion follows a delayed intended motion: the state of the robot, and one step a tick."""
+
+from __future__ import annotations
+
+import numpy as np
+from calmotion.arrays import Array, IntArray
+from calmotion.multibody import VelocityForces
+
+from .gains import Gains
+from .limits import MotorLimits
+
+
+class Window:
+    """The intended motion at the ticks from the one that is played to the newest (window + 1 ticks, M motors).
+
+    Rates and accelerations of a tick are known once the next one is: central differences, which belong to straight
+    pieces between ticks.
+    """
+
+    def __init__(self, ticks: int, limits: MotorLimits, forces: VelocityForces):
+        self._tick, self._forces, self._ticks = limits.tick, forces, ticks
+        self._at_rest = forces.at
+
+    def begin(self, position: Array) -> None:
+        """Rest at a pose."""
+        count, self.positions = len(position), np.tile(position, (self._ticks + 2, 1))
+        self.rates, self.accelerations = np.zeros((2, self._ticks, count))
+        self.forces = np.tile(self._forces.at(position, np.zeros(count)), (self._ticks, 1))
+
+    def push(self, position: Array) -> None:
+        """The intended position of the newest tick, shape [M]; the oldest tick leaves."""
+        for rows in (self.positions, self.rates, self.accelerations, self.forces):
+            rows[:-1] = rows[1:]
+        self.positions[-1] = position
+        before, at, after = self.positions[-3:]
+        self.rates[-1] = (after - before) / (2.0 * self._tick)
+        self.accelerations[-1] = (after - 2.0 * at + before) / self._tick**2
+        self.forces[-1] = self._forces.at(at, self.rates[-1])
+
+    @property
+    def played(self) -> Array:
+        """The intended position at the tick that is played."""
+        return np.asarray(self.positions[1])
+
+    @property
+    def next(self) -> Array:
+        """That of the tick after it."""
+        return np.asarray(self.positions[2])
+
+
+class Regulator:
+    """The state of the robot as the linear models have it, and the next commands.
+
+    Args:
+        coupling: Of all motors with those that may deviate, shape [M, m].
+        deviating: The latter, shape [m].
+        limits: Of all motors.
+    """
+
+    SETTLED = 1e-14  # of a deviation [rad or m], with no impulse in the window: at rest
+
+    def __init__(self, coupling: Array, deviating: IntArray, limits: MotorLimits):
+        self._coupling, self._deviating, self._limits = coupling, deviating, limits
+        self._gains: Gains | None = None
+
+    def begin(self, position: Array, gains: Gains) -> None:
+        """Rest at a pose."""
+        self._gains, self._x = gains, np.zeros(len(gains.transition))
+        self.command, self._speed = np.array(position, float), np.zeros(len(position))
+
+    def use(self, gains: Gains) -> None:
+        """Go on in the modes of another pose."""
+        assert self._gains is not None
+        self._x, self._gains = gains.state_from(self._x, self._gains), gains
+
+    @property
+    def deviation(self) -> Array:
+        """Of the commands from the intended motion, shape [m]."""
+        return self._x[: len(self._deviating)]
+
+    def targets(self) -> Array:
+        """Weighted deviation of the targets from the delayed intended motion, as the linear model has it."""
+        assert self._gains is not None
+        return np.asarray(self._gains.targets @ self._x)
+
+    def advance(self, window: Window) -> tuple[Array, IntArray]:
+        """The commands of the next tick, shape [M], and what limits acted, see `MotorLimits.kept`."""
+        gains, h, m = self._gains, self._limits.tick, len(self._deviating)
+        assert gains is not None
+        impulses = gains.impulses(window.accelerations, window.rates, window.forces, h)
+        wanted = -gains.feedback @ self._x
+        wanted -= np.einsum("kmi,ki->m", gains.preview[: len(impulses)], impulses)
+        intended = (window.next - window.played) / h
+        asked = intended + self._coupling @ (self._x[m : 2 * m] + wanted)
+        self._speed, acted = self._limits.kept(self.command, self._speed, asked)
+        change = (self._speed - intended)[self._deviating] - self._x[m : 2 * m]
+        self._x = gains.transition @ self._x + gains.by_change @ change + gains.by_impulse @ impulses[0]
+        self._x[:m] = (self.command + h * self._speed - window.next)[self._deviating]
+        self.command = window.next + self._coupling @ self._x[:m]
+        return self.command, acted

@@ -1,0 +1,311 @@
+"""Commands for a robot from a stream, tick by tick."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from calmotion.arrays import Array, IntArray
+from calmotion.errors import ShotError
+from calmotion.host import SettingError, nearest
+from calmotion.model import PRESCRIBED, RunSettings, contact_joints, tolerance_of
+from calmotion.multibody import SimulationFailure, VelocityForces, pose_model
+from calmotion.simulation import CompiledShot, coupling_of, leaders, prepare
+
+from .gains import Gains, Weighting, gains_at
+from .limits import MotorLimits
+from .regulator import Regulator, Window
+from .renewal import Renewal
+from .stream import Stream
+
+Angles = TypeVar("Angles", Array, Mapping[str, float], None)
+
+
+@dataclass(frozen=True)
+class LiveSettings:
+    """How a stream is played.
+
+    Attributes:
+        rate: Commands a second [Hz].
+        lookahead: How late the robot may answer [s].
+        sender_rate: Samples a second of the sender [Hz]; None: one for each command.
+        uncertainty: Share by which the frequencies of the robot are not known.
+        tolerance: Error at the targets that is worth an effort [m]; None: the shot's.
+        background: Whether a thread renews the gains; else `step` does, at fixed ticks: slower, but repeatable.
+    """
+
+    ACCELERATION = 100.0  # of a motor without a limit, which is worth the tolerance [rad/s^2 or m/s^2]
+    HIGHEST = 1 / 3  # frequency of a mode that commands can act on, of the rate
+    RENEWAL_S = 0.04  # between two renewals without a thread
+
+    rate: float = 250.0
+    lookahead: float = 0.12
+    sender_rate: float | None = None
+    uncertainty: float = 0.0
+    tolerance: float | None = None
+    background: bool = True
+
+
+class Live:
+    """A robot that follows a stream of joint angles `latency_s` later, without shaking.
+
+    Args:
+        shot: The robot; it begins at rest in the pose of the first frame.
+
+    Attributes:
+        joints: Paths of the motors' joints, the order of arrays.
+        start: The pose of the first frame [rad or m], shape [M].
+        tick_s: Time between two commands [s].
+        unknown: How often a sample had a joint that the robot does not have, by its path.
+        notes: What is left out for this robot.
+
+    Raises:
+        ShotError: Feet that come and go, or a pose without equilibrium.
+        SettingError: A rate or a look-ahead that does not fit, or that this machine cannot keep.
+    """
+
+    def __init__(self, shot: CompiledShot, settings: LiveSettings | None = None):
+        self.settings = settings = settings or LiveSettings()
+        character = shot.character
+        _refuse_unfit(shot, settings)
+        self.joints = tuple(motor.path for motor in character.motors)
+        self.tick_s = 1.0 / settings.rate
+        self._window_ticks = 1 + round(settings.lookahead * settings.rate)
+        self._model = shot.model
+        self._world = prepare(shot, RunSettings(pre_roll=0.0)).world[0]
+        self._follows = [(k, motor.follows) for k, motor in enumerate(character.motors) if motor.follows is not None]
+        self._limits = MotorLimits.of(character, self.tick_s)
+        self._deviating: IntArray = leaders(character)
+        self._coupling = coupling_of(character, self._deviating)
+        self._weighting = self._weighting_of(shot)
+        period = 1.0 / settings.sender_rate if settings.sender_rate else self.tick_s
+        self._stream = Stream(self._limits, settings.lookahead, period)
+        forces = VelocityForces(self._model, self._world)
+        self._window = Window(self._window_ticks, self._limits, forces)
+        self._regulator = Regulator(self._coupling, self._deviating, self._limits)
+        self._renewal = Renewal(self._gains, settings.background)
+        self._delay = max((motor.delay for motor in character.motors if motor.model != PRESCRIBED), default=0.0)
+        self.notes = _notes(shot, forces)
+        self.start = np.array([float(np.interp(0.0, track.times, track.values)) for track in shot.animation.current])
+        self.reset(self.start)
+        self._refuse_slow()
+
+    @property
+    def latency_s(self) -> float:
+        """How much later than its sample the robot does what was asked [s]."""
+        return (self._window_ticks - 1) * self.tick_s + self._stream.delay + self._delay
+
+    @property
+    def limited(self) -> tuple[str, ...]:
+        """Joints at whose limits the last commands were kept."""
+        return tuple(self.joints[k] for k in np.flatnonzero(self._acted >= 0))
+
+    @property
+    def late(self) -> int:
+        """Ticks without a sample in time, so far."""
+        return self._stream.events["late"]
+
+    def reset(self, pose: Array | Mapping[str, float]) -> None:
+        """Rest at a pose, and forget the stream.
+
+        Args:
+            pose: Of all motors [rad or m], in the order of `joints` or by their paths.
+
+        Raises:
+            SettingError: A joint that does not exist, or a pose of another size.
+            ShotError: The robot has no equilibrium there.
+        """
+        self._sample = self.start.copy()
+        position = np.clip(self._values(pose), self._limits.lower, self._limits.upper)
+        self._sample = position
+        try:
+            gains = self._gains(position)
+        except SimulationFailure as failure:
+            raise ShotError(
+                "the robot has no static equilibrium in the pose in which it shall begin",
+                remedy="Begin in another pose, or see what calmotion inspect says of the shot.",
+            ) from failure
+        self._renewal.begin(position, gains)
+        self._stream.begin(position)
+        self._window.begin(position)
+        self._regulator.begin(position, gains)
+        self._acted = np.full(len(self.joints), -1)
+        self._counts: Counter[int] = Counter()
+        self.unknown: Counter[str] = Counter()
+        self._ticks, self._since, self._largest = 0, 0, 0.0
+        self._spent: deque[float] = deque(maxlen=20_000)
+
+    def step(self, time_s: float, angles: Angles) -> Angles | Array:
+        """One tick: a sample, if one has arrived, and the commands.
+
+        Args:
+            time_s: Time of the sample by the sender's clock [s].
+            angles: Of the motors [rad or m]: an array in the order of `joints`, or a mapping from paths, in which
+                joints that are left out stay; None where nothing has arrived.
+
+        Returns:
+            The commands in the form of the sample; an array where there was none.
+
+        Raises:
+            SettingError: A joint that does not exist, or an array of another size.
+        """
+        if angles is not None:
+            self.give(time_s, angles)
+        commands = self.advance()
+        if isinstance(angles, Mapping):
+            return dict(zip(self.joints, commands.tolist(), strict=True))  # type: ignore[return-value]
+        return commands
+
+    def give(self, time_s: float, angles: Array | Mapping[str, float]) -> None:
+        """A sample has arrived; see `step`. Several may arrive before a tick."""
+        values = self._values(angles)
+        if np.all(np.isfinite(values)):
+            self._sample = values
+        self._stream.give(time_s, values)
+
+    def end(self) -> None:
+        """No sample will come any more; further ticks lead to rest."""
+        self._stream.end()
+
+    def advance(self) -> Array:
+        """The commands of the next tick [rad or m], shape [M], in the order of `joints`."""
+        begin = time.perf_counter()
+        self._window.push(self._stream.advance())
+        gains = self._renewal.poll()
+        if gains is not None:
+            self._regulator.use(gains)
+        commands, self._acted = self._regulator.advance(self._window)
+        self._counts.update(np.flatnonzero(self._acted >= 0).tolist())
+        self._ticks += 1
+        self._since += 1
+        ahead = round(LiveSettings.RENEWAL_S * self.settings.rate)
+        if self.settings.background or self._since >= ahead:
+            self._since = 0
+            self._renewal.ask(self._window.positions[min(1 + ahead // 2, self._window_ticks)])
+        self._largest = max(self._largest, float(np.abs(self._regulator.deviation).max(initial=0.0)))
+        self._spent.append(time.perf_counter() - begin)
+        return commands
+
+    def report(self) -> dict[str, Any]:
+        """What happened since the last `reset`: ticks, events of the stream, limits that acted, times of ticks."""
+        spent = np.array(self._spent) if self._spent else np.zeros(1)
+        return {
+            "ticks": self._ticks,
+            "latency_s": self.latency_s,
+            "events": dict(self._stream.events),
+            "unknown_joints": dict(self.unknown),
+            "limited": {self.joints[k]: count for k, count in sorted(self._counts.items())},
+            "largest_deviation": self._largest,
+            "renewals": self._renewal.done,
+            "renewals_failed": self._renewal.failed,
+            "tick_s": {
+                "median": float(np.median(spent)),
+                "p99": float(np.quantile(spent, 0.99)),
+                "largest": float(spent.max()),
+            },
+            "notes": list(self.notes),
+        }
+
+    def close(self) -> None:
+        """End the thread."""
+        self._renewal.close()
+
+    def __enter__(self) -> Live:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _values(self, angles: Array | Mapping[str, float]) -> Array:
+        values = self._sample.copy()
+        if isinstance(angles, Mapping):
+            for path, value in angles.items():
+                if path not in self.joints:
+                    raise SettingError(
+                        "the robot has no motor of this name", path=path,
+                        remedy=f"{nearest(path, self.joints)}Its motors are {', '.join(self.joints)}.",
+                    )  # fmt: skip
+                values[self.joints.index(path)] = value
+        else:
+            given = np.asarray(angles, dtype=float)
+            if given.shape != values.shape:
+                raise SettingError(
+                    "the sample has another number of values than the robot has motors", found=given.shape,
+                    remedy=f"Give {len(values)}, in this order: {', '.join(self.joints)}.",
+                )  # fmt: skip
+            values = given.copy()
+        for k, follows in self._follows:
+            values[k] = follows.offset + follows.ratio * values[follows.leader]
+        return values
+
+    def _weighting_of(self, shot: CompiledShot) -> Weighting:
+        settings, targets = self.settings, shot.model.targets
+        worth = tolerance_of(shot.character, settings.tolerance)
+        largest = np.array([shot.character.motors[k].max_acceleration for k in self._deviating])
+        largest = np.where(np.isfinite(largest), largest, LiveSettings.ACCELERATION)
+        weights = np.stack([targets.position_weight, targets.rotation_weight], axis=1)
+        spread = (1.0 - settings.uncertainty, 1.0, 1.0 + settings.uncertainty) if settings.uncertainty else (1.0,)
+        return Weighting(
+            self.tick_s, self._window_ticks, np.sqrt(np.repeat(weights, 3, axis=1)),
+            self.PENALTY * worth / (largest * self.tick_s), worth, spread,
+        )  # fmt: skip
+
+    PENALTY = 1.0  # an acceleration at its limit, as a deviation of the intended one, in tolerances
+
+    def _gains(self, position: Array) -> Gains:
+        pose = pose_model(self._model, position, self._world, LiveSettings.HIGHEST * self.settings.rate)
+        return gains_at(pose, self._coupling, self._weighting)
+
+    def _refuse_slow(self) -> None:
+        """Some ticks at rest, for the time they take.
+
+        Raises:
+            SettingError: More than there is.
+        """
+        for _ in range(30):
+            self.advance()
+        needed = float(np.median(np.array(self._spent)[10:]))
+        self.reset(self.start)
+        if needed > self.tick_s:
+            raise SettingError(
+                "this machine cannot calm this robot at this rate", path="--rate", found=f"{self.settings.rate:g} Hz",
+                remedy=f"Use at most {0.5 / needed:.0f} Hz; a shorter look-ahead or fewer flexible links are faster.",
+            )  # fmt: skip
+
+
+def _refuse_unfit(shot: CompiledShot, settings: LiveSettings) -> None:
+    character, contacts = shot.character, contact_joints(shot.character)
+    if contacts:
+        raise ShotError(
+            "a robot whose feet come and go cannot be calmed live: where they stand later is not known",
+            path=character.joints[contacts[0]].path,
+            remedy="Fix the feet to the ground, or use calmotion optimize on the whole motion.",
+        )
+    if not 10.0 <= settings.rate <= 2000.0:
+        raise SettingError(
+            "the rate is no rate of commands", path="--rate", found=f"{settings.rate:g} Hz",
+            remedy="Use 10 to 2000 Hz; most controllers take 50 to 500.",
+        )  # fmt: skip
+    if not 0.0 <= settings.lookahead <= 5.0:
+        raise SettingError(
+            "the look-ahead is not within 0 and 5 s", path="--lookahead", found=f"{settings.lookahead:g} s",
+            remedy="Use a third of the longest period of the robot, such as 120ms; see calmotion inspect --modes.",
+        )  # fmt: skip
+
+
+def _notes(shot: CompiledShot, forces: VelocityForces) -> tuple[str, ...]:
+    found = []
+    if shot.animation.moving:
+        found.append("the moving root stays where it is in the first frame")
+    if not forces.known:
+        found.append("centrifugal forces are left out: joints move freely or close chains")
+    if any(np.isfinite(motor.max_torque) for motor in shot.character.motors):
+        found.append("efforts are not limited: a stream that asks for more than a motor has leaves an error")
+    delays = {motor.delay for motor in shot.character.motors if motor.model != PRESCRIBED}
+    if len(delays) > 1:
+        found.append("motors with different delays are taken as if all had the longest")
+    return tuple(found)
