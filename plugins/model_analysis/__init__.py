@@ -17,6 +17,7 @@ from calmotion.model import (
     PRESCRIBED,
     Animation,
     Character,
+    ExceededLimits,
     ModelChoices,
     MotorEffects,
     OutputPaths,
@@ -25,6 +26,7 @@ from calmotion.model import (
     ShapedTracks,
     Source,
     Verification,
+    has_limits,
     no_flexible_bodies,
     run_settings,
 )
@@ -199,6 +201,35 @@ class EstimateMotorEffects(Operator):
         return [found]
 
 
+class CompareWithLimits(Operator):
+    """Which limits of the motors the animation exceeds, on a rigid robot with ideal motors."""
+
+    idname = "accuracy.limits"
+    label = "Compare the animation with the limits"
+    requires = (Character, Animation)
+    uses = (Source,)
+    provides = (ExceededLimits,)
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        source, character, animation = data.get(Source), data.get(Character), data.get(Animation)
+        if source is not None and source.command not in ("inspect", "check"):
+            return NotAsked("other commands tell it of what they simulate")
+        if character is not None and not has_limits(character):
+            return NotAsked("no motor has limits")
+        if animation is not None and len(animation.frame_times) < 2:
+            return NotAsked("the shot has a single frame")
+        return None
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.simulation import busiest
+        from calmotion.tolerance import exceeded_limits
+
+        character, animation = context.get(Character), context.get(Animation)
+        part = animation if character.retarget.cyclic else busiest(animation, LONG_SHOT)
+        return [ExceededLimits(exceeded_limits(character, part, run_settings(context.get(Source))))]
+
+
 class VerifyResult(Operator):
     """Compares the result with a finer run of the same curves, with a quarter of the step and more modes."""
 
@@ -251,4 +282,6 @@ class VerifyResult(Operator):
             yield found
 
 
-register, unregister = registration(AnalyseShot, RefineReduction, PlanStep, EstimateMotorEffects, VerifyResult)
+register, unregister = registration(
+    AnalyseShot, RefineReduction, PlanStep, EstimateMotorEffects, CompareWithLimits, VerifyResult
+)

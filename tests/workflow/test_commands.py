@@ -12,6 +12,7 @@ import pytest
 from calmotion.model.model_choice import KINDS, OFF, ON
 from calmotion.workflow.commands import _forced
 from one_hinge import HINGE, ONE_HINGE, TIP
+from scipy.interpolate import CubicSpline
 
 
 @pytest.fixture
@@ -277,6 +278,33 @@ def test_motors_that_give_are_simulated_unless_ideal_ones_are_asked_for(tmp_path
     assert motor["model"] == "prescribed" and motor["position_gain_n_m_rad"] == pytest.approx(np.degrees(0.5))
     with pytest.raises(cm.SettingError, match="motors is 'perfect'"):
         cm.simulate(tmp_path / "drive.usda", motors="perfect")
+
+
+@pytest.mark.parametrize("share", [0.5, 1.1])
+@pytest.mark.parametrize(
+    ("attribute", "quantity", "order", "unit"),
+    [
+        ("maxVelocity", "velocity", 1, 1.0), ("maxAcceleration", "acceleration", 2, 1.0),
+        ("maxJerk", "jerk", 3, 1.0), ("maxTorque", "effort", 2, np.radians(1.0) * 2 * 0.2**2 / 6),
+    ],
+)  # fmt: skip
+def test_inspect_finds_animations_beyond_the_limits_of_motors(tmp_path, attribute, quantity, order, unit, share):
+    """Each limit by itself, above or below what the cubic through the samples needs; the effort is inertia times it."""
+    spline = CubicSpline(np.linspace(0.0, 1.0, 5), [0, 10, 30, 20, 0])
+    peak = np.abs(spline(np.linspace(0.0, 1.0, 4801), order)).max() * unit
+    text = ONE_HINGE.replace('"PhysicsDriveAPI:angular"', '"PhysicsDriveAPI:angular", "CalmMotorAPI"')
+    text = text.replace(
+        "rel physics:body1", f"float calm:motor:{attribute} = {share * peak:.9g}\n        rel physics:body1"
+    )
+    (tmp_path / "shot.usda").write_text(text)
+    rows = cm.inspect(tmp_path / "shot.usda").report()["limits"]
+    findings = cm.inspect(tmp_path / "shot.usda", strict=True).findings.items
+    found = [finding for finding in findings if quantity in finding.problem]
+    assert len(rows) == len(found) == (share < 1.0)
+    if rows:
+        assert rows[0]["quantity"] == quantity and rows[0]["exceeded"]
+        assert abs(rows[0]["before"]) == pytest.approx(peak if quantity == "effort" else np.radians(peak), rel=0.02)
+        assert found[0].path == HINGE and found[0].attribute == f"calm:motor:{attribute}" and found[0].remedy
 
 
 def test_inspecting_a_robot_with_gains_and_without_animation_is_no_problem(tmp_path):

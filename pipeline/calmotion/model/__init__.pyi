@@ -28,6 +28,7 @@ from calmotion.model.curves import Sample as Sample
 from calmotion.model.curves import commanded_curves as commanded_curves
 from calmotion.model.curves import curve_of as curve_of
 from calmotion.model.curves import held_curve as held_curve
+from calmotion.model.limits.kinds import has_limits as has_limits
 from calmotion.model.limits.use import LimitUse as LimitUse
 from calmotion.model.limits.use import is_exceeded as is_exceeded
 from calmotion.model.limits.use import is_reached as is_reached
@@ -53,6 +54,7 @@ from calmotion.model.motor import Motor as Motor
 from calmotion.model.motor import Rotor as Rotor
 from calmotion.model.motor import measure_of as measure_of
 from calmotion.model.outputs import CsvFile as CsvFile
+from calmotion.model.outputs import ExceededLimits as ExceededLimits
 from calmotion.model.outputs import Figures as Figures
 from calmotion.model.outputs import Finding as Finding
 from calmotion.model.outputs import Findings as Findings

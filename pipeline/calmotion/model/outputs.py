@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from calmotion.arrays import Array
     from calmotion.model.animation import Track
+    from calmotion.model.limits.use import LimitUse
     from calmotion.model.result import Simplification
 
 ERROR, WARNING = "error", "warning"  # levels of a `Finding`
@@ -147,6 +148,13 @@ class MotorEffects:
     droop: Array
     ideal_lag: Array
     ideal_droop: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ExceededLimits:
+    """The limits of motors that the animation exceeds, each where it does most."""
+
+    uses: tuple[LimitUse, ...]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from calmotion.model import (
     Animation,
     Body,
     Character,
+    ExceededLimits,
     FEMesh,
     FEMeshes,
     Findings,
@@ -24,13 +25,14 @@ from calmotion.model import (
     Simplification,
     Track,
 )
+from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.model.motor import SERVO, measure_of
-from calmotion.model.outputs import ModeShapes, MotorEffects, PlannedStep, SystemModes
+from calmotion.model.outputs import WARNING, Finding, ModeShapes, MotorEffects, PlannedStep, SystemModes
 from calmotion.model.run import WINDOW_OVERLAP, RunSettings
 from calmotion.tolerance.reduced_bodies import ReducedBodies
 from calmotion.version import __version__
 from calmotion.workflow.problems import Problem
-from calmotion.workflow.report import left_out_row, operator_row
+from calmotion.workflow.report import left_out_row, limit_row, operator_row
 from calmotion.workflow.run import Outcome
 
 SHOWN_MODES = 10
@@ -45,7 +47,8 @@ def wanted_of(strict: bool, modes: bool) -> tuple[tuple[type, ...], tuple[type, 
         modes: Whether mode shapes are requested.
     """
     wanted: tuple[type, ...] = (Findings,) if strict else _CONTENTS
-    optional = _CONTENTS if strict else (ModelChoices, ReducedBodies, SystemModes, PlannedStep, MotorEffects)
+    costly = (ModelChoices, ReducedBodies, SystemModes, PlannedStep, MotorEffects)
+    optional = (ExceededLimits, *(_CONTENTS if strict else costly))
     return (*wanted, *((ModeShapes,) if modes else ())), optional
 
 
@@ -68,7 +71,10 @@ class Inspection:
     @property
     def findings(self) -> Findings | None:
         """What a strict inspection found; None without `strict`."""
-        return self._run.get(Findings)
+        found, exceeded = self._run.get(Findings), self._run.get(ExceededLimits)
+        if found is None or exceeded is None:
+            return found
+        return Findings((*found.items, *_beyond(self._run.data[Character], exceeded)))
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints; empty where the shot could not be read."""
@@ -82,6 +88,20 @@ class Inspection:
         return made
 
 
+def _beyond(character: Character, exceeded: ExceededLimits) -> Iterator[Finding]:
+    """The limits that the animation exceeds, but those of positions, which the rules for the stage find."""
+    for use in exceeded.uses:
+        row, kind = limit_row(character, use), kinds_of_limits()[use.quantity]
+        if use.quantity == "position":
+            continue
+        limit, _, value = row["shown"]
+        yield Finding(
+            WARNING, "AnimationKeepsLimits", row["path"], kind.raised_by,
+            f"the animation exceeds the {use.quantity} of its motor", f"{value} at {use.time_s:.3f} s, limit {limit}",
+            "Slow the animation down there, or raise the limit if the motor can do more",
+        )  # fmt: skip
+
+
 def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]:
     """The object of `inspect --json`; SI units and radians, as the names of the keys say.
 
@@ -91,6 +111,7 @@ def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]
     """
     character, animation, provenance = run.data[Character], run.data[Animation], run.data[Provenance]
     reduced, modes, choices = run.get(ReducedBodies), run.get(SystemModes), run.get(ModelChoices)
+    exceeded = run.get(ExceededLimits)
     tables = {table.body: table for table in reduced.modes} if reduced else {}
     names = [body.path for body in character.bodies]
     meshes = {mesh.body: mesh for mesh in made.meshes} if (made := run.get(FEMeshes)) else {}
@@ -140,6 +161,7 @@ def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]
             }
             for target in character.targets
         ],
+        "limits": [limit_row(character, use) for use in exceeded.uses] if exceeded else [],
         "effects_of_gains": _effects(character, run.get(MotorEffects)),
         "expected": _expected(character, animation, modes, settings),
         "system_frequencies_hz": modes.frequencies[:SHOWN_MODES].tolist() if modes else [],

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from calmotion.cli.quantities import angle, counted, frequency, length
 from calmotion.cli.reports.left_out import print_left_out
+from calmotion.cli.reports.limits import print_limits
 from calmotion.cli.reports.run import print_notes
 from calmotion.cli.reports.verdict import NOTHING_SHAKES
 from calmotion.cli.tables import print_table, say
@@ -94,6 +95,7 @@ def _print_contents(console: Console, report: dict[str, Any], verbose: bool) -> 
             f"{frequency(hertz)} Hz ({ratio:.2g})" for hertz, ratio in modes[: None if verbose else MODES]
         )
         say(console, f"natural frequencies of the character in its first pose (damping ratios): {shown}, ...")
+    print_limits(console, report["limits"], False)
     _print_gains(console, report)
     print_left_out(console, report["left_out"], verbose)
     if report["mode_shapes"]:

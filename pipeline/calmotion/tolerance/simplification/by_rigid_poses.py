@@ -44,8 +44,7 @@ def decide(
     poses_matter = changes or bool(tree.closing)
     if not poses_matter and choice("bodies") == AUTO:
         return character, []
-    solids = {k: solid_of(body) for k, body in enumerate(character.bodies) if body.flexible is not None}
-    known = {k: None if solid is None else solid.mass for k, solid in solids.items()}
+    known = _masses_of_solids(character)
     rough = replace(character, bodies=tuple(_with_mass(k, body, known) for k, body in enumerate(character.bodies)))
     character, rows = _bodies(character, known, choice("bodies"))
     if not poses_matter:
@@ -58,6 +57,19 @@ def decide(
         rows += more
     character, more = _loops(character, tree, poses, choice("loops"))
     return character, rows + more
+
+
+def with_rough_masses(character: Character) -> Character:
+    """A character whose bodies can all be simulated as rigid: flexible ones without a stated mass have that of their
+    closed surface, or of half of the box around it."""
+    known = _masses_of_solids(character)
+    return replace(character, bodies=tuple(_with_mass(k, body, known) for k, body in enumerate(character.bodies)))
+
+
+def _masses_of_solids(character: Character) -> dict[int, MassProperties | None]:
+    """Of the flexible bodies, by index; None where nothing is closed."""
+    solids = {k: solid_of(body) for k, body in enumerate(character.bodies) if body.flexible is not None}
+    return {k: None if solid is None else solid.mass for k, solid in solids.items()}
 
 
 def _with_mass(index: int, body: Body, known: Mapping[int, MassProperties | None]) -> Body:
