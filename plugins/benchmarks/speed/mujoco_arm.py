@@ -11,8 +11,8 @@ import time
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.testing import ExudynArm as Arm
 
+from ..scenes.exudyn_arm import ExudynArm as Arm
 from .exudyn_arm import DURATION, SAMPLES
 
 HINGES = 6 + Arm.FIXED_MODES
