@@ -6,14 +6,14 @@ import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.host import Host, SettingError, has_no_unit, open_host, parse_quantity
-from calmotion.model import Animation, Character, MotorTracks, Source
+from calmotion.model import Animation, Character, MotorTracks, Provenance, Source
 from calmotion.rigging import Material, known_materials, material_named
 from calmotion.support import try_writing
 from calmotion.usd import EXTENSIONS, read_shot, refuse_input_as_output, relative_asset, write_layer
@@ -42,6 +42,7 @@ class ImportedRobot:
         character: What was read of it again.
         animation: Its motion; of one frame where none was given.
         notes: What the user should know, as sentences.
+        names: Of prims whose names USD does not allow, to those in the robot's file.
     """
 
     layer: str
@@ -49,6 +50,7 @@ class ImportedRobot:
     character: Character
     animation: Animation
     notes: tuple[str, ...]
+    names: Mapping[str, str] = field(default_factory=dict)
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints."""
@@ -72,6 +74,7 @@ class ImportedRobot:
                 "frames": len(frames),
                 "duration_s": float(frames[-1]),
                 "notes": self.notes,
+                "written_names": dict(self.names),
             }
         )
         return report
@@ -194,10 +197,11 @@ def _over_usd(robot: str, layer: str, options: RobotOptions) -> ImportedRobot:
     """A layer over a robot that is USD, which stays where it is."""
     refuse_input_as_output(layer, [robot])
     made, notes = robot_layer(robot, relative_asset(robot, os.path.dirname(os.path.realpath(layer))), options)
-    read: list[tuple[Character, Animation]] = []
-    write_layer(made, layer, lambda path: read.append(read_shot(path, still=True)[:2]))
-    character, animation = read[0]
-    return ImportedRobot(layer, "", character, animation, (*notes, *_doubts(character), *character.notes))
+    read: list[tuple[Character, Animation, Provenance]] = []
+    write_layer(made, layer, lambda path: read.append(read_shot(path, still=True)))
+    character, animation, provenance = read[0]
+    told = (*notes, *_doubts(character), *character.notes)
+    return ImportedRobot(layer, "", character, animation, told, provenance.names)
 
 
 class _Import:
@@ -220,18 +224,13 @@ class _Import:
             layer, notes = robot_layer(converted, asset, options)
             layer.documentation = f"The robot of {os.path.basename(self._description.path)}, imported by Calmotion."
             draft = os.path.join(work, os.path.basename(self._layer))
-            read: list[tuple[Character, Animation]] = []
-            write_layer(layer, draft, lambda path: read.append(read_shot(path, still=True)[:2]))
+            read: list[tuple[Character, Animation, Provenance]] = []
+            write_layer(layer, draft, lambda path: read.append(read_shot(path, still=True)))
             self._move(parts, draft)
-        character, animation = read[0]
+        character, animation, provenance = read[0]
         told = (*changes, *self._description.unread, *notes, *(f"converter: {text}" for text in warnings))
-        return ImportedRobot(
-            self._layer,
-            self._folder,
-            character,
-            animation,
-            (*told, *_doubts(character), *character.notes),
-        )
+        told += (*_doubts(character), *character.notes)
+        return ImportedRobot(self._layer, self._folder, character, animation, told, provenance.names)
 
     def _converted(self, work: str, parts: str, python: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
         """The converted robot, warnings of the converter, and what was repaired for it."""

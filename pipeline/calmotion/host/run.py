@@ -18,6 +18,7 @@ from calmotion.host.polling import can_check, find_rivals, poll, will_run
 from calmotion.host.properties import PropertyValues
 from calmotion.support import interrupts
 from calmotion.support.memory import RESERVE, require_address_space
+from calmotion.support.naming import as_written
 
 if TYPE_CHECKING:
     from calmotion.model import Simplification
@@ -197,10 +198,18 @@ class Run:
         self.data.update(values)
         self._made |= dict.fromkeys(values, cls)
         duration = time.perf_counter() - start
-        return self._result(cls, Outcome.DONE, duration=duration, records=tuple(context.records), progress=1.0)
+        return self._result(cls, Outcome.DONE, duration=duration, records=self._records(context), progress=1.0)
 
     def _result(self, cls: type[Operator], outcome: Outcome, **fields: Any) -> OperatorResult:
         return OperatorResult(cls.idname, cls.label, self._owners[cls.idname], outcome, **fields)
+
+    def _records(self, context: RunContext) -> tuple[Record, ...]:
+        """What an operator reported, with names of prims as the author of the shot wrote them."""
+        from calmotion.model import Provenance
+
+        provenance = self.data.get(Provenance)
+        names = {} if provenance is None else provenance.names
+        return tuple(Record(record.level, as_written(record.text, names)) for record in context.records)
 
     def _failure(
         self,
@@ -217,7 +226,7 @@ class Run:
             error=error,
             traceback="".join(traceback.format_exception(error)),
             duration=duration,
-            records=tuple(context.records) if context else (),
+            records=self._records(context) if context else (),
             progress=context.fraction if context else 0.0,
         )
 

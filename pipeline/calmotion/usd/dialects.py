@@ -37,7 +37,9 @@ EFFORT_LIMIT = (
 VELOCITY_LIMIT = (
     Spelling("Calmotion", "calm:motor:maxVelocity"),
     Spelling("Newton", "newton:velocityLimit"),
+    Spelling("PhysX", "physxJointAxis:{drive}:maxJointVelocity"),
     Spelling("PhysX", "physxJoint:maxJointVelocity"),
+    Spelling("PhysX", "physxDrivePerformanceEnvelope:{drive}:maxActuatorVelocity"),
 )
 
 # position gain and velocity gain of a drive, by dialect
@@ -56,17 +58,20 @@ ARMATURE = (
     Spelling("Calmotion", "calm:motor:armature"),
     Spelling("Newton", "newton:armature"),
     Spelling("MuJoCo", "mjc:armature"),
+    Spelling("PhysX", "physxJointAxis:{drive}:armature"),
     Spelling("PhysX", "physxJoint:armature"),
 )
 FRICTION = (
     Spelling("Calmotion", "calm:motor:friction"),
     Spelling("Newton", "newton:friction"),
     Spelling("MuJoCo", "mjc:frictionloss"),
+    Spelling("PhysX", "physxJointAxis:{drive}:dynamicFrictionEffort"),
 )
 VISCOUS_FRICTION = (
     Spelling("Calmotion", "calm:motor:viscousFriction"),
     Spelling("Newton", "newton:damping"),
     Spelling("MuJoCo", "mjc:damping"),
+    Spelling("PhysX", "physxJointAxis:{drive}:viscousFrictionCoefficient"),
 )
 POSITION_ACTUATOR = ("mjc:gainPrm", "mjc:biasPrm", "mjc:gear")  # of an MjcActuator, which stands beside the joint
 

@@ -222,6 +222,21 @@ def test_rotors_of_other_dialects_have_degrees_or_radians_as_these_do(tmp_path):
     assert own.viscous_friction == pytest.approx(0.02)
 
 
+def test_physx_has_rotors_and_limits_by_axis_in_degrees(tmp_path):
+    def edit(stage):
+        servo(stage)
+        values = {"armature": 0.01, "dynamicFrictionEffort": 0.3, "viscousFrictionCoefficient": 0.02}
+        for name, value in (values | {"maxJointVelocity": 90.0}).items():
+            set_float(stage, ELBOW, f"physxJointAxis:angular:{name}", value)
+        set_float(stage, ELBOW, "physxJoint:armature", 7.0)
+        set_float(stage, ELBOW, "physxJoint:maxJointVelocity", 7.0)
+
+    motor = read(tmp_path, edit)[1]
+    own = motor.rotor
+    assert (own.armature, own.viscous_friction, own.friction) == pytest.approx((0.01, 0.02 * 57.29577951, 0.3))
+    assert motor.max_velocity == pytest.approx(np.pi / 2.0)
+
+
 @pytest.mark.parametrize(
     ("edit", "attribute", "what"),
     [

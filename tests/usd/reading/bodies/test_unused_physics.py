@@ -1,6 +1,7 @@
 """What a shot says of its physics and is not simulated is named."""
 
 import numpy as np
+import pytest
 from calmotion.usd.reading import read_shot
 from pxr import Sdf, UsdPhysics
 from small_shots import ELBOW, FORE, UPPER, write_arm
@@ -35,15 +36,29 @@ def test_what_has_no_effect_anyway_is_not(tmp_path):
         assert not [note for note in notes(tmp_path, authored(0.0, limit)) if "is not used" in note]
 
 
-def test_bodies_without_weight_are_named(tmp_path):
-    def weightless(value):
+FLOATS = Sdf.ValueTypeNames.Double
+OTHERS = [  # prim, attribute, a value that has an effect in its program, one that has none
+    (FORE, "physxRigidBody:disableGravity", 1.0, 0.0, "gravity acts"),
+    (FORE, "mjc:gravcomp", 1.0, 0.0, "gravity acts"),
+    (FORE, "mjc:body:gravcomp", 0.5, 0.0, "gravity acts"),
+    (FORE, "physxRigidBody:linearDamping", 0.2, 0.0, "brakes"),
+    (FORE, "physxRigidBody:angularDamping", 0.2, 0.05, "brakes"),
+    (FORE, "physxRigidBody:lockedRotAxis", 3.0, 0.0, "joint to the world"),
+    (ELBOW, "physxLimit:angular:stiffness", 3.0, 0.0, "exact"),
+    (ELBOW, "physxDrivePerformanceEnvelope:angular:speedEffortGradient", 3.0, 0.0, "torqueSpeedKnee"),
+    (ELBOW, "isaac:physics:AccelerationLimit", 3.0, np.inf, "maxAcceleration"),
+    (ELBOW, "isaac:physics:JerkLimit", 3.0, np.inf, "maxJerk"),
+    (ELBOW, "physics:breakTorque", 3.0, np.inf, "break"),
+]
+
+
+@pytest.mark.parametrize(("path", "name", "value", "harmless", "why"), OTHERS, ids=[row[1] for row in OTHERS])
+def test_attributes_of_other_programs_are_named_where_they_have_an_effect(tmp_path, path, name, value, harmless, why):
+    def found(number):
         def edit(stage):
-            prims = [stage.GetPrimAtPath(path) for path in (FORE, UPPER)]
-            prims[0].CreateAttribute("physxRigidBody:disableGravity", Sdf.ValueTypeNames.Bool).Set(bool(value))
-            prims[1].CreateAttribute("mjc:gravcomp", Sdf.ValueTypeNames.Double).Set(value)
+            stage.GetPrimAtPath(path).CreateAttribute(name, FLOATS).Set(number)
 
-        return edit
+        return [note for note in notes(tmp_path, edit) if f"{name} is not used" in note]
 
-    found = [note for note in notes(tmp_path, weightless(1.0)) if "gravity acts on the body" in note]
-    assert [note.split(":")[0] for note in found] == [UPPER, FORE]
-    assert not [note for note in notes(tmp_path, weightless(0.0)) if "gravity acts on the body" in note]
+    (note,) = found(value)
+    assert note.startswith(f"{path}: ") and why in note and not found(harmless)

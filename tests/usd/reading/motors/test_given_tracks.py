@@ -13,9 +13,10 @@ def tracks(end=1.0, **values):
     return MotorTracks("take.csv", np.array([0.0, end]), {name: np.array(pair) for name, pair in values.items()})
 
 
-def test_joints_are_named_by_path_or_name(tmp_path):
-    shot = str(write_arm(tmp_path / "arm.usda"))
-    given = MotorTracks("take.csv", np.array([0.0, 1.0]), {"shoulder": np.array([0, 0.1]), ELBOW: np.array([0, 0.2])})
+@pytest.mark.parametrize("name", ["shoulder", SHOULDER, "1-pan!"])
+def test_joints_are_named_by_path_or_name(tmp_path, name):
+    shot = str(write_arm(tmp_path / "arm.usda", lambda stage: stage.GetPrimAtPath(SHOULDER).SetDisplayName("1-pan!")))
+    given = MotorTracks("take.csv", np.array([0.0, 1.0]), {name: np.array([0, 0.1]), ELBOW: np.array([0, 0.2])})
     character, animation, _ = read_shot(shot, given=given)
     ends = {motor.path: track.values[-1] for motor, track in zip(character.motors, animation.tracks, strict=True)}
     assert ends == {SHOULDER: 0.1, ELBOW: 0.2}

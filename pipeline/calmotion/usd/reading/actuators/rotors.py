@@ -158,7 +158,7 @@ def _rotor(
     friction = at.of_dialects(FRICTION, "friction", {}, force)
     if found is not None and found[1] and not friction:
         notes.append(f"{joint.path}: {_COEFFICIENT} is a coefficient, not a torque: author {_name('friction')} instead")
-    viscous = {_CALMOTION: per_length, "Newton": per_length}  # MuJoCo has radians
+    viscous = dict.fromkeys((_CALMOTION, "Newton", "PhysX"), per_length)  # MuJoCo has radians
     return Rotor(
         armature=armature,
         gear_stiffness=at.own("gearStiffness", "gear_stiffness", per_length, math.inf, positive=True),

@@ -3,6 +3,7 @@ break."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -12,10 +13,36 @@ from calmotion.usd.reading.joints import JointPrim
 if TYPE_CHECKING:
     from pxr import Usd
 
-_VELOCITIES = ("physics:velocity", "physics:angularVelocity")
-_WEIGHTLESS = ("physxRigidBody:disableGravity", "mjc:gravcomp")  # of PhysX and of MuJoCo: gravity is taken from a body
 _NEVER = 1e30  # and more stands for no limit: some programs author the largest float
-_BREAKS = ("physics:breakForce", "physics:breakTorque")
+_AT_REST = "a shot starts at rest, or eases into its motion"
+_ALL_WEIGH = "gravity acts on the body"
+_NOTHING_BRAKES = "nothing but joints brakes the body"
+_NO_BREAK = "joints do not break; the table of --csv has their reactions"
+_EXACT = "limits are exact"
+_CURVE = "the velocity of a motor is that of its curve"
+# attribute, `{drive}` being that of the joint; values that change nothing, from and to; why it is not used
+_OF_BODIES = (
+    ("physics:velocity", 0.0, 0.0, _AT_REST),
+    ("physics:angularVelocity", 0.0, 0.0, _AT_REST),
+    ("physxRigidBody:disableGravity", 0.0, 0.0, _ALL_WEIGH),
+    ("mjc:gravcomp", 0.0, 0.0, _ALL_WEIGH),
+    ("mjc:body:gravcomp", 0.0, 0.0, _ALL_WEIGH),
+    ("physxRigidBody:linearDamping", 0.0, 0.0, _NOTHING_BRAKES),
+    ("physxRigidBody:angularDamping", 0.0, 0.05, _NOTHING_BRAKES),  # the fallback of PhysX
+    ("physxRigidBody:lockedPosAxis", 0.0, 0.0, "a joint to the world holds a body"),
+    ("physxRigidBody:lockedRotAxis", 0.0, 0.0, "a joint to the world holds a body"),
+)
+_OF_JOINTS = (
+    ("physics:breakForce", _NEVER, math.inf, _NO_BREAK),
+    ("physics:breakTorque", _NEVER, math.inf, _NO_BREAK),
+    ("drive:{drive}:physics:targetVelocity", 0.0, 0.0, _CURVE),
+    ("physxLimit:{drive}:stiffness", 0.0, 0.0, _EXACT),
+    ("physxLimit:{drive}:damping", 0.0, 0.0, _EXACT),
+    ("physxDrivePerformanceEnvelope:{drive}:velocityDependentResistance", 0.0, 0.0, "viscousFriction of a servo is"),
+    ("physxDrivePerformanceEnvelope:{drive}:speedEffortGradient", 0.0, 0.0, "torqueSpeedKnee of a servo is"),
+    ("isaac:physics:AccelerationLimit", _NEVER, math.inf, "calm:motor:maxAcceleration is"),
+    ("isaac:physics:JerkLimit", _NEVER, math.inf, "calm:motor:maxJerk is"),
+)
 
 
 def tell_what_is_not_used(reading: Reading, bodies: Iterable[Usd.Prim], joints: Sequence[JointPrim]) -> None:
@@ -27,21 +54,19 @@ def tell_what_is_not_used(reading: Reading, bodies: Iterable[Usd.Prim], joints: 
         joints: Its joints.
     """
     for prim in bodies:
-        for name in _VELOCITIES:
-            if any(value != 0.0 for value in _authored(prim, name, reading.start)):
-                reading.note(f"{prim.GetPath()}: {name} is not used: a shot starts at rest, or eases into its motion")
-        for name in _WEIGHTLESS:
-            if any(value != 0.0 for value in _authored(prim, name, reading.start)):
-                reading.note(f"{prim.GetPath()}: {name} is not used: gravity acts on the body")
-    prims = {joint.prim_path: joint.prim for joint in joints if joint.prim is not None}
-    for path, prim in prims.items():
-        for name in _BREAKS:
-            if any(value < _NEVER for value in _authored(prim, name, reading.start)):
-                reading.note(f"{path}: {name} is not used: joints do not break; the table of --csv has their reactions")
-        drives = {joint.drive for joint in joints if joint.prim_path == path and joint.drive}
-        for name in (f"drive:{drive}:physics:targetVelocity" for drive in sorted(drives)):
-            if any(value != 0.0 for value in _authored(prim, name, reading.start)):
-                reading.note(f"{path}: {name} is not used: the velocity of a motor is that of its curve")
+        _tell(reading, prim, "", _OF_BODIES)
+    told: set[tuple[str, str]] = set()
+    for joint in joints:
+        if joint.prim is not None and (joint.prim_path, joint.drive) not in told:
+            told.add((joint.prim_path, joint.drive))
+            _tell(reading, joint.prim, joint.drive, _OF_JOINTS)
+
+
+def _tell(reading: Reading, prim: Usd.Prim, drive: str, rows: Sequence[tuple[str, float, float, str]]) -> None:
+    for attribute, low, high, why in rows:
+        name = attribute.format(drive=drive)
+        if any(not low <= value <= high for value in _authored(prim, name, reading.start)):
+            reading.note(f"{prim.GetPath()}: {name} is not used: {why}")
 
 
 def _authored(prim: Usd.Prim, name: str, time: float) -> tuple[float, ...]:

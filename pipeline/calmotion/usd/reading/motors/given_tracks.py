@@ -25,17 +25,17 @@ def given_joints(stage: Usd.Stage, given: MotorTracks | None) -> tuple[str, ...]
     """
     if given is None:
         return ()
-    paths = [path for prim in joint_prims(stage) for path in _paths(prim)]
+    names = {path: _names(path, prim) for prim in joint_prims(stage) for path in _paths(prim)}
     found: dict[str, str] = {}
     for name in given.values:
-        named = [path for path in paths if path == name] or [path for path in paths if path.split("/")[-1] == name]
+        named = [path for path in names if path == name] or [path for path in names if name in names[path]]
         if len(named) != 1:
-            likely = "" if named else nearest(name, paths)
+            likely = "" if named else nearest(name, [*names, *(own[0] for own in names.values())])
             raise ShotError(
                 "several joints have this name" if named else "no joint has this name",
                 path=given.origin,
                 found=name,
-                remedy=f"{likely}Use the path of a joint, such as {(named or paths or ['/Robot/joint'])[0]}",
+                remedy=f"{likely}Use the path of a joint, such as {next(iter(named or names), '/Robot/joint')}",
             )
         if (other := found.setdefault(named[0], name)) != name:
             raise ShotError(
@@ -67,7 +67,14 @@ def _paths(prim: Usd.Prim) -> list[str]:
     return [f"{path}.{name}" for name in found.free] if found.kind == freedoms.SEVERAL_FREEDOMS else [path]
 
 
+def _names(path: str, prim: Usd.Prim) -> tuple[str, str]:
+    """What a joint may be named by: its name as its author wrote it, where USD allows no such name, and that of its
+    prim; each with the axis behind it where it has several."""
+    name = path.rsplit("/", 1)[-1]
+    return name.replace(prim.GetName(), prim.GetDisplayName() or prim.GetName(), 1), name
+
+
 def given_track(given: MotorTracks, joint: JointPrim) -> Track:
     """The track of a joint that is named."""
-    name = joint.path if joint.path in given.values else joint.path.split("/")[-1]
+    name = next(name for name in (joint.path, *_names(joint.path, joint.prim)) if name in given.values)
     return Track(np.asarray(given.times, dtype=np.float64), np.asarray(given.values[name], dtype=np.float64))
