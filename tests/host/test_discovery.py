@@ -7,7 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 import pytest
 from calmotion.host import Host, PluginState, SettingError, open_host
-from calmotion.host.discovery import Location, bundled_folder, discover
+from calmotion.host.discovery import Location, discover
 
 EMPTY = "def register(host): ...\ndef unregister(host): ...\n"
 OPERATOR = """
@@ -21,10 +21,6 @@ OPERATOR = """
     def register(host): host.register_operator(Made)
     def unregister(host): host.unregister_operator(Made)
 """
-
-
-def test_bundled_plugins_are_those_of_the_checkout(repository):
-    assert bundled_folder() == repository / "plugins"
 
 
 def test_other_processes_import_a_bundled_plugin_by_its_name(tmp_path):

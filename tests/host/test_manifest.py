@@ -93,13 +93,6 @@ def test_what_was_installed_since_the_last_check_is_found(make_plugin, tmp_path,
     check_requirements(manifest, "0.1.0")
 
 
-def test_metadata_of_a_distribution_is_read_once(make_plugin, monkeypatch):
-    manifest = read_manifest(make_plugin("anvil", EMPTY, requires=["numpy>=1", "numpy<999"]))
-    check_requirements(manifest, "0.1.0")
-    monkeypatch.setattr("importlib.metadata.version", lambda name: pytest.fail(f"{name} was read again"))
-    check_requirements(manifest, "0.1.0")
-
-
 def test_a_requirement_for_another_system_does_not_count(make_plugin):
     manifest = read_manifest(make_plugin("anvil", EMPTY, requires=["nothing; sys_platform == 'beos'"]))
     check_requirements(manifest, "0.1.0")

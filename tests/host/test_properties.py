@@ -75,8 +75,3 @@ def test_the_nearest_right_value_is_named(declared, value, near):
     with pytest.raises(SettingError) as refused:
         values_of([declared], {declared.name: value}, "fe.mesh")
     assert near in refused.value.remedy.split(". ")[0] + refused.value.remedy.split("? ")[0]
-
-
-def test_the_nearest_name_is_named():
-    with pytest.raises(SettingError, match="Did you mean size"):
-        values_of([SIZE, COUNT], {"sise": 1.0}, "fe.mesh")

@@ -155,15 +155,6 @@ def test_conflicting_operators_are_refused_before_any_costly_one_runs():
     assert "more than one operator makes Iron" in run.results[0].reason
 
 
-def test_operators_without_a_conflict_still_run():
-    again = operator("smithy.again", requires=[Ore], provides=[Iron])
-    alloy = operator("smithy.alloy", requires=[Iron], provides=[Steel])
-    burn = operator("wood.burn", requires=[Ore], provides=[Coal])
-    run = host_of(DIG, MELT, again, alloy, burn).run([], [Steel, Coal]).finish()
-    assert run.get(Coal) is not None and run.get(Steel) is None
-    assert outcomes(run)["smithy.melt"] is outcomes(run)["smithy.again"] is Outcome.FAILED
-
-
 def test_an_answer_that_may_change_is_not_a_conflict_yet():
     """The poll asks for coal, which is made later and makes it decline."""
     late = operator("smithy.late", requires=[Ore], uses=[Coal], provides=[Iron],

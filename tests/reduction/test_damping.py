@@ -83,9 +83,3 @@ def test_rayleigh_coefficients_are_taken_as_authored(law):
     assert np.array_equal(one.damping, other.damping)
     assert np.allclose(one.damping, np.diag(0.3 + (0.0 if law else 1e-4) * OMEGA**2))
     assert law is None or one.elasticity.retardation == 1e-4
-
-
-def test_a_body_without_modes_has_no_damping():
-    none = replace(body("stvk"), stiffness=np.zeros(0))
-    found = damped(none, MATERIAL, np.array([3.0]), np.zeros((0, 1)))
-    assert found.damping.shape == (0, 0) and found.elasticity.retardation == 0.0

@@ -3,11 +3,10 @@
 from typing import ClassVar
 
 import numba
-import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.support import compilation, interrupts
-from calmotion.support.compilation import kernel, kernel_folder, kernel_key
+from calmotion.support.compilation import kernel, kernel_key
 from calmotion.support.numba_internals import with_entrance_for_python
 
 
@@ -42,28 +41,10 @@ def test_the_key_changes_with_the_compiler(package, monkeypatch, module):
     assert kernel_key(package) != before
 
 
-def test_the_key_changes_with_the_optimisation_level(package, monkeypatch):
-    before = kernel_key(package)
-    monkeypatch.setattr(numba.config, "OPT", 3)
-    assert kernel_key(package) != before
-
-
 def test_where_numba_is_told_not_to_compile_the_variable_is_named(monkeypatch):
     monkeypatch.setattr(numba.config, "DISABLE_JIT", 1)
     with pytest.raises(ShotError, match="NUMBA_DISABLE_JIT"):
         kernel(lambda x: x)
-
-
-def test_kernels_are_kept_under_the_key():
-    assert kernel_key(compilation.PACKAGE).startswith(kernel_folder().name)
-
-
-def test_a_kernel_computes():
-    @kernel
-    def doubled(x):
-        return 2.0 * x
-
-    assert doubled(np.float64(1.5)) == 3.0
 
 
 def test_an_interrupt_waits_until_a_kernel_is_loaded():

@@ -102,14 +102,6 @@ def test_a_kernel_in_the_place_of_another_one_is_compiled_again(tmp_path, run):
     assert run() == (1, "4.0\n")
 
 
-def test_a_link_to_itself_in_the_place_of_a_file_stops_nobody(run, tmp_path):
-    assert run() == (0, "")
-    for path in (tmp_path / "cache").rglob("*.nb?"):
-        path.unlink()
-        path.symlink_to(path.name)
-    assert run()[0] == 0 and run()[0] == 1
-
-
 def test_processes_that_save_at_once_lose_nothing(make, tmp_path):
     code = (
         "import sys\n"

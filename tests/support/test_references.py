@@ -100,10 +100,3 @@ def test_a_changed_copy_has_members_of_its_own():
     longer = outer._replace(length=1.25, inner=Inner(np.ones(8), 0.5))
     assert type(longer) is type(outer)
     assert _read(longer, 0) == before + 1.0 + 2.0 and _read(outer, 0) == before
-
-
-def test_types_are_compiled_apart():
-    first = make(np.ones((3, 2)))
-    single = first._replace(numbers=np.arange(3, dtype=np.int64))
-    assert _read(first, 0) == _read(single, 0)
-    assert len(_read.signatures) >= 2

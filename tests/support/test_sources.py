@@ -1,7 +1,7 @@
 """Hashes of sources: they change with every module that is imported, directly or not."""
 
 import pytest
-from calmotion.support.sources import PACKAGE, digest_of, source_digest, with_imports
+from calmotion.support.sources import digest_of, with_imports
 
 
 @pytest.fixture
@@ -27,12 +27,3 @@ def test_a_hash_changes_with_content_and_name(package):
     assert one != digest_of([package / "d.py"])
     (package / "c.py").write_text("X = 2\n")
     assert one != digest_of([package / "c.py"])
-
-
-def test_rooms_have_hashes_of_their_own():
-    assert source_digest("multibody") != source_digest("retargeting") != source_digest("multibody", "retargeting")
-
-
-def test_a_kernel_brings_the_constants_that_it_imports():
-    found = {path.relative_to(PACKAGE).as_posix() for path in with_imports([PACKAGE / "multibody/kernels/assembly.py"])}
-    assert "multibody/kernels/joints.py" in found and "support/compilation.py" in found

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from calmotion.mesh.grids.boundary_fit import fitted
 from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles
-from calmotion.mesh.tetrahedra import boundary_triangles, surface_volume, tet_volumes
+from calmotion.mesh.tetrahedra import surface_volume, tet_volumes
 from round_bars import LENGTH, RADIUS, bar_surface, coarse_bar
 
 
@@ -22,17 +22,3 @@ def test_a_coarse_round_bar_has_the_volume_and_the_second_moment_of_a_fine_one(h
     assert tet_volumes(found, tets).min() > 0.0
     assert tet_volumes(found, tets).sum() == pytest.approx(volume, rel=2e-3)
     assert second_moment(found, tets) == pytest.approx(moment, rel=5e-3)
-
-
-def test_a_box_stays_as_it_is(helpers):
-    points, tets = helpers.box((5, 2, 2), (0.3, 0.04, 0.04))
-    corners, bricks = helpers.box((1, 1, 1), (0.3, 0.04, 0.04))
-    found = fitted(np.asarray(points), tets, NearbyTriangles(np.asarray(corners), boundary_triangles(bricks), 0.01))
-    assert np.abs(found - points).max() < 1e-12
-
-
-def test_no_corner_moves_farther_than_the_limit(helpers):
-    (points, tets), surface = coarse_bar(helpers), bar_surface()
-    limit = 0.02 * RADIUS
-    moved = np.linalg.norm(fitted(points, tets, NearbyTriangles(*surface, limit)) - points, axis=1)
-    assert 0.0 < moved.max() <= limit * (1.0 + 1e-12)

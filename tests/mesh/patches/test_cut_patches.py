@@ -76,13 +76,6 @@ def test_frequencies_hardly_depend_on_where_the_elements_are(helpers, beam, fram
     assert abs(whole[1] / whole[0] - 1.0) > 0.02 and along[1] == pytest.approx(along[0], rel=0.006)
 
 
-def test_a_body_without_joints_is_not_cut(helpers, beam):
-    points, tets = helpers.box((4, 1, 1), SIZE)
-    target = [AttachmentFrame("/Arm/tip", helpers.frame(0.3, 0.01, 0.01), "point")]
-    found, split, rims = with_rims(np.asarray(points), tets, beam, target)
-    assert np.array_equal(found, points) and split is tets and rims == ()
-
-
 def test_patches_that_would_meet_keep_their_parts_when_elements_are_refined(helpers, plastic):
     """The spheres about two joints overlap; each holds what is nearer to it, on any elements."""
     size, at = (0.06, 0.06, 0.005), ((-0.01, 0.0, 0.025), (0.01, 0.0, 0.025))

@@ -132,12 +132,6 @@ def test_the_patch_of_a_bore_is_a_band_of_its_wall(helpers, attachment):
         assert (ring.nodes[patch.nodes][:, :2] @ direction).max() >= 0.025 - 1e-12
 
 
-def test_points_on_a_line_span_no_plane():
-    line = np.outer(np.arange(4.0), [1, 2, 3])
-    assert not spans_a_plane(line) and not spans_a_plane(line[:2])
-    assert spans_a_plane(np.vstack([line, [[1.0, 0, 0], [0, 4, 0]]]))
-
-
 @pytest.mark.parametrize("pin", [0.25, 0.5])
 def test_a_casting_is_not_held_by_a_detail_that_the_frame_of_its_joint_touches(pin, attachment, helpers):
     """A pin of half a millimetre across on 756 cm^3: it was held by 1.25 mm of it."""

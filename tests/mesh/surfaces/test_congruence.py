@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import trimesh
 from calmotion.mesh.surfaces.congruence import isometries, near_isometries
 from mesher_links import bracket, divided
 
@@ -39,16 +38,6 @@ def test_parts_that_differ_have_none():
     bent = points.copy()
     bent[np.argmax(points[:, 0]), 1] += 2e-5
     assert isometries(points, triangles, bent, triangles) == []
-
-
-def test_a_box_has_eight_and_the_first_is_no_turn():
-    box = trimesh.creation.box((0.1, 0.03, 0.02))
-    points, triangles = np.array(box.vertices), np.array(box.faces)
-    found = isometries(points, triangles, points + 1.0, triangles)
-    assert len(found) == 8 and np.array_equal(found[0].turn, np.eye(3))
-    assert [kept.mirrors for kept in found] == [False] * 4 + [True] * 4
-    cube = np.array(trimesh.creation.box((0.1, 0.1, 0.1)).vertices)
-    assert len(isometries(cube, triangles, cube + 1.0, triangles)) == 1
 
 
 @pytest.mark.parametrize("turn", [np.eye(3), turned(), turned() @ MIRROR])

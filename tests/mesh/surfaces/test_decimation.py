@@ -59,9 +59,3 @@ def test_solids_that_touch_along_an_edge_stay_closed():
     repeated = np.unique(ends, axis=0, return_counts=True)[1]
     assert (repeated % 2 == 0).all() and (repeated == 4).sum() == 4
     assert surface_volume(points, triangles) == pytest.approx(2e-3, rel=1e-9)
-
-
-def test_what_has_few_triangles_stays_as_it_is():
-    box = trimesh.creation.box((0.1, 0.04, 0.02))
-    points, triangles = decimated(box.vertices, box.faces, 12, 1e-2)
-    assert points == pytest.approx(box.vertices, abs=1e-15) and np.array_equal(triangles, box.faces)

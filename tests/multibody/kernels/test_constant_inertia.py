@@ -9,7 +9,6 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels import constant_inertia
 from calmotion.multibody.kernels.components import ComponentMotion
 from calmotion.multibody.kernels.work import allocate_work
-from calmotion.multibody.model.model import rigid_model
 from gantries import ASIDE, STILL, UP, drive, gantry
 from particles import by_particles, component_of, particle_system
 
@@ -116,17 +115,3 @@ def test_the_error_on_flexible_parents_is_of_second_order(beams):
     orders = np.log2(np.array(lost[:-1]) / lost[1:])
     assert np.all(orders > 1.9), (orders, lost)
     assert lost[0][0] < 1e-3, "[m], of a deflection of 0.2 m"
-
-
-def test_a_rotating_body_that_is_marked_as_non_rotating_moves_differently():
-    exact, told = (run(gantry([STILL], non_rotating, hinged=True), 1.0)[0] for non_rotating in ((), ALL))
-    assert np.abs(told.u - exact.u).max() > 0.01 * np.abs(exact.u).max()
-
-
-def test_non_rotating_bodies_stay_marked_when_they_become_rigid():
-    model = gantry([STILL], ALL[:3])
-    for system in (model.system, rigid_model(model).system):
-        assert list(system.nonrotating) == [0, 1, 2] and list(system.rotating) == [3]
-        assert not len(system.stvk) and not len(system.neohookean)
-    states = run(rigid_model(model), 0.2)[0]
-    assert not states.u.size and np.abs(states.q[:, :, 1:]).max() < 1e-15

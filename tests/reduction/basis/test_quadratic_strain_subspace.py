@@ -90,12 +90,3 @@ def test_simplifications_are_reported(plastic):
     row = body.left_out[-1]
     assert row.what == f"/C/Link: quadratic strain in {p} of {r} elastic coordinates"
     assert 0.0 < row.estimated_error_m <= 2.5e-5
-
-
-def test_all_pairs_can_be_kept(plastic):
-    body = link(plastic, 1e-4, loads(30.0), pairs_share=0.0)
-    assert body.elasticity.strain_projection is None and not any("quadratic" in row.what for row in body.left_out)
-
-
-def test_without_loads_the_strain_subspace_is_the_whole_space(plastic):
-    assert link(plastic, 1e-4, None).elasticity.strain_projection is None

@@ -1,31 +1,11 @@
 """Unit accelerations, and their peaks."""
 
 import numpy as np
-from calmotion.reduction.basis.static_loads import peak_loads, unit_accelerations
 from calmotion.reduction.load_envelope import LoadEnvelope, load_direction_envelope, patch_load_envelope
 
 
 def an_excitation(rng, rows=2):
     return LoadEnvelope(*rng.random((3, 3)), rng.random((rows, 3)), rng.random((rows, 3)), 7.0, rng.random(rows))
-
-
-def test_unit_accelerations_make_up_the_acceleration_of_any_rigid_motion():
-    rng = np.random.default_rng(0)
-    nodes, (a, alpha, w) = rng.normal(size=(20, 3)), rng.normal(size=(3, 3))
-    products = [w[0] ** 2, w[1] ** 2, w[2] ** 2, w[1] * w[2], w[0] * w[2], w[0] * w[1]]
-    field = unit_accelerations(nodes) @ np.concatenate([a, alpha, products])
-    expected = a + np.cross(alpha, nodes) + np.cross(w, np.cross(w, nodes))
-    assert np.allclose(field, expected, rtol=0, atol=1e-13)
-
-
-def test_peaks_are_in_the_order_of_the_accelerations_then_wrench_by_wrench():
-    item = an_excitation(np.random.default_rng(1))
-    peaks = peak_loads(item)
-    w = item.angular_velocity
-    assert np.allclose(peaks[:6], np.concatenate([item.acceleration, item.angular_acceleration]))
-    assert np.allclose(peaks[6:12], [w[0] ** 2, w[1] ** 2, w[2] ** 2, w[1] * w[2], w[0] * w[2], w[0] * w[1]])
-    assert np.allclose(peaks[12:18], np.concatenate([item.force[0], item.moment[0]]))
-    assert np.allclose(peaks[18:], np.concatenate([item.force[1], item.moment[1]]))
 
 
 def test_wrenches_of_a_patch_bound_those_of_its_interfaces_together():

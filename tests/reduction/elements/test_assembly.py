@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from boxes import quadratic_shapes
-from calmotion.mesh.quadratic import quadratic_mesh, quadratic_nodes
-from calmotion.mesh.tetrahedra import surface_area
 from calmotion.reduction.elements.assembly import assemble
 
 
@@ -29,20 +27,6 @@ def test_nodes_are_corners_then_midpoints_of_edges(block):
         assert np.allclose(nodes[ten[:, middle]], 0.5 * (nodes[ten[:, i]] + nodes[ten[:, j]]), atol=1e-15)
 
 
-def test_nodes_are_counted_without_making_them(block):
-    points, tets, model = block
-    assert quadratic_nodes(points, tets) == len(model.mesh.nodes)
-
-
-def test_surface_triangles_carry_their_own_midpoints(block):
-    _, _, model = block
-    nodes, surface = model.mesh.nodes, model.mesh.surface
-    for middle, (i, j) in zip((3, 4, 5), ((0, 1), (1, 2), (2, 0)), strict=True):
-        assert np.allclose(nodes[surface[:, middle]], 0.5 * (nodes[surface[:, i]] + nodes[surface[:, j]]), atol=1e-15)
-    fine = np.vstack([surface[:, [0, 3, 5]], surface[:, [3, 1, 4]], surface[:, [5, 4, 2]], surface[:, [3, 4, 5]]])
-    assert surface_area(nodes, fine) == pytest.approx(surface_area(nodes, surface[:, :3]), rel=1e-13)
-
-
 def test_the_mass_matrix_equals_independent_quadrature(block, helpers, steel):
     points, tets, model = block
     bary, weights = helpers.quadrature(points, tets, order=5)
@@ -60,10 +44,6 @@ def test_rigid_motions_store_no_energy(block):
     for axis in np.eye(3):
         for field in (np.tile(axis, (len(nodes), 1)), np.cross(axis, nodes)):
             assert np.abs(K @ field.ravel()).max() < 1e-12 * abs(K).max() * np.abs(field).max()
-
-
-def test_the_stiffness_is_symmetric_to_the_last_bit(block):
-    assert abs(block[2].stiffness - block[2].stiffness.T).max() == 0.0
 
 
 @pytest.mark.parametrize("component", range(3))
@@ -88,9 +68,3 @@ def test_a_given_mass_scales_the_density(helpers, steel):
     assert given.mass.sum() == pytest.approx(3.0, rel=1e-13)
     assert abs(given.mass - own.mass * (3.0 / 0.008)).max() < 1e-12
     assert abs(given.stiffness - own.stiffness).max() == 0.0
-
-
-def test_the_nodes_of_a_mesh_without_shared_edges_are_not_merged(helpers):
-    points, tets = helpers.box((1, 1, 1), (1, 1, 1))
-    mesh = quadratic_mesh(np.vstack([points, points + 5.0]), np.vstack([tets, tets + len(points)]).astype(np.int32))
-    assert len(mesh.nodes) == 2 * 27 and len(mesh.surface_nodes) == 2 * 26

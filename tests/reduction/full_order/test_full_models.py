@@ -58,16 +58,6 @@ def test_what_decides_a_model_tells_links_apart(member, helpers, plastic):
     assert len({own.key for own in (member, *others)}) == 1 + len(others)
 
 
-def test_a_model_is_kept_until_the_last_link_has_it(member):
-    models, other = FullModels(keeps=False), with_flexible(member, interface_radius=0.01)
-    models.expect([member, alike(member), other])
-    first = models.of(member)
-    assert models.known(alike(member)) is first
-    assert models.of(alike(member)) is first and models.known(member) is None
-    models.of(other)
-    assert models.known(other) is None, "it has no other link"
-
-
 def test_threads_that_need_one_model_make_it_once(member, monkeypatch):
     from calmotion.reduction import reduce
 

@@ -96,11 +96,6 @@ def test_a_symbolic_link_is_removed_and_what_it_names_is_not(folder, tmp_path_fa
     assert (precious / "file").read_text() == "precious"
 
 
-def test_a_cache_that_does_not_exist_is_empty():
-    for cache in CACHES:
-        assert entries(cache) == prune(cache) == clear(cache) == []
-
-
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners there")
 @pytest.mark.parametrize("foreign", ["writable by a group", "writable by all", "of another user"])
 def test_what_another_user_can_write_is_not_read_and_made_again_without_a_word(folder, caplog, monkeypatch, foreign):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from calmotion.model import Motion
 from calmotion.usd.writing.motions import simulated_motion
 
@@ -26,8 +25,3 @@ def test_frames_are_picked_out_of_the_steps_without_the_pre_roll():
 def test_an_interrupted_run_gives_the_frames_it_reached():
     found = simulated_motion(motion(np.arange(100) / 480.0), np.arange(25) / 24.0)
     assert len(found.times) == 5
-
-
-def test_frames_that_are_not_steps_are_an_internal_error():
-    with pytest.raises(ValueError, match="not steps"):
-        simulated_motion(motion(np.arange(100) / 100.0), np.arange(20) / 24.0)

@@ -9,7 +9,7 @@ import pytest
 from calmotion import ShotError
 from calmotion.usd import stages
 from calmotion.usd.reading import read_shot
-from calmotion.usd.writing.root import keeps_earlier_curves, relative_asset, root_path, shot_layers, write_root
+from calmotion.usd.writing.root import keeps_earlier_curves, root_path, shot_layers, write_root
 from pxr import Sdf, Usd
 from small_shots import SHOULDER, TARGET_POSITION, write_arm
 
@@ -92,8 +92,3 @@ def test_a_root_that_does_not_compose_is_not_left_behind(tmp_path):
     with pytest.raises(ShotError):
         write_root(str(tmp_path / "never_written.usda"), provenance, stages.CURVES)
     assert names(tmp_path.iterdir()) == ["arm.usda"]
-
-
-def test_assets_are_relative_with_a_leading_dot(tmp_path):
-    assert relative_asset(str(tmp_path / "a.usda"), str(tmp_path)) == "./a.usda"
-    assert relative_asset(str(tmp_path / "a.usda"), str(tmp_path / "b")) == "../a.usda"
