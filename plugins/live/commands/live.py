@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from ..session import Live
 
 EXAMPLES = (
-    ("calmotion live robot.usda --rate 250 --lookahead 120 < samples.jsonl > commands.jsonl", "JSON lines"),
+    ("calmotion live robot.usda --rate 250 --lookahead 120", "JSON lines in and out"),
     ("calmotion live robot.usda --in osc://127.0.0.1:9000 --out osc://127.0.0.1:9001", "faders over OSC"),
-    ("calmotion live robot.usda --replay calm.usda > commands.jsonl", "play the motion of a shot as a stream"),
+    ("calmotion live robot.usda --replay calm_root.usda", "play the motion of a shot as a stream"),
 )
 
 
