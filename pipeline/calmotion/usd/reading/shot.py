@@ -35,6 +35,7 @@ from calmotion.usd.reading.plausibility.motions import motion_doubts
 from calmotion.usd.reading.provenance import notes_of_results, provenance_of
 from calmotion.usd.reading.targets import weight_tracks
 from calmotion.usd.reading.unread import misplaced_schemas, unread_attributes
+from calmotion.usd.reading.variants import naming_variants, physics_elsewhere
 from calmotion.usd.reading.well_formed import broken_transforms, wrong_types
 from calmotion.usd.units import other_units, units_of
 
@@ -115,7 +116,7 @@ def read_stage(
     Args:
         whole: The stage with all of its prims, of which `stage` is a part; None: it is whole.
     """
-    with stages.refused_by_usd(stage):
+    with stages.refused_by_usd(stage), naming_variants(whole or stage):
         raise_all(list(wrong_types(stage)))
         raise_all(list(broken_transforms(stage)))
         animated = hold_constants(stage)
@@ -133,6 +134,8 @@ def read_stage(
         _note_dense_samples(tracks, clock, reading)
         character = build_character(reading, skeleton)
         notes = (*character.notes, *motion_doubts(character, tracks))
+        if not character.motors and (chosen := physics_elsewhere(whole or stage)):
+            notes += (f"another variant has more physics. {chosen}",)
         return StageReading(reading, clock, skeleton, dataclasses.replace(character, notes=notes), tracks, moving)
 
 

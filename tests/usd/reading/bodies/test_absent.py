@@ -56,14 +56,3 @@ def test_bodies_that_are_switched_off_are_named_with_their_attribute(tmp_path):
         FORE,
         BASE,
     )
-
-
-def test_variants_without_physics_are_named(tmp_path):
-    physics = f'"On" {{\n            def Xform "Link" {BODY}\n            {{\n            }}\n        }}'
-    text = (
-        'def Xform "Robot" (\n    variants = {\n        string Physics = "Off"\n    }\n'
-        '    prepend variantSets = "Physics"\n)\n'
-        f'{{\n    variantSet "Physics" = {{\n        "Off" {{\n        }}\n        {physics}\n    }}\n}}\n'
-    )
-    error = refused(written(tmp_path, text))
-    assert "/Robot with Physics = Off of Off, On" in error.found and error.remedy.startswith("Select the variant")

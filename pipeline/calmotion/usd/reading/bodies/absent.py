@@ -31,11 +31,8 @@ def no_bodies(stage: Usd.Stage) -> ShotError:
         found = _reason(prim)
         if found:
             return ShotError(_PROBLEM, path=str(prim.GetPath()), attribute=found[0], found=found[1], remedy=found[2])
-    choices = _choices(stage)
-    remedy = "apply PhysicsRigidBodyAPI to the moving parts of the character"
-    if choices:
-        return ShotError(_PROBLEM, path=file, found=choices, remedy=f"Select the variant with physics, or {remedy}")
-    return ShotError(_PROBLEM, path=file, remedy=f"A{remedy[1:]}")
+    remedy = "Apply PhysicsRigidBodyAPI to the moving parts of the character"
+    return ShotError(_PROBLEM, path=file, remedy=remedy)
 
 
 def _reason(prim: Usd.Prim) -> tuple[str, str, str] | None:
@@ -52,15 +49,3 @@ def _reason(prim: Usd.Prim) -> tuple[str, str, str] | None:
     if is_applied(prim, RIGID_BODY):
         return "physics:rigidBodyEnabled", "False", "Set it to true, or remove it"
     return None
-
-
-def _choices(stage: Usd.Stage) -> str:
-    """The variants that the stage selects, as text; a robot may have its physics in another one."""
-    texts = []
-    for prim in prims_of(stage):
-        variants = prim.GetVariantSets()
-        for name in variants.GetNames():
-            chosen, others = variants.GetVariantSelection(name), variants.GetVariantSet(name).GetVariantNames()
-            if len(others) > 1 or not chosen:
-                texts.append(f"{prim.GetPath()} with {name} = {chosen or 'none'} of {', '.join(others)}")
-    return "; ".join(texts[:3])

@@ -1,0 +1,113 @@
+"""Physics in a variant that a stage does not select: robots come with and without it, or for several engines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from calmotion.errors import ShotError, each, raise_all
+from calmotion.usd.diagnostics import quiet
+from calmotion.usd.reading.context import RIGID_BODY, prims_of
+
+if TYPE_CHECKING:
+    from pxr import Sdf, Usd
+
+_MOST_TRIED = 16  # variants that are composed, one after the other
+_DRIVE = "PhysicsDriveAPI"
+
+
+def physics_elsewhere(stage: Usd.Stage) -> str:
+    """Which variant to select for more bodies, joints or drives than the stage has, as an imperative; empty where no
+    other variant has more."""
+    from pxr import Sdf, Usd
+
+    others = _others(stage)
+    if not others:
+        return ""
+    choices, here, found = Sdf.Layer.CreateAnonymous(), _physics(stage), {}
+    with quiet():
+        probe = Usd.Stage.Open(stage.GetRootLayer(), choices, Usd.Stage.LoadAll)
+        probe.SetEditTarget(choices)
+        for path, name, variant in others[:_MOST_TRIED]:
+            choices.Clear()
+            probe.GetPrimAtPath(path).GetVariantSet(name).SetVariantSelection(variant)
+            found[path, name, variant] = _physics(probe) - here
+    path, name, variant = max(found, key=found.__getitem__)
+    more = found[path, name, variant]
+    if more <= 0:
+        return ""
+    return (
+        f'Author variants = {{ string {name} = "{variant}" }} on {path}: it has {more} more bodies, joints and drives'
+    )
+
+
+@contextmanager
+def naming_variants(stage: Usd.Stage) -> Iterator[None]:
+    """Add to the remedies of errors which variant to select, where another one has more physics.
+
+    Raises:
+        ShotError: Those of the block.
+    """
+    try:
+        yield
+    except ShotError as error:
+        chosen = physics_elsewhere(stage)
+        if not chosen:
+            raise
+        raise_all(
+            [
+                ShotError(
+                    one.problem, path=one.path, attribute=one.attribute, found=one.found,
+                    remedy=f"{chosen}; or {one.remedy[:1].lower()}{one.remedy[1:]}",
+                )
+                for one in each(error)
+            ]
+        )  # fmt: skip
+
+
+def _others(stage: Usd.Stage) -> list[tuple[Sdf.Path, str, str]]:
+    """Prim, set and name of the variants that are not selected, and may bring physics."""
+    found = []
+    for prim in prims_of(stage):
+        if not prim.HasVariantSets() or prim.IsInstanceProxy():
+            continue
+        sets = prim.GetVariantSets()
+        for name in sets.GetNames():
+            chosen = sets.GetVariantSelection(name)
+            brings = _bringing(prim, name)
+            found += [(prim.GetPath(), name, other) for other in brings if other != chosen]
+    return found
+
+
+def _bringing(prim: Usd.Prim, name: str) -> list[str]:
+    """The variants of a set that have physics, or refer to other files or prims."""
+    found: dict[str, None] = {}
+    for spec in prim.GetPrimStack():
+        variants = spec.variantSets.get(name)
+        for variant in variants.variants.values() if variants else ():
+            if _may_have_physics(variant.primSpec):
+                found[variant.name] = None
+    return list(found)
+
+
+def _may_have_physics(spec: Sdf.PrimSpec) -> bool:
+    schemas = spec.GetInfo("apiSchemas").GetAddedOrExplicitItems() if spec.HasInfo("apiSchemas") else ()
+    return (
+        spec.hasReferences
+        or spec.hasPayloads
+        or spec.typeName.startswith("Physics")
+        or any(str(name).startswith("Physics") for name in schemas)
+        or any(_may_have_physics(child) for child in spec.nameChildren)
+    )
+
+
+def _physics(stage: Usd.Stage) -> int:
+    """How many bodies, joints and drives a stage has."""
+    count = 0
+    for prim in prims_of(stage):
+        applied = prim.GetAppliedSchemas()
+        count += RIGID_BODY in applied
+        count += prim.GetTypeName().startswith("Physics") and prim.GetTypeName().endswith("Joint")
+        count += any(name.startswith(_DRIVE) for name in applied)
+    return count
