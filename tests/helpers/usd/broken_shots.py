@@ -207,6 +207,8 @@ CASES: dict[str, Case] = {
     "an infinite mass": edited(number(FORE, "physics:mass", INF), FORE, "physics:mass"),
     "a mass of a wrong type": edited(attribute(FORE, "physics:mass", "String", "heavy"), FORE, "physics:mass"),
     "a negative inertia": edited(vector(FORE, "physics:diagonalInertia", -1, 1, 1), FORE, "physics:diagonalInertia"),
+    "an inertia of zero about an axis": edited(vector(FORE, "physics:diagonalInertia", 1, 0, 1), FORE, "Inertia"),
+    "a negative density": edited(number(f"{UPPER}/box", "physics:density", -2.0), f"{UPPER}/box", "physics:density"),
     "an inertia that is no number": edited(vector(FORE, "physics:diagonalInertia", NAN, 1, 1), FORE, "Inertia"),
     "a transform that is no number": edited(transform(FORE, Gf.Matrix4d(NAN)), FORE),
     "an infinite transform": edited(transform(FORE, Gf.Matrix4d(1).SetTranslate(Gf.Vec3d(INF, 0, 0))), FORE),
@@ -237,9 +239,9 @@ CASES: dict[str, Case] = {
     "an animation without a drive": edited(
         lambda s: s.GetPrimAtPath(ELBOW).RemoveAppliedSchema("PhysicsDriveAPI:angular"), ELBOW, TARGET_POSITION
     ),
-    "a sample that is no number": edited(sample(SHOULDER, NAN), SHOULDER, TARGET_POSITION),
+    "a sample that is no number": edited(sample(SHOULDER, NAN), SHOULDER, TARGET_POSITION, "time code"),
     "an infinite sample": edited(sample(SHOULDER, INF), SHOULDER, TARGET_POSITION),
-    "a sample that is blocked": edited(sample(SHOULDER, Sdf.ValueBlock()), SHOULDER, TARGET_POSITION),
+    "a sample that is blocked": edited(sample(SHOULDER, Sdf.ValueBlock()), SHOULDER, "a block at time code"),
     "a track of a wrong type": edited(attribute(SHOULDER, TARGET_POSITION, "String", "up"), SHOULDER, TARGET_POSITION),
     "half turns between frames": edited(half_turns, SHOULDER, TARGET_POSITION),
     "more samples than anybody means": too_many_samples(1_100_000),
@@ -253,10 +255,17 @@ CASES: dict[str, Case] = {
     "a joint of a skeleton that is not there": edited(skel_joint, ELBOW, "calm:motor:skelJoint"),
     # targets and settings
     "a target on no body": edited(applied("/Arm", "CalmTargetAPI"), "/Arm"),
+    "a target without a transform": edited(
+        both(lambda s: s.DefinePrim(f"{FORE}/part", "Scope"), applied(f"{FORE}/part", "CalmTargetAPI")), f"{FORE}/part"
+    ),
     "a target without weight": edited(target(positionWeight=0.0), HAND, "calm:target:positionWeight"),
     "a negative weight": edited(target(positionWeight=-1.0), HAND, "calm:target:positionWeight"),
     "a weight that is no number": edited(target(rotationWeight=NAN), HAND, "calm:target:rotationWeight"),
     "a negative tolerance": edited(retarget("tolerance", "Float", -5.0), "/Arm", "calm:retarget:tolerance"),
+    "knots apart by no number": edited(retarget("knotSpacing", "Float", NAN), "/Arm", "calm:retarget:knotSpacing"),
+    "a negative smoothness": edited(retarget("smoothness", "Float", -3.0), "/Arm", "calm:retarget:smoothness"),
+    "a negative uncertainty": edited(retarget("uncertainty:payload", "Float", -0.5), "/Arm", "uncertainty:payload"),
+    "an infinite uncertainty": edited(retarget("uncertainty:modulus", "Float", INF), "/Arm", "uncertainty:modulus"),
     "a step that is no number": edited(retarget("timeStep", "Float", NAN), "/Arm", "calm:retarget:timeStep"),
     "a reference that is none": edited(retarget("reference", "Token", "soft"), "/Arm", "calm:retarget:reference"),
     "a loop that does not close": edited(
@@ -265,6 +274,11 @@ CASES: dict[str, Case] = {
     # flexible bodies
     "no elastic material": edited(applied(FORE, "CalmFlexibleBodyAPI"), FORE, "material:binding:physics"),
     "a negative stiffness": edited(material(youngsModulus=-1.0), PLASTIC, "physics:youngsModulus"),
+    "a ratio that is no number": edited(material(poissonsRatio=NAN), PLASTIC, "physics:poissonsRatio"),
+    "elements of no size": edited(flexible(number(FORE, "calm:flexible:elementSize", 0.0)), FORE, "elementSize"),
+    "a negative radius": edited(flexible(number(FORE, "calm:flexible:interfaceRadius", -3.0)), FORE, "interfaceRadius"),
+    "a frequency that is no number": edited(flexible(number(FORE, "calm:flexible:maxFrequency", NAN)), FORE, "maxFreq"),
+    "a wall of no thickness": edited(flexible(number(FORE, "calm:flexible:wallThickness", 0.0)), FORE, "wallThickness"),
     "a stiffness of zero": edited(material(youngsModulus=0.0), PLASTIC, "physics:youngsModulus"),
     "an incompressible material": edited(material(poissonsRatio=0.5), PLASTIC, "physics:poissonsRatio"),
     "a density of zero": edited(material(density=0.0), PLASTIC, "physics:density"),

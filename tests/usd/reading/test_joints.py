@@ -176,42 +176,6 @@ def test_a_joint_that_locks_nothing_is_left_out(tmp_path):
     assert any("/Arm/joints/other: it leaves all directions free" in note for note in character.notes)
 
 
-def test_a_joint_with_both_ends_on_one_body_is_refused(tmp_path):
-    def edit(stage):
-        UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(ELBOW)).GetBody0Rel().SetTargets([FORE])
-
-    with pytest.raises(ShotError, match="same body") as caught:
-        read(tmp_path, edit)
-    assert caught.value.path == ELBOW
-
-
-def test_a_body_that_does_not_exist_is_refused(tmp_path):
-    def edit(stage):
-        UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(ELBOW)).GetBody0Rel().SetTargets(["/Arm/gone"])
-
-    with pytest.raises(ShotError, match="does not exist") as caught:
-        read(tmp_path, edit)
-    assert (caught.value.path, caught.value.attribute) == (ELBOW, "physics:body0")
-
-
-@pytest.mark.parametrize(
-    ("attribute", "value"),
-    [
-        ("physics:localPos0", Gf.Vec3f(float("nan"), 0, 0)),
-        ("physics:localRot1", Gf.Quatf(0, 0, 0, 0)),
-        ("physics:lowerLimit", float("nan")),
-    ],
-)
-def test_values_that_make_no_joint_are_refused(tmp_path, attribute, value):
-    def edit(stage):
-        UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(ELBOW)).CreateLocalRot1Attr()
-        stage.GetPrimAtPath(ELBOW).GetAttribute(attribute).Set(value)
-
-    with pytest.raises(ShotError) as caught:
-        read(tmp_path, edit)
-    assert (caught.value.path, caught.value.attribute) == (ELBOW, attribute)
-
-
 @pytest.mark.parametrize("locked", [(1.0, -1.0), (0.0, 0.0)])
 @pytest.mark.parametrize("freedom", ["rotX", "rotY", "rotZ"])
 def test_a_generic_joint_with_one_free_rotation_is_a_hinge(tmp_path, freedom, locked):

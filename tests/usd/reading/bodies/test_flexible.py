@@ -93,40 +93,6 @@ def test_a_mesh_file_is_found_beside_the_layer_that_names_it(tmp_path):
     assert settings.flexible.mesh_scale == pytest.approx(2.0)
 
 
-def test_a_missing_mesh_file_is_refused(tmp_path):
-    def edit(stage):
-        make_flexible(stage)
-        asset = stage.GetPrimAtPath(FORE).CreateAttribute("calm:flexible:meshFile", Sdf.ValueTypeNames.Asset)
-        asset.Set(Sdf.AssetPath("./gone.msh"))
-
-    with pytest.raises(ShotError, match=r"gone\.msh") as caught:
-        fore(tmp_path, edit)
-    assert (caught.value.path, caught.value.attribute) == (FORE, "calm:flexible:meshFile")
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("elementSize", 0.0), ("interfaceRadius", -3.0), ("maxFrequency", float("nan")), ("wallThickness", 0.0)],
-)
-def test_settings_out_of_range_are_refused(tmp_path, name, value):
-    def edit(stage):
-        make_flexible(stage)
-        set_float(stage, FORE, f"calm:flexible:{name}", value)
-
-    with pytest.raises(ShotError) as caught:
-        fore(tmp_path, edit)
-    assert caught.value.attribute == f"calm:flexible:{name}"
-
-
-def test_an_unknown_elasticity_is_refused_with_the_choices(tmp_path):
-    def edit(stage):
-        make_flexible(stage)
-        stage.GetPrimAtPath(FORE).CreateAttribute("calm:flexible:elasticity", Sdf.ValueTypeNames.Token).Set("rubber")
-
-    with pytest.raises(ShotError, match="neohookean"):
-        fore(tmp_path, edit)
-
-
 def test_the_source_of_the_geometry_is_read_and_a_wrong_one_refused(tmp_path):
     def asks(source):
         def edit(stage):

@@ -98,20 +98,6 @@ def test_holes_are_not_part_of_the_polygon(tmp_path):
     assert len(body(tmp_path, FORE, edit).surfaces[0].triangles) == 8
 
 
-def test_indices_that_do_not_fit_are_refused(tmp_path):
-    def wrong_count(stage):
-        UsdGeom.Mesh(stage.GetPrimAtPath(f"{FORE}/skin")).GetFaceVertexCountsAttr().Set([4] * 5)
-
-    def wrong_index(stage):
-        mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"{FORE}/skin"))
-        mesh.GetFaceVertexIndicesAttr().Set([99, *list(mesh.GetFaceVertexIndicesAttr().Get())[1:]])
-
-    for edit, attribute in ((wrong_count, "faceVertexCounts"), (wrong_index, "faceVertexIndices")):
-        with pytest.raises(ShotError) as caught:
-            body(tmp_path, FORE, edit)
-        assert caught.value.path == f"{FORE}/skin" and caught.value.attribute == attribute
-
-
 def test_dented_polygons_keep_their_volume_and_surface(tmp_path):
     """A channel section whose ends are polygons of eight corners."""
     ring = np.array([[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]]) * 0.01
