@@ -18,6 +18,7 @@ WHAT = {
     "optimizer": ("optimizer.optimizer", "Gauss-Newton and a quasi-Newton method"),
     "baselines": ("optimizer.baselines", "input shapers, a filter and the optimised curves"),
     "motor-commands": ("motors.commands", "optimised commands of servos, replayed in MuJoCo"),
+    "live": ("motors.live", "streams that are calmed while they are played, and input shapers"),
     "speed": ("speed.stages", "where the time of a run goes"),
     "scaling": ("speed.scaling", "growth of the run time; Exudyn, MuJoCo"),
 }

@@ -36,6 +36,7 @@ from calmotion.simulation.inputs.time_grid import TimeGrid as TimeGrid
 from calmotion.simulation.inputs.time_grid import over_grid as over_grid
 from calmotion.simulation.inputs.time_grid import pre_roll_weights as pre_roll_weights
 from calmotion.simulation.intended_motion import rigid_motion as rigid_motion
+from calmotion.simulation.intended_motion import static_motion as static_motion
 from calmotion.simulation.preparation import Prepared as Prepared
 from calmotion.simulation.preparation import failure_error as failure_error
 from calmotion.simulation.preparation import lowest_frequency as lowest_frequency
