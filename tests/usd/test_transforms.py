@@ -31,20 +31,6 @@ def test_a_pose_puts_its_matrix_together_again(scale):
     assert np.allclose(pose.matrix(), matrix, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("linear", "words"),
-    [
-        (np.array([[1, 0.3, 0], [0, 1, 0], [0, 0, 1.0]]), "shears"),
-        (np.diag([1.0, 0.0, 1.0]), "scale of zero"),
-        (np.full((3, 3), np.nan), "not finite"),
-    ],
-)
-def test_a_matrix_without_a_rigid_pose_is_refused(linear, words):
-    with pytest.raises(ShotError, match=words) as caught:
-        transforms.pose_from_matrix(affine(linear), "/sheared")
-    assert caught.value.path == "/sheared" and caught.value.remedy
-
-
 def test_local_points_are_where_the_pose_puts_them():
     pose = transforms.pose_from_matrix(affine(rotation(2) * 3.0), "/a")
     local = np.array([[0.1, 0.2, 0.3]])

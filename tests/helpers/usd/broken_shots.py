@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import posed_shots
 import small_shots as shots
-from pxr import Gf, Sdf, UsdPhysics, Vt
+from pxr import Gf, Sdf, UsdGeom, UsdPhysics, Vt
 from shot_edits import (
     SKIN,
     Edit,
@@ -23,10 +24,12 @@ from shot_edits import (
     attribute,
     both,
     close_samples,
+    connected,
     flexible,
     gear,
     gears_in_a_circle,
     half_turns,
+    kinematic,
     massless,
     material,
     mesh,
@@ -36,6 +39,7 @@ from shot_edits import (
     number,
     one_sample,
     retarget,
+    rotations,
     sample,
     second_motor,
     skel_joint,
@@ -48,6 +52,7 @@ from shot_edits import (
     unanimated,
     undriven,
     vector,
+    without_order,
 )
 from small_shots import BASE, ELBOW, FORE, HAND, PLASTIC, SHOULDER, TARGET_POSITION, UPPER
 
@@ -215,12 +220,19 @@ CASES: dict[str, Case] = {
     "a scale of zero": edited(transform(FORE, Gf.Matrix4d(0).SetScale(Gf.Vec3d(1, 0, 1))), FORE),
     "a transform that shears": edited(transform(FORE, SHEAR), FORE),
     "a root that is held and moves": edited(moving_root, BASE),
+    "a kinematic forearm": edited(kinematic(FORE), FORE, "physics:kinematicEnabled"),
+    "all bodies kinematic and animated": edited(
+        both(posed_shots.posed, kinematic(BASE, UPPER, FORE)), "physics:kinematicEnabled"
+    ),
+    "animated bodies without an order of operations": edited(without_order, UPPER, "xformOpOrder"),
     # joints
     "no joints": edited(lambda stage: stage.RemovePrim("/Arm/joints"), "/Arm"),
     "a joint between a body and itself": edited(targets(ELBOW, "physics:body0", FORE), ELBOW, "physics:body"),
     "a joint to a prim that is not there": edited(targets(ELBOW, "physics:body0", "/Arm/gone"), ELBOW, "physics:body0"),
     "a joint end on two bodies": edited(targets(ELBOW, "physics:body0", UPPER, BASE), ELBOW, "physics:body0"),
     "a joint to an attribute": edited(targets(ELBOW, "physics:body0", f"{UPPER}.physics:mass"), ELBOW, "physics:body0"),
+    "a joint on a material": edited(flexible(targets(ELBOW, "physics:body1", PLASTIC)), ELBOW, PLASTIC, "transform"),
+    "a joint on another joint": edited(targets(ELBOW, "physics:body1", SHOULDER), ELBOW, SHOULDER, "no transform"),
     "an axis that is none": edited(attribute(ELBOW, "physics:axis", "Token", "W"), ELBOW, "physics:axis"),
     "an axis of a wrong type": edited(attribute(ELBOW, "physics:axis", "Float", 1.0), ELBOW, "physics:axis"),
     "a rotation of length zero": edited(
@@ -253,6 +265,13 @@ CASES: dict[str, Case] = {
     "a gear to nothing": edited(gear("/Arm/joints/gone"), ELBOW, "newton:mimicJoint"),
     "gears in a circle": edited(gears_in_a_circle, "/Arm/joints"),
     "a joint of a skeleton that is not there": edited(skel_joint, ELBOW, "calm:motor:skelJoint"),
+    "a target position by a connection": edited(connected, ELBOW, "/Arm/control.angle", "connection"),
+    "a skeleton with too few rotations": edited(
+        rotations(lambda own: own[:1]), posed_shots.ANIMATION, "time code 5"
+    ),
+    "rotations of length two": edited(
+        rotations(lambda own: [2.0 * one for one in own]), posed_shots.ANIMATION, "unit length", "time code 5"
+    ),
     # targets and settings
     "a target on no body": edited(applied("/Arm", "CalmTargetAPI"), "/Arm"),
     "a target without a transform": edited(
@@ -300,6 +319,9 @@ CASES: dict[str, Case] = {
     "a mesh without points": edited(mesh("points", Vt.Vec3fArray()), SKIN),
     "tetrahedra of points that are not there": edited(tet_mesh(SQUARE, [(0, 1, 2, 9)]), f"{FORE}/tets"),
     "no tetrahedra": edited(tet_mesh(SQUARE, []), f"{FORE}/tets", "tetVertexIndices"),
+    "two meshes of tetrahedra": edited(
+        both(tet_mesh(SQUARE, [(0, 1, 2, 3)]), lambda s: UsdGeom.TetMesh.Define(s, f"{FORE}/more")), "one TetMesh"
+    ),
     "a flat tetrahedron": edited(tet_mesh([*SQUARE[:3], Gf.Vec3f(1, 1, 0)], [(0, 1, 2, 3)]), f"{FORE}/tets"),
     "a mesh file that is missing": edited(mesh_file("./gone.msh"), FORE, "calm:flexible:meshFile"),
     "a mesh file out of the folder": edited(mesh_file("../../../../../../etc/passwd"), FORE, "calm:flexible:meshFile"),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import posed_shots
 import small_shots as shots
-from pxr import Gf, Sdf, Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdSkel, Vt
 from small_shots import BASE, ELBOW, FORE, HAND, SHOULDER, TARGET_POSITION, UPPER, clear_mass, set_float
 
 Edit = Callable[[Usd.Stage], None]
@@ -181,3 +182,33 @@ def half_turns(stage: Usd.Stage) -> None:
 def close_samples(stage: Usd.Stage) -> None:
     attr = stage.GetPrimAtPath(SHOULDER).GetAttribute(TARGET_POSITION)
     attr.Set(float(attr.Get(12.0)) + 1e-4, 12.0 + 1e-10)
+
+
+def kinematic(*paths: str) -> Edit:
+    return lambda stage: [
+        UsdPhysics.RigidBodyAPI(stage.GetPrimAtPath(path)).CreateKinematicEnabledAttr(True) for path in paths
+    ]
+
+
+def without_order(stage: Usd.Stage) -> None:
+    posed_shots.posed(stage)
+    for path in (UPPER, FORE):
+        stage.GetPrimAtPath(path).RemoveProperty("xformOpOrder")
+
+
+def connected(stage: Usd.Stage) -> None:
+    source = stage.DefinePrim("/Arm/control").CreateAttribute("angle", Sdf.ValueTypeNames.Float)
+    own = stage.GetPrimAtPath(ELBOW).GetAttribute(TARGET_POSITION)
+    own.Clear()
+    own.SetConnections([source.GetPath()])
+
+
+def rotations(change: Callable[[list[Gf.Quatf]], list[Gf.Quatf]]) -> Edit:
+    """A skeleton of which the rotations at a frame are changed."""
+
+    def edit(stage: Usd.Stage) -> None:
+        posed_shots.skeletal(stage)
+        own = UsdSkel.Animation(stage.GetPrimAtPath(posed_shots.ANIMATION)).GetRotationsAttr()
+        own.Set(Vt.QuatfArray(change(list(own.Get(5)))), 5)
+
+    return edit

@@ -171,15 +171,6 @@ def test_tetrahedra_are_read_with_positive_volumes(tmp_path, scale):
     assert np.linalg.det(corners[1:] - corners[0]) == pytest.approx(0.006, rel=1e-5)
 
 
-def test_two_tet_meshes_on_a_body_are_refused(tmp_path):
-    def edit(stage):
-        tet_mesh(stage, f"{FORE}/one")
-        tet_mesh(stage, f"{FORE}/two")
-
-    with pytest.raises(ShotError, match="one TetMesh"):
-        body(tmp_path, FORE, edit)
-
-
 def test_a_body_of_guides_alone_is_shown_by_them(tmp_path):
     def edit(stage):
         UsdGeom.Imageable(stage.GetPrimAtPath(FORE)).CreatePurposeAttr("guide")

@@ -97,16 +97,3 @@ def test_a_second_drive_that_moves_nothing_is_told(tmp_path):
 
     character, _, _ = read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
     assert any(note.startswith(f"{ELBOW}: drive:linear:") and "not used" in note for note in character.notes)
-
-
-def test_an_animation_by_a_connection_is_refused(tmp_path):
-    def edit(stage):
-        source = stage.DefinePrim("/Arm/control").CreateAttribute("angle", Sdf.ValueTypeNames.Float)
-        source.Set(3.0, 0.0)
-        position = stage.GetPrimAtPath(ELBOW).GetAttribute("drive:angular:physics:targetPosition")
-        position.Clear()
-        position.SetConnections([source.GetPath()])
-
-    with pytest.raises(ShotError, match="connection") as error:
-        read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
-    assert error.value.path == ELBOW and "/Arm/control.angle" in error.value.found
