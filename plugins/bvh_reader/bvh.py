@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.support import refuse_lfs_pointers, refuse_special, too_large
+from calmotion.support import exact_step, refuse_lfs_pointers, refuse_special, too_large
 
 _EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
+_FRAME_TIME = "Frame Time:"
 _AXES = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
 
 
@@ -55,9 +56,10 @@ def read_bvh(path: str) -> BvhMotion:
         raise _wrong(path, len(lines), "there is no MOTION", lines[-1])
     channels = tuple(_channels(path, lines[1:motion]))
     count = _number(path, lines, motion + 1, "Frames:")
-    frame_time = _number(path, lines, motion + 2, "Frame Time:")
+    frame_time = _number(path, lines, motion + 2, _FRAME_TIME)
     if not frame_time > 0.0:
         raise _wrong(path, motion + 3, "the frame time must be positive", lines[motion + 2])
+    frame_time = exact_step(lines[motion + 2].strip()[len(_FRAME_TIME) :])
     rows = [row for row in enumerate(lines[motion + 3 :], motion + 4) if row[1].strip()]
     if len(rows) != int(count) or not rows:
         raise _wrong(

@@ -7,9 +7,9 @@ from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
 from calmotion.model import MotorTracks, Source
+from calmotion.support import TIME_UNITS
 
 SUFFIXES = (".csv", ".npz")
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # units of times
 
 
 class ReadTable(Operator):
@@ -22,7 +22,8 @@ class ReadTable(Operator):
     properties = (
         Property("angles", str, "auto", choices=("auto", "rad", "deg"),
                  description="Unit of angles; auto: as a header of the table says, else rad"),
-        Property("times", str, "s", choices=tuple(SECONDS), description="Unit of the times of a table"),
+        Property("times", str, "auto", choices=("auto", *TIME_UNITS),
+                 description="Unit of the times of a table; auto: as their column is named, else by their size"),
         Property("rate", float, 0.0, unit="Hz", minimum=0.0, maximum=1e5,
                  description="Rows a second of a table without time_s"),
         Property("joints", str, "",
@@ -45,7 +46,10 @@ class ReadTable(Operator):
         path, values = context.get(Source).motion, context.properties
         assert path is not None  # poll
         names = [name.strip() for name in values.joints.split(",")] if values.joints else []
-        tracks = read_motion(path, angles=values.angles, seconds=SECONDS[values.times], rate=values.rate, names=names)
+        motion = read_motion(path, angles=values.angles, times=values.times, rate=values.rate, names=names)
+        tracks = motion.tracks
+        for note in motion.notes:
+            context.report("info", note)
         context.report("info", f"{path}: {len(tracks.values)} joints, {tracks.times[-1]:.4g} s")
         last = len(tracks.times) - 1
         if values.rate > 0.0 and abs(tracks.times[-1] * values.rate - last) > 0.01 * last:

@@ -5,12 +5,24 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import MotorTracks
-from calmotion.support import available_memory, refuse_lfs_pointers, refuse_special, too_large
+from calmotion.support import (
+    TIME_UNITS,
+    TimeColumn,
+    available_memory,
+    counters,
+    exact_times,
+    names_times,
+    refuse_lfs_pointers,
+    refuse_special,
+    time_column,
+    too_large,
+)
 
 TIME = "time_s"
 _OUTPUTS = (".x", ".y", ".z", ".error", ".rotation_error", ".input", ".output", ".effort")
@@ -25,13 +37,21 @@ _EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
 _WITHOUT = "--set motion.read.rate=60Hz --set motion.read.joints=NAME,-,... with a name, or -, for each column"
 
 
-def read_motion(path: str, *, angles: str, seconds: float, rate: float, names: Sequence[str]) -> MotorTracks:
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The tracks of a table, and what its columns were taken for where their names do not say it."""
+
+    tracks: MotorTracks
+    notes: tuple[str, ...] = ()
+
+
+def read_motion(path: str, *, angles: str, times: str, rate: float, names: Sequence[str]) -> Motion:
     """The tracks of a table.
 
     Args:
         path: A .csv or .npz file.
         angles: `rad`, `deg`, or `auto`: as the table says.
-        seconds: Unit of the times of a table [s].
+        times: Unit of the times of a table, or `auto`: that of their name, else of their values.
         rate: Rows a second of a table without times [Hz]; 0 where it has them.
         names: Joints of the columns of a table without names; `-` leaves one out.
 
@@ -43,32 +63,60 @@ def read_motion(path: str, *, angles: str, seconds: float, rate: float, names: S
         refuse_lfs_pointers([path])
         if reason := too_large(path, _EXPANSION):
             raise OSError(0, f"it is too large for the memory: {reason}")
-        columns, degrees = (_npz if path.lower().endswith(".npz") else _csv)(path, names)
+        is_csv = not path.lower().endswith(".npz")
+        columns, degrees = _csv(path, names, not rate > 0.0) if is_csv else _npz(path, names)
     except (OSError, UnicodeDecodeError) as error:
         found = error.strerror if isinstance(error, OSError) else error
         remedy = "Name another file" if isinstance(error, OSError) else "Save the table as UTF-8"
         raise ShotError("the motion cannot be read", path=path, found=found, remedy=remedy) from error
-    times = columns.pop(TIME, None)
-    if times is None:
+    own, notes = _times(columns), []
+    for name in counters(columns):
+        if own is None or name not in own.names:
+            notes.append(f"{path}: the column {name or 'without a name'} numbers the rows, and is no joint")
+            columns.pop(name)
+    if own is None:
         if not rate > 0.0:
             remedy = f"{_REMEDY}; or use {_WITHOUT}"
             raise ShotError("the motion has no times", path=path, attribute=TIME, remedy=remedy)
-        times, seconds = np.arange(len(next(iter(columns.values()), np.zeros(0)))) / rate, 1.0
-    _refuse_bad(path, times, columns)
-    times = seconds * (times - times[0])
-    _refuse_long(path, times)
+        own = TimeColumn((TIME,), np.arange(len(next(iter(columns.values()), np.zeros(0)))) / rate, "s", True)
+    for name in own.names:
+        columns.pop(name, None)
+    unit = own.unit if times == "auto" else times
+    if own.names != (TIME,):
+        notes.append(f"{path}: its times are those of {' and '.join(own.names)}, in {_UNITS.get(unit, 'seconds')}")
+    _refuse_bad(path, own, columns)
+    seconds = exact_times(TIME_UNITS[unit] * (own.values - own.values[0]))
+    _refuse_long(path, own.names[0], seconds)
     scale = np.radians(1.0) if angles == "deg" or (angles == "auto" and degrees) else 1.0
-    return MotorTracks(path, times, {name: scale * values for name, values in columns.items()})
+    return Motion(MotorTracks(path, seconds, {name: scale * v for name, v in columns.items()}), tuple(notes))
 
 
-def _csv(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
-    """Columns by name, and whether angles are in degrees."""
+def _times(columns: dict[str, Array]) -> TimeColumn | None:
+    """The times of a table: `time_s`, or a column that is named like them."""
+    if TIME in columns:
+        return TimeColumn((TIME,), columns[TIME], "s", True)
+    found = time_column(columns)
+    if found is None and "" in columns and "" not in counters(columns):  # as pandas writes an index
+        found = time_column({"time": columns[""]})
+        return None if found is None else replace(found, names=("",))
+    return found
+
+
+def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array], bool]:
+    """Columns by name, and whether angles are in degrees.
+
+    Args:
+        timed: Whether a column of times counts where other names are given for all columns.
+    """
     with open(path, encoding="utf-8-sig", newline="") as stream:
         lines = [(n, line) for n, line in enumerate(stream.read().splitlines(), 1) if line.strip()]
     degrees = any(line.startswith("#") and _DEGREES.search(line) for _, line in lines)
+    comments = [line for _, line in lines if line.startswith("#")]
     lines = [(n, line) for n, line in lines if not line.startswith("#")]
     if not lines:
         raise ShotError("the motion is empty", path=path, remedy=_REMEDY)
+    if comments and _is_number(lines[0][1].split(",")[0]) and comments[-1].count(",") == lines[0][1].count(",") > 0:
+        lines.insert(0, (lines[0][0], comments[-1].lstrip("# ")))  # the head is a comment, as NumPy writes it
     try:
         rows = [next(csv.reader([line], strict=True)) for _, line in lines]  # no row goes on in the next line
     except csv.Error as error:
@@ -88,7 +136,8 @@ def _csv(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
         head = list(names)
     else:
         if len(names) == len(head) and TIME not in head:  # names of other columns, as the remedy says
-            head = list(names)
+            kept = [timed and new == "-" and names_times(old) for old, new in zip(head, names, strict=True)]
+            head = [old if own else new for old, new, own in zip(head, names, kept, strict=True)]
         rows, lines = rows[1:], lines[1:]
     if any(name.endswith(_OUTPUTS) for name in head):
         raise ShotError(
@@ -172,13 +221,14 @@ def _numbers(path: str, name: str, array: np.ndarray, axes: int) -> Array:
     return np.asarray(array, np.float64)
 
 
-def _refuse_bad(path: str, times: Array, columns: dict[str, Array]) -> None:
+def _refuse_bad(path: str, own: TimeColumn, columns: dict[str, Array]) -> None:
+    times, named = own.values, own.names[0]
     if not columns:
         raise ShotError("the motion has no joints", path=path, remedy=_REMEDY)
-    for name, values in ((TIME, times), *columns.items()):
+    for name, values in ((named, times), *columns.items()):
         if len(values) != len(times):
             raise ShotError(
-                "has another number of values than time_s", path=path, attribute=name,
+                f"has another number of values than {named}", path=path, attribute=name,
                 found=f"{len(values)} and {len(times)}", remedy="Correct the table",
             )  # fmt: skip
         bad = np.flatnonzero(~np.isfinite(values))
@@ -192,19 +242,19 @@ def _refuse_bad(path: str, times: Array, columns: dict[str, Array]) -> None:
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if len(back):
         raise ShotError(
-            "times must increase", path=path, attribute=TIME,
+            "times must increase", path=path, attribute=named,
             found=f"{times[back[0]]:g} and then {times[back[0] + 1]:g} in row {back[0] + 2}",
             remedy="Sort the rows, and remove those that come twice",
         )  # fmt: skip
 
 
-def _refuse_long(path: str, times: Array) -> None:
+def _refuse_long(path: str, named: str, times: Array) -> None:
     """Refuse times of which no shot can have the frames; they are mostly those of a clock that counts nanoseconds."""
     length, step = float(times[-1] - times[0]), float(np.median(np.diff(times)))
     if length > _LONGEST:
         unit = "ns" if step > 1e5 else "us" if step > 1e2 else "ms"
         raise ShotError(
-            "the motion is too long", path=path, attribute=TIME,
+            "the motion is too long", path=path, attribute=named,
             found=f"{length:.4g} s in {len(times)} rows, {step:.4g} s apart",
             remedy=f"Write times in seconds; if they are {_UNITS[unit]}, read them with --set motion.read.times={unit}",
         )  # fmt: skip

@@ -20,7 +20,7 @@ from calmotion.recordings import (
     SensorRecording,
     hash_of,
 )
-from calmotion.support import nearest, read_toml
+from calmotion.support import TIME_UNITS, TimeColumn, counters, nearest, read_toml, time_column
 
 from .columns import UNITS, column_of, increasing, read_columns, unit_of
 
@@ -75,16 +75,18 @@ def read_table(request: RecordingRequest, map_file: str) -> SensorRecording:
 
 def _named(file: str, columns: Mapping[str, Array], degrees: bool) -> tuple[list[Channel], list[str]]:
     """Channels of a table whose columns are named after prims."""
-    if TIME not in columns:
+    own = TimeColumn((TIME,), columns[TIME], "s", True) if TIME in columns else time_column(columns)
+    if own is None:
         raise ShotError(
             "the recording has no column of times", path=file, attribute=TIME, found=", ".join(list(columns)[:12]),
             remedy=f"Name it {TIME}, in seconds, or write a map: {os.path.splitext(os.path.basename(file))[0]}.toml",
         )  # fmt: skip
     groups: dict[tuple[str, str], dict[int, Array]] = {}
+    counted = counters({name: values for name, values in columns.items() if not name.startswith("/")})
     skipped, wrong = [], []
     for name, values in columns.items():
         path, dot, suffix = name.rpartition(".")
-        if name == TIME:
+        if name in own.names or name in counted:
             continue
         if f"{dot}{suffix}" in NOT_MEASURED or path.endswith(REACTIONS) or suffix.endswith(BEFORE):
             skipped.append(name)
@@ -103,14 +105,18 @@ def _named(file: str, columns: Mapping[str, Array], degrees: bool) -> tuple[list
             for name in wrong
         ]
     )  # fmt: skip
-    keep = increasing(columns[TIME], file, TIME)
+    # seconds of the recording: those since 1970 would leave no digits for what is between two samples
+    seconds = TIME_UNITS[own.unit] * (own.values - (0.0 if own.names == (TIME,) else own.values[0]))
+    keep = increasing(seconds, file, own.names[0])
     channels = []
     for (kind, path), parts in groups.items():
         values = np.full((len(keep), COMPONENTS[kind]), np.nan)
         for component, column in parts.items():
             values[:, component] = column
-        channels += _channel(kind, path, columns[TIME], values, keep, None)
+        channels += _channel(kind, path, seconds, values, keep, None)
     notes = _notes(file, keep)
+    if own.names != (TIME,):
+        notes.append(f"{file}: its times are those of {' and '.join(own.names)}, in {own.unit}, from the first row on")
     if skipped:
         notes.append(f"{file}: {len(skipped)} columns are not measurements, such as {skipped[0]}; they are not read")
     return channels, notes

@@ -128,7 +128,7 @@ def import_robot(
     named = {name: os.fspath(folder) for name, folder in (packages or {}).items()}
     is_usd = os.path.splitext(os.fspath(robot))[1].lower() in (*EXTENSIONS, ".usdz")
     description = Description(os.fspath(robot), USD) if is_usd else read_description(os.fspath(robot), named)
-    tracks = _motion(host, motion, settings) if motion is not None else None
+    tracks, told = _motion(host, motion, settings) if motion is not None else (None, ())
     options = RobotOptions(
         links, tuple(targets), description.efforts, description.without_mass, description.massless,
         None if solid is None else material_named(solid, known)[1], tracks,
@@ -136,9 +136,11 @@ def import_robot(
         description.locks, description.soft_limits,
     )  # fmt: skip
     if is_usd:
-        return _over_usd(description.path, target, options)
-    python = converter_python(None if converters is None else os.fspath(converters), tell)
-    return _Import(description, target, options).made(python)
+        made = _over_usd(description.path, target, options)
+    else:
+        python = converter_python(None if converters is None else os.fspath(converters), tell)
+        made = _Import(description, target, options).made(python)
+    return replace(made, notes=(*told, *made.notes))
 
 
 def flexible_links(text: str, known: Mapping[str, Material]) -> FlexibleLinks:
@@ -182,7 +184,8 @@ def frames_per_second(motion: MotorTracks | None) -> float:
     return float(round(rate)) if abs(rate - round(rate)) < 1e-3 * rate else rate
 
 
-def _motion(host: Host, path: Path, settings: Given) -> MotorTracks:
+def _motion(host: Host, path: Path, settings: Given) -> tuple[MotorTracks, tuple[str, ...]]:
+    """A motion, and what its reader tells."""
     run = host.run([Source("", "import", motion=os.fspath(path))], [MotorTracks], settings=read_settings(settings))
     run.finish()
     problems = problems_of(run, [MotorTracks])
@@ -190,7 +193,8 @@ def _motion(host: Host, path: Path, settings: Given) -> MotorTracks:
         raise SettingError(
             "no plugin reads this motion", path="--motion", found=path, remedy="Name a .csv, .npz or .bvh file."
         )
-    return value_of(run, MotorTracks, problems)
+    told = tuple(record.text for result in run.results for record in result.records)
+    return value_of(run, MotorTracks, problems), told
 
 
 def _over_usd(robot: str, layer: str, options: RobotOptions) -> ImportedRobot:

@@ -90,7 +90,7 @@ class _Author:
         if options.motion is not None:
             root.startTimeCode = 0.0
             frames = float(options.motion.times[-1]) * self._rate
-            root.endTimeCode = float(np.floor(frames + 1e-6))
+            root.endTimeCode = float(np.floor(frames + 1e-3))  # times may be rounded
 
     @property
     def _rate(self) -> float:

@@ -53,6 +53,13 @@ def read(repository):
     return run
 
 
+@pytest.mark.parametrize("frame_time", ["0.0417", "0.041667", "0.0416667", "0.04166667"])
+def test_a_rounded_frame_time_loses_no_row(read, tmp_path, repository, frame_time):
+    path = bvh(tmp_path / "a.bvh")
+    path.write_text(path.read_text().replace(f"{1 / 24:.12f}", frame_time))
+    assert read(path, map="Arm.Zrotation=shoulder").times == pytest.approx(TIMES, abs=1e-12)
+
+
 def test_channels_become_tracks_with_factor_and_offset(read, tmp_path):
     found = read(bvh(tmp_path / "a.bvh"), map="Arm.Zrotation=/Arm/shoulder*-0.5+90deg, Arm.Xrotation = elbow")
     assert np.allclose(found.times, TIMES)

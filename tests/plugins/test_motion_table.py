@@ -52,6 +52,17 @@ def table(head="time_s,pan,lift", times=TIMES, scale=1.0):
         ("a.csv", table(times=1e3 * TIMES), {"times": "ms"}),
         ("a.csv", table(times=1e6 * TIMES), {"times": "us"}),
         ("a.npz", {"time_s": (1e9 * TIMES).astype(int) + 10**15, "pan": PAN, "lift": LIFT}, {"times": "ns"}),
+        ("a.csv", table("time,pan,lift"), {}),
+        ("a.csv", table("Timestamp (ms),pan,lift", 1e3 * TIMES), {}),
+        ("a.csv", table("header.stamp,pan,lift", 1e9 * TIMES), {}),
+        ("a.csv", table("elapsed_us,pan,lift", 1e3 * TIMES), {"times": "ms"}),
+        ("a.csv", table(",pan,lift"), {}),
+        ("a.csv", "# time,pan,lift\n" + table(None), {}),
+        ("a.csv", table("when,pan,lift", [0.0, 1.0, 2.0]), {"rate": 2.0, "joints": "-,pan,lift"}),
+        ("a.csv", table("frame,pan,lift", [0.0, 1.0, 2.0]), {"rate": 2.0}),
+        ("a.csv", table("time,j1,j2"), {"joints": "-,pan,lift"}),
+        ("a.csv", table("time,pan,lift", [0.0, 0.0, 1.0]), {"rate": 2.0, "joints": "-,pan,lift"}),
+        ("a.npz", {"timestamps": 1e9 * TIMES, "pan": PAN, "lift": LIFT}, {}),
         ("a.csv", table("pan,lift", None), {"rate": 2.0}),
         ("a.csv", table(None, None), {"rate": 2.0, "joints": "pan, lift"}),
         ("a.npz", {"time_s": TIMES, "pan": PAN, "lift": LIFT}, {}),
@@ -154,14 +165,6 @@ def test_arrays_that_would_fill_the_memory_are_not_made(read, tmp_path, monkeypa
     monkeypatch.setattr(memory, "_free_memory", lambda: 1e6)
     with pytest.raises(ShotError, match="GB are free"):
         read("holds.npz", None, rate=24.0)
-
-
-def test_columns_of_a_table_whose_times_have_another_name_are_named_by_hand(read):
-    """As the remedy for a table without time_s says: a name, or -, for each column of it."""
-    found = read("a.csv", table("time,j1,j2"), rate=2.0, joints="-,pan,lift")
-    assert list(found.values) == ["pan", "lift"]
-    np.testing.assert_allclose(found.times, [0.0, 0.5, 1.0])
-    np.testing.assert_allclose(found.values["lift"], LIFT)
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.npz"])

@@ -20,5 +20,12 @@ from calmotion.support.naming import grouped_notes as grouped_notes
 from calmotion.support.naming import nearest as nearest
 from calmotion.support.reading import read_text as read_text
 from calmotion.support.reading import read_toml as read_toml
+from calmotion.support.time_columns import TIME_UNITS as TIME_UNITS
+from calmotion.support.time_columns import TimeColumn as TimeColumn
+from calmotion.support.time_columns import counters as counters
+from calmotion.support.time_columns import exact_step as exact_step
+from calmotion.support.time_columns import exact_times as exact_times
+from calmotion.support.time_columns import names_times as names_times
+from calmotion.support.time_columns import time_column as time_column
 from calmotion.support.worker_processes import Fault as Fault
 from calmotion.support.worker_processes import results_of as results_of

@@ -46,7 +46,7 @@ class Clock:
 
     def frame_times(self) -> Array:
         """Times of the frames [s], shape [f], first 0."""
-        count = int(np.floor((self.end - self.start) / self.time_codes_per_second * self.frames_per_second + 1e-6))
+        count = int(np.floor((self.end - self.start) / self.time_codes_per_second * self.frames_per_second + ROUNDING))
         return np.arange(count + 1) / self.frames_per_second
 
     def merged(self, time_codes: Array) -> Array:

@@ -95,7 +95,7 @@ def test_the_log_of_a_printer_is_in_millimetres_and_its_axes_are_chosen(read):
     [
         ("", "empty"), ("time_s,/A.x\n", "no row"),
         ("time_s,/A.x\n0,a\n", "line 2"), ("time_s,/A.x\n0,1,2\n", "line 2"),
-        ('time_s,/A.x\n"0\n",1\n', "line 2"), ("t,/A.x\n0,1\n", "time_s"),
+        ('time_s,/A.x\n"0\n",1\n', "line 2"), ("when,/A.x\n0,1\n", "time_s"),
         ("time_s,/A.q\n0,1\n", "no column of a recording"), ("time_s,/A.x,/A.x\n0,1,1\n", "same name"),
         ("time_s,/A.x\n1,1\n0,1\n", "must not go back"), ("time_s,/A.x\n,1\n", "no time"),
         ("0,1\n1,2\n", "does not name its columns"), ("time_s,/A.error\n0,1\n", "no channel"),
