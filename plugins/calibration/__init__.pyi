@@ -6,6 +6,7 @@ from calmotion.host import Host, Operator
 
 from .identification.calibrate import CalibrationSettings as CalibrationSettings
 from .identification.calibrate import calibrate_shot as calibrate_shot
+from .identification.calibrate import calibrate_shots as calibrate_shots
 from .identification.parameters import robot_parameters as robot_parameters
 from .identification.robots import Robot as Robot
 from .identification.robots import robot_with as robot_with
@@ -16,6 +17,7 @@ from .model.estimates import Calibration as Calibration
 from .model.estimates import CalibrationFigures as CalibrationFigures
 from .workflow.calibrate import CalibratedShot as CalibratedShot
 from .workflow.calibrate import calibrate as calibrate
+from .workflow.calibrate import calibrate_together as calibrate_together
 from .workflow.excite import ExcitedShot as ExcitedShot
 from .workflow.excite import excite as excite
 from .workflow.refine import RefinedShot as RefinedShot

@@ -7,11 +7,13 @@ has all parameters with the hashes of the recordings, and the covariance that `o
 from __future__ import annotations
 
 import os
+import re
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.model import Character, Provenance
+from calmotion.model import Character, Motor, Provenance
 from calmotion.usd import (
     CALIBRATION,
     DAMPING_ON,
@@ -40,11 +42,13 @@ from .model.estimates import (
     ENCODER_OFFSET,
     FRICTION,
     GEAR_STIFFNESS,
+    LOAD_FRICTION,
     MASS,
     MODULUS,
     POSITION_GAIN,
     VELOCITY_GAIN,
     VISCOUS_FRICTION,
+    WITH_THIS_MODEL_ONLY,
     Calibration,
     Estimate,
 )
@@ -52,6 +56,7 @@ from .model.estimates import (
 if TYPE_CHECKING:
     from pxr import Sdf
 
+GAIN_FACTOR = "calm:motor:gainFactor"
 ENTRY = "calibration"  # in the metadata of the layer
 _MOTOR = {
     POSITION_GAIN: "positionGain", VELOCITY_GAIN: "velocityGain", GEAR_STIFFNESS: "gearStiffness", ARMATURE: "armature",
@@ -101,6 +106,7 @@ class _Writer:
     def __init__(self, layer: Sdf.Layer, reading: Reading, character: Character, calibration: Calibration):
         self._layer, self._reading, self._character = layer, reading, character
         self._values = {(item.kind, item.path, item.axis): item for item in calibration.estimates if item.of_robot}
+        self._factors = calibration.gain_factors
         self.written: dict[str, Any] = {}
 
     def write(self) -> None:
@@ -178,10 +184,17 @@ class _Writer:
             ARMATURE: units.mass(1.0) if linear else units.inertia(1.0), FRICTION: effort, DELAY: 1.0,
         }  # fmt: skip
         found = [self._values[kind, path, -1] for kind in _MOTOR if (kind, path, -1) in self._values]
+        motor = next(own for own in self._character.motors if own.path == path)
+        if (POSITION_GAIN, path, -1) in self._values and (motor.rotor.back_emf > 0.0 or path in self._factors):
+            item = self._values[POSITION_GAIN, path, -1]
+            found.remove(item)
+            self._attribute(path, GAIN_FACTOR, item, motor.position_gain)
+        if motor.rotor.back_emf > 0.0 and found:  # else viscous friction would hold it
+            self._number(path, "calm:motor:backEmf", motor.rotor.back_emf / (effort / length))
         for item in found:
             self._attribute(path, f"calm:motor:{_MOTOR[item.kind]}", item, unit.get(item.kind, effort / length))
+        self._load(motor)
         kinds = {item.kind for item in found}
-        motor = next(own for own in self._character.motors if own.path == path)
         # gains are read from one dialect: both are there, or none, and what the second multiplies
         if kinds & {POSITION_GAIN, VELOCITY_GAIN}:
             self._spec(path, DAMPING_ON, Sdf.ValueTypeNames.Token).default = motor.damping_on
@@ -190,6 +203,17 @@ class _Writer:
                 self._number(path, f"calm:motor:{_MOTOR[kind]}", value / (effort / length))
         if found:
             self._apply(path, "CalmMotorAPI")
+
+    def _load(self, motor: Motor) -> None:
+        """The shares of the load in the friction."""
+        item = self._values.get((LOAD_FRICTION, motor.path, -1))
+        if item is None:
+            return
+        law = motor.rotor.law.with_share(item.value)
+        for part in fields(law):
+            if part.name.endswith("load"):
+                name = re.sub(r"_(\w)", lambda found: found[1].upper(), part.name)
+                self._number(motor.path, f"calm:motor:friction:{name}", getattr(law, part.name))
 
     def _note(self, item: Estimate) -> None:
         """An offset of an encoder, which no attribute of the joint has."""
@@ -208,6 +232,7 @@ class _Writer:
                 "prior_value": item.nominal / unit,
                 "prior_standard_deviation": item.prior / abs(unit),
                 "identifiable": item.identifiable,
+                **({"trust": WITH_THIS_MODEL_ONLY} if item.disagrees else {}),
             }
         }
 
@@ -268,6 +293,7 @@ def _entry(calibration: Calibration) -> dict[str, Any]:
         "prior_standard_deviations": to_doubles([item.prior for item in items]),
         "units": to_strings(item.unit for item in items),
         "identifiable": to_strings(item.name for item in items if item.identifiable),
+        "with_this_model_only": to_strings(item.name for item in items if item.disagrees),
         "factors": to_strings(items[k].name for k in known),
         "covariance_of_log_factors": to_doubles(covariance.ravel()),
         "recordings": to_strings(calibration.recordings),

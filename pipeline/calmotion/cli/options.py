@@ -37,9 +37,13 @@ def report_options(command: argparse.ArgumentParser | argparse._ArgumentGroup) -
     command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
 
 
-def shot_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the options that all commands on a shot have."""
-    command.add_argument("shot", metavar="SHOT", help="USD file of the shot")
+def shot_arguments(command: argparse.ArgumentParser, optional: bool = False) -> None:
+    """Add the options that all commands on a shot have.
+
+    Args:
+        optional: Whether other options may name shots in place of the argument.
+    """
+    command.add_argument("shot", metavar="SHOT", nargs="?" if optional else None, help="USD file of the shot")
     group = command.add_argument_group(SHARED)
     report_options(group)
     group.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")

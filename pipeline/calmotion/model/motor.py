@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -45,6 +45,18 @@ class Coulomb:
     def terms(self) -> FrictionTerms:
         """The terms beside Coulomb's."""
         return FrictionTerms()
+
+    @property
+    def share(self) -> float:
+        """Friction at rest by the mean of the torques on both sides of the gear [-]."""
+        own = self.terms()
+        return 0.5 * (own.motor_load + own.joint_load + own.stribeck_motor_load + own.stribeck_joint_load)
+
+    def with_share(self, share: float) -> Coulomb:
+        """The law with another share, all of it in proportion; itself where it has none."""
+        factor = share / self.share if self.share else 1.0
+        loads = [item.name for item in fields(self) if item.name.endswith("load")]
+        return replace(self, **{name: factor * getattr(self, name) for name in loads})
 
 
 @dataclass(frozen=True)
@@ -253,6 +265,15 @@ class Motor:
     delay: float = 0.0
     backlash: float = 0.0
     kind: str = ""
+
+    def with_gain(self, position_gain: float) -> Motor:
+        """The motor with another position gain; where it is fed with a voltage, with a winding that makes it so: the
+        duty cycle keeps its gain, and the largest torque and the back-EMF change in proportion."""
+        if not (self.rotor.back_emf > 0.0 and self.position_gain > 0.0):
+            return replace(self, position_gain=position_gain)
+        factor = position_gain / self.position_gain
+        rotor = replace(self.rotor, back_emf=factor * self.rotor.back_emf)
+        return replace(self, position_gain=position_gain, max_torque=factor * self.max_torque, rotor=rotor)
 
     @property
     def prim_path(self) -> str:

@@ -152,7 +152,7 @@ def _body(parent: xml.Element, character: Character, number: int, driven: tuple[
         more: dict[str, str] = {"axis": _text(axis)} if joint.kind != "spherical" else {}
         if driven is not None:
             rotor = driven[1].rotor
-            more |= {"armature": repr(rotor.armature), "damping": repr(rotor.viscous_friction)}
+            more |= {"armature": repr(rotor.armature), "damping": repr(rotor.viscous_friction + rotor.back_emf)}
             limit = driven[1].max_torque
             if np.isfinite(limit):
                 more |= {"actuatorfrcrange": _text([-limit, limit]), "actuatorfrclimited": "true"}

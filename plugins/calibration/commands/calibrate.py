@@ -29,14 +29,35 @@ EXAMPLES = (
     ("calmotion calibrate shot.usda --recording take.csv -o robot.usda", "markers, encoders"),
     ("calmotion calibrate shot.usda --recording accel.csv@/Arm/Hand/sensor -o robot.usda", "a printer's log"),
     ("calmotion calibrate shot.usda --recording a.csv --parameters modulus damping", "these alone"),
+    ("calmotion calibrate --shot a.usda --recording a.csv --shot b.usda --recording b.csv -o robot.usda", "two shots"),
 )
+
+
+class _Named(argparse.Action):
+    """Keeps `--shot` and `--recording` in their order: each recording is of the shot named before it."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        performed = [*(getattr(namespace, "performed", None) or ())]
+        if self.dest == "of_shot":
+            performed.append((values, ()))
+        else:
+            shot, files = performed.pop() if performed else (None, ())
+            performed.append((shot, (*files, values)))
+        namespace.performed = performed
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    shot_arguments(command)
+    shot_arguments(command, optional=True)
     command.add_argument(
-        "--recording", metavar="FILE", action="append", required=True,
+        "--shot", dest="of_shot", metavar="FILE", action=_Named,
+        help="a shot of the robot, in place of SHOT, of which the recordings behind it are; may be repeated: the robot "
+        "is the same, and gains may differ from shot to shot by known factors",
+    )  # fmt: skip
+    command.add_argument(
+        "--recording", metavar="FILE", action=_Named, required=True,
         help="what was recorded: a table with columns named after prims or with a TOML map beside it, or an "
         "accelerometer log of a 3D printer as FILE@/PRIM; may be repeated",
     )  # fmt: skip
@@ -44,7 +65,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--parameters", metavar="KIND", nargs="+",
         help="what to estimate: modulus, damping, density, mass, centre, position_gain, velocity_gain, gear_stiffness, "
-        "armature, friction, viscous_friction, delay, encoder_offset, each also as KIND:PATTERN for some prim paths "
+        "armature, friction, viscous_friction, load_friction, delay, encoder_offset, each also as KIND:PATTERN for "
+        "some prim paths "
         "(default: all but density, centre and encoder_offset)",
     )  # fmt: skip
     prior_option(command)
@@ -102,19 +124,49 @@ def parameter_arguments(args: argparse.Namespace) -> dict[str, Any]:
 def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.workflow import with_shot
 
-    from ..workflow.calibrate import calibrate
+    from ..workflow.calibrate import calibrate_together
 
-    args.shot = with_shot(args.shot)
-    shot = opened_shot(args)
+    performed = _performed(args)
+    shots = []
+    for name, _ in performed:
+        args.shot = with_shot(name)
+        shots.append(opened_shot(args))
     with progress_display(args) as display:
-        made = calibrate(
-            shot, args.recording, layer=args.output, **parameter_arguments(args), validate=not args.no_validation,
-            tolerance=args.tolerance, step=args.step, integrator=args.integrator,
-            figures=args.figures, operators=args.run, settings=assignments(args), progress=display,
-            on_operator=display.done,
+        made = calibrate_together(
+            list(zip(shots, (files for _, files in performed), strict=True)), layer=args.output,
+            **parameter_arguments(args), validate=not args.no_validation, tolerance=args.tolerance, step=args.step,
+            integrator=args.integrator, figures=args.figures, operators=args.run, settings=assignments(args),
+            progress=display, on_operator=display.done,
         )  # fmt: skip
     conclude(made.report(), (), output, None if args.quiet else _print)
     return 0
+
+
+def _performed(args: argparse.Namespace) -> list[tuple[str, tuple[str, ...]]]:
+    """Shots with their recordings, as SHOT or `--shot` name them.
+
+    Raises:
+        SettingError: Both do, none does, or a shot has no recording.
+    """
+    from calmotion.host import SettingError
+
+    named = args.performed
+    if args.shot is not None and named[0][0] is not None:
+        raise SettingError(
+            "a shot is named twice", path="--shot", found=args.shot, remedy="Name all shots with --shot, or one as SHOT"
+        )
+    if args.shot is None and named[0][0] is None:
+        raise SettingError(
+            "no shot is named for a recording", path="--recording", found=named[0][1][0],
+            remedy="Name the shot as SHOT, or before its recordings with --shot",
+        )  # fmt: skip
+    found = [(args.shot if name is None else name, files) for name, files in named]
+    for name, files in found:
+        if not files:
+            raise SettingError(
+                "the shot has no recording", path="--shot", found=name, remedy="Name it behind it with --recording"
+            )
+    return found
 
 
 def _went(row: dict[str, Any]) -> str:
@@ -124,7 +176,7 @@ def _went(row: dict[str, Any]) -> str:
 def _print(report: dict[str, Any], console: Console) -> None:
 
     of_robot = [row for row in report["parameters"] if row["of_robot"]]
-    told = sum(row["identifiable"] for row in of_robot)
+    told = sum(bool(row["identifiable"]) for row in of_robot)
     say(console, f"The recordings tell {told} of {counted(len(of_robot), 'parameter')} of the robot.")
     for row in report["channels"]:
         held_out = row["validation_rms"]
@@ -163,10 +215,14 @@ def _print_parameters(console: Console, title: str, parameters: Sequence[dict[st
         value, deviation = measured(row["value"], row["standard_deviation"], row["unit"])
         rows.append([
             row["kind"], row["name"].partition(" ")[2], quantity_in(row["prior"]["value"], row["unit"]), value,
-            deviation + _share(row), "yes" if row["identifiable"] else "no",
+            deviation + _share(row), _told(row["identifiable"]),
         ])  # fmt: skip
     heads = ["parameter", "of", "in the shot", "estimated", "standard deviation", "identifiable"]
     print_table(console, title, heads, rows, texts=2)
+
+
+def _told(identifiable: bool | str) -> str:
+    return identifiable if isinstance(identifiable, str) else "yes" if identifiable else "no"
 
 
 def _share(row: dict[str, Any]) -> str:

@@ -60,7 +60,7 @@ def advised(problem: Calibrated, information: Array, z: Array) -> dict[int, Advi
     ]
     if not missing:
         return {}
-    here = problem.signals(z)
+    here = problem.signals(z)[0]
     times = np.arange(max(0.0, here.times[0]), here.times[-1], 1.0 / RATE)
     character = problem.shot.character
     candidates = [(kind, k, t.path) for k, t in enumerate(character.targets) for kind in (MARKER, ACCELEROMETER)]
@@ -68,7 +68,7 @@ def advised(problem: Calibrated, information: Array, z: Array) -> dict[int, Advi
     best: dict[int, Advice] = {}
     for kind, index, path in candidates:
         noise = NOISE.get(kind) or max(EFFORT_NOISE * float(np.abs(here.at(kind, index, times)).max()), 1e-9)
-        changes = differences.of(lambda signals, kind=kind, index=index: signals.at(kind, index, times))  # type: ignore[misc]
+        changes = differences.of(lambda motions, kind=kind, index=index: motions[0].at(kind, index, times))  # type: ignore[misc]
         J = np.stack([((change - change.mean(axis=0)) / noise).ravel() for change in changes], axis=1)
         more = information.copy()
         more[:count, :count] += J.T @ J

@@ -11,9 +11,8 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import RunSettings
-from calmotion.multibody import IMPLICIT, SimulationFailure
 from calmotion.recordings import UNITS, SensorRecording
-from calmotion.simulation import MAX_STEP, CompiledShot, failure_error, prepare
+from calmotion.simulation import CompiledShot
 
 from ..model.estimates import (
     CLOCK_DRIFT,
@@ -25,22 +24,19 @@ from ..model.estimates import (
     Estimate,
 )
 from .advice import IDENTIFIABLE, advised
-from .measurement import Measurement, measurement_parameters, sensors_of
-from .motor_groups import grouped, of_each_motor
-from .parameters import DEFAULT, Parameter, robot_parameters
+from .disagreement import misses
+from .measurement import Measurement, Motions, Sensor, measurement_parameters, sensors_of
+from .motor_groups import of_each_motor
+from .parameters import DEFAULT, Parameter
 from .problem import Calibrated
 from .recordings.clocks import clock_of
-from .recordings.noise import noise_of
 from .recordings.plausible import refuse_far, refuse_long, refuse_still
-from .robots import robot_at, robot_with
-from .search import HALVINGS, STIFF, Found, profiled, search, step_of
-from .signals import Signals, ends_at_rest, refuse_cyclic, signals_of
+from .search import HALVINGS, Found, profiled, search, step_of
+from .signals import refuse_cyclic
+from .takes import all_simulable, hardly_shaking, takes_of
 
 AFTER = 1.0  # what a recording holds after the end of the shot is used up to here [s]
-SCHEME = "generalized-alpha"  # a quarter of BDF2's error, and no damping to speak of
-STIFFER = 30.0  # times as stiff as the shot's: a robot that hardly shakes, by which clocks are found
 STRONG = 0.9  # correlation that is worth a note
-MISSED, TOGETHER = 1.5, 3.0  # residuals over the noise, and samples that count as one: the model misses something
 
 
 @dataclass(frozen=True)
@@ -68,70 +64,67 @@ def calibrate_shot(
     shot: CompiledShot, recordings: Sequence[SensorRecording], settings: CalibrationSettings, options: RunSettings,
     progress: Callable[[float, str], None] = lambda fraction, message: None,
 ) -> Calibration:  # fmt: skip
-    """Estimate the parameters of a robot.
+    """`calibrate_shots` of one shot."""
+    return calibrate_shots([(shot, recordings)], settings, options, progress)
+
+
+def calibrate_shots(
+    performed: Sequence[tuple[CompiledShot, Sequence[SensorRecording]]], settings: CalibrationSettings,
+    options: RunSettings, progress: Callable[[float, str], None] = lambda fraction, message: None,
+) -> Calibration:  # fmt: skip
+    """Estimate the parameters of a robot from recordings of one or several shots.
 
     Args:
-        shot: The shot that was performed, with a target at each prim that has a sensor; its current curves are those
-            that the robot played.
-        recordings: What was measured.
+        performed: Shots of the same robot, each with a target at each prim that has a sensor, whose current curves are
+            those that the robot played, and what was measured then. Nominal values, such as gains, may differ from shot
+            to shot by known factors; an estimate is that of the first shot, and has the same factor in all.
         settings: What to estimate.
         options: Step and integrator.
         progress: Called with a fraction and a message.
 
     Raises:
-        ShotError: The shot loops or cannot be simulated, nothing is to be estimated, or a recording does not fit.
+        ShotError: A shot loops or cannot be simulated, nothing is to be estimated, a recording does not fit, or the
+            shots are not of one robot.
     """
     begin = time.perf_counter()
-    refuse_cyclic(shot.character.retarget.cyclic, shot.character.path)
-    refuse_long(recordings, float(shot.animation.frame_times[-1]))
-    if not recordings:
-        raise ShotError("there are no recordings", path=shot.character.path, remedy="Name one with --recording")
-    parameters = robot_parameters(shot, settings.parameters, settings.priors)
-    if settings.by_motor_type:
-        parameters = grouped(parameters, shot.character)
-    if not ends_at_rest(shot.animation):  # what a robot does that is stopped amid a motion is not known
-        settings = replace(settings, after=0.0)
-    options, nominal = simulable(shot, options, settings.after)
-    refuse_far(shot.character, recordings, nominal)
-    refuse_still(shot.character, recordings, nominal)
-    progress(0.02, "finding the clocks of the recordings")
+    for shot, recordings in performed:
+        refuse_cyclic(shot.character.retarget.cyclic, shot.character.path)
+        refuse_long(recordings, float(shot.animation.frame_times[-1]))
+        if not recordings:
+            raise ShotError("there are no recordings", path=shot.character.path, remedy="Name one with --recording")
     known = CLOCK_OFFSET in settings.priors  # then time 0 is the first frame, within this standard deviation
-    robots = [nominal] if known else [nominal, *_hardly_shaking(shot, parameters, options, settings.after)]
-    clocks = [0.0 if known else clock_of(recording, shot.character, robots) for recording in recordings]
-    first, last = (0.0 if nominal.times[0] < 0.0 else -np.inf), float(nominal.times[-1])
-    measurement = Measurement(
-        tuple(recording.file for recording in recordings),
-        sensors_of(shot.character, recordings, clocks, max(first, -1.0), last, settings.validate),
-        measurement_parameters(recordings, clocks, settings.priors),
-    )
+    takes, factors = takes_of([shot for shot, _ in performed], settings)
+    options, nominal = all_simulable(takes, options)
+    all_recordings = [recording for _, recordings in performed for recording in recordings]
+    sensors: list[Sensor] = []
+    rows: list[Parameter] = []
+    progress(0.02, "finding the clocks of the recordings")
+    for k, (take, (shot, recordings)) in enumerate(zip(takes, performed, strict=True)):
+        refuse_far(shot.character, recordings, nominal[k])
+        refuse_still(shot.character, recordings, nominal[k])
+        robots = [nominal[k]] if known else [nominal[k], *hardly_shaking(take, options)]
+        clocks = [0.0 if known else clock_of(recording, shot.character, robots) for recording in recordings]
+        first, last = (0.0 if nominal[k].times[0] < 0.0 else -np.inf), float(nominal[k].times[-1])
+        own = sensors_of(shot.character, recordings, clocks, max(first, -1.0), last, settings.validate)
+        before = sum(len(earlier) for _, earlier in performed[:k])
+        sensors += [replace(sensor, take=k, recording=sensor.recording + before) for sensor in own]
+        rows += measurement_parameters(recordings, clocks, settings.priors, k)
+    measurement = Measurement(tuple(recording.file for recording in all_recordings), tuple(sensors), tuple(rows))
     told = _Told(progress)
-    problem = Calibrated(shot, parameters, measurement, options, settings.after, told.simulated)
+    problem = Calibrated(takes, measurement, options, told.simulated)
     found = search(problem, told, settings.halvings)
     progress(0.95, "comparing the recordings with the robot")
-    before = _nominal_fit(problem, found)
+    nominal_fit = _nominal_fit(problem, found)
     estimates = _estimates(found)
-    fits, curves = _fits(found, *before, recordings)
+    fits, curves = _fits(found, *nominal_fit, all_recordings)
     spreads = np.array([p.spread for p in _all(found.problem)])
     notes = tuple(_notes(found, estimates, fits, settings))
-    estimates, covariance = of_each_motor(parameters, estimates, spreads[:, None] * found.covariance * spreads)
+    estimates, covariance = of_each_motor(problem.parameters, estimates, spreads[:, None] * found.covariance * spreads)
     return Calibration(
-        estimates, covariance, {r.file: r.sha256 for r in recordings}, fits, curves,
+        estimates, covariance, {r.file: r.sha256 for r in all_recordings}, fits, curves,
         found.solution.converged, found.iterations, told.count, step_of(found.problem), found.shift,
-        time.perf_counter() - begin, notes,
+        time.perf_counter() - begin, notes, factors,
     )  # fmt: skip
-
-
-def _hardly_shaking(
-    shot: CompiledShot, parameters: Sequence[Parameter], options: RunSettings, after: float
-) -> list[Signals]:
-    """Signals of a robot of which all that is estimated and gives is far stiffer; none where it cannot be simulated."""
-    x = np.array([np.log(STIFFER) / p.spread if p.kind in STIFF else 0.0 for p in parameters])
-    if not x.any():
-        return []
-    try:
-        return [signals_of(robot_at(shot, parameters, x), options, after)]
-    except (SimulationFailure, ShotError):
-        return []
 
 
 class _Told:
@@ -152,32 +145,13 @@ class _Told:
             self._progress(self._fraction, f"{self._message}: {self.count} simulations")
 
 
-def simulable(shot: CompiledShot, options: RunSettings, after: float) -> tuple[RunSettings, Signals]:
-    """Options with a step and an integrator that simulate the shot, and its signals."""
-    step = options.step or shot.character.retarget.time_step or MAX_STEP
-    given = options.integrator
-    schemes = (given,) if given is not None else (SCHEME, "bdf2")
-    for scheme in schemes:
-        chosen = replace(options, step=step, integrator=scheme)
-        try:
-            return chosen, signals_of(robot_with(shot, {}), chosen, after)
-        except (SimulationFailure, ShotError) as failure:
-            if scheme == schemes[-1] or scheme not in IMPLICIT:
-                if isinstance(failure, SimulationFailure):
-                    raise failure_error(prepare(shot, chosen), failure) from failure
-                raise
-    raise AssertionError("a scheme either simulates or raises")
-
-
 def _all(problem: Calibrated) -> tuple[Parameter, ...]:
     return (*problem.parameters, *problem.measurement.parameters)
 
 
-def _nominal_fit(problem: Calibrated, found: Found) -> tuple[Signals, Array]:
-    """Signals of the shot's own robot, and the parameters of the measurement that fit them best."""
-    own = Calibrated(
-        problem.shot, problem.parameters, found.problem.measurement, found.problem.options, found.problem.after
-    )
+def _nominal_fit(problem: Calibrated, found: Found) -> tuple[Motions, Array]:
+    """Signals of the shots' own robot, and the parameters of the measurement that fit them best."""
+    own = Calibrated(problem.takes, found.problem.measurement, found.problem.options)
     z = np.zeros_like(found.z)
     fitted, _ = profiled(own, z)
     return own.signals(z), fitted[len(problem.parameters) :]
@@ -209,13 +183,14 @@ def _estimates(found: Found) -> tuple[Estimate, ...]:
                 p.logarithmic,
                 identifiable,
                 text,
+                identifiable and bool(found.disagrees[k]),
             )  # fmt: skip
         )
     return tuple(rows)
 
 
 def _fits(
-    found: Found, nominal: Signals, of_nominal: Array, recordings: Sequence[SensorRecording]
+    found: Found, nominal: Motions, of_nominal: Array, recordings: Sequence[SensorRecording]
 ) -> tuple[tuple[ChannelFit, ...], tuple[ChannelCurves, ...]]:
     problem = found.problem
     measurement, y = problem.measurement, found.z[len(problem.parameters) :]
@@ -265,6 +240,12 @@ def _notes(
     if settings.halvings and found.shift > 1.0:
         notes.append("the estimates still depend on the time step: give a smaller one with --step")
     notes += _missed(found, fits)
+    split = [item.name for item in estimates if item.of_robot and item.disagrees]
+    if split:
+        notes.append(
+            f"pieces of the recordings tell other values of {', '.join(split)} by more than noise: they hold with this "
+            "model only, and their standard deviations are those of what other recordings would tell"
+        )
     deviations = np.sqrt(np.diag(found.covariance))
     correlations = found.covariance / np.outer(deviations, deviations)
     robot = [k for k, item in enumerate(estimates) if item.of_robot]
@@ -289,12 +270,12 @@ def _missed(found: Found, fits: Sequence[ChannelFit]) -> list[str]:
     """Sensors that measured something which no robot of this kind does: more than noise is left, and not at random."""
     notes = []
     for sensor, fit in zip(found.problem.measurement.sensors, fits, strict=True):
-        channel = sensor.channel
-        noise = channel.sigma if channel.sigma is not None else noise_of(channel.values[sensor.used])
-        if fit.rms > MISSED * noise and sensor.count > TOGETHER:
+        left = misses(sensor, fit.rms)
+        if left:
             notes.append(
-                f"{channel.name} still differs by {fit.rms / noise:.2g} times its noise, and not at random: the model "
-                "misses something, and the estimates may be wrong by more than their standard deviations. Try a finer "
-                "model (a smaller --tolerance), or more --parameters"
+                f"{sensor.channel.name} still differs by {left:.2g} times its noise, and not at random: the model "
+                "misses something, and standard deviations are those of what other recordings would tell. Try a finer "
+                "model (a smaller --tolerance), another friction of motors (calm:motor:frictionModel), or more "
+                "--parameters"
             )
     return notes

@@ -22,6 +22,8 @@ from .parameters import PRIORS, Parameter
 from .recordings.noise import noise_of
 from .signals import Signals
 
+Motions = Sequence[Signals]  # of each shot
+
 REST = 0.5  # time before the first frame that counts [s]: the robot rests
 BLOCKS, EVERY = 20, 5  # parts of a recording, of which every fifth is held out
 LEAST = 12  # values of a channel that are worth a fit
@@ -39,6 +41,7 @@ class Sensor:
         held_out: Those of them that are not fitted, shape [n].
         sigma: Standard deviation of its noise.
         count: How many successive samples count as one: 1 for white noise.
+        take: Index of the shot that was performed.
     """
 
     recording: int
@@ -48,6 +51,7 @@ class Sensor:
     held_out: BoolArray
     sigma: float
     count: float = 1.0
+    take: int = 0
 
     @property
     def fitted(self) -> BoolArray:
@@ -102,10 +106,15 @@ def sensors_of(
 
 
 def measurement_parameters(
-    recordings: Sequence[SensorRecording], clocks: Sequence[float], priors: Mapping[str, float] | None = None
-) -> tuple[Parameter, ...]:
-    """Clocks of the recordings, biases of accelerometers and places of markers; those with the prior None are left
-    out."""
+    recordings: Sequence[SensorRecording], clocks: Sequence[float], priors: Mapping[str, float] | None = None,
+    take: int = 0,
+) -> tuple[Parameter, ...]:  # fmt: skip
+    """Clocks of the recordings, biases of accelerometers and places of markers; the recordings of one shot share the
+    latter two.
+
+    Args:
+        take: Index of the shot.
+    """
     given = {**PRIORS, **(priors or {})}
     found = []
     for recording, clock in zip(recordings, clocks, strict=True):
@@ -115,8 +124,18 @@ def measurement_parameters(
             kind = {MARKER: PLACE, ACCELEROMETER: BIAS}.get(channel.kind)
             if kind is not None:
                 unit = "m" if kind == PLACE else "m/s^2"
-                found += [Parameter(kind, channel.path, 0.0, given[kind], unit, axis, False) for axis in range(3)]
+                path = _of_take(channel.path, take)
+                found += [Parameter(kind, path, 0.0, given[kind], unit, axis, False) for axis in range(3)]
     return tuple({p.name: p for p in found}.values())
+
+
+def own_path(sensor: Sensor) -> str:
+    """The path of the parameters of a sensor itself, which differ from shot to shot."""
+    return _of_take(sensor.channel.path, sensor.take)
+
+
+def _of_take(path: str, take: int) -> str:
+    return path if take == 0 else f"{path} (shot {take + 1})"
 
 
 def refuse_unknown_channels(character: Character, recordings: Sequence[SensorRecording]) -> None:
@@ -176,9 +195,14 @@ class Measurement:
         start, drift = (self._value(x, kind, file) for kind in (CLOCK_OFFSET, CLOCK_DRIFT))
         return np.asarray((sensor.channel.times - start) * (1.0 + drift))
 
-    def predicted(self, signals: Signals, sensor: Sensor, x: Array) -> Array:
-        """What a sensor would measure, shape [n, c]."""
-        times, kind, path = self.robot_times(sensor, x), sensor.channel.kind, sensor.channel.path
+    def predicted(self, motions: Motions, sensor: Sensor, x: Array) -> Array:
+        """What a sensor would measure, shape [n, c].
+
+        Args:
+            motions: Signals of each shot.
+        """
+        times, kind, path = self.robot_times(sensor, x), sensor.channel.kind, own_path(sensor)
+        signals = motions[sensor.take]
         values = signals.at(kind, sensor.index, times)
         if kind == MARKER and np.any(place := self._vector(x, PLACE, path)):
             values = values + signals.axes_at(sensor.index, times) @ place
@@ -186,13 +210,14 @@ class Measurement:
             values = values + self._vector(x, BIAS, path)
         return values
 
-    def derivatives(self, signals: Signals, sensor: Sensor, x: Array) -> Array:
+    def derivatives(self, motions: Motions, sensor: Sensor, x: Array) -> Array:
         """Derivative of `predicted` by the parameters, shape [n, c, m]."""
-        times, channel = self.robot_times(sensor, x), sensor.channel
+        times, channel, path = self.robot_times(sensor, x), sensor.channel, own_path(sensor)
+        signals = motions[sensor.take]
         file = self.recordings[sensor.recording]
         out = np.zeros((len(times), channel.values.shape[1], len(self.parameters)))
         rate = signals.at(channel.kind, sensor.index, times, 1)
-        if channel.kind == MARKER and np.any(place := self._vector(x, PLACE, channel.path)):
+        if channel.kind == MARKER and np.any(place := self._vector(x, PLACE, path)):
             rate = rate + signals.axes_at(sensor.index, times, 1) @ place
         start, drift = (self._value(x, kind, file) for kind in (CLOCK_OFFSET, CLOCK_DRIFT))
         for m, p in enumerate(self.parameters):
@@ -200,17 +225,17 @@ class Measurement:
                 out[:, :, m] = -(1.0 + drift) * p.spread * rate
             elif p.kind == CLOCK_DRIFT and p.path == file:
                 out[:, :, m] = p.spread * (channel.times - start)[:, None] * rate
-            elif p.kind == BIAS and channel.kind == ACCELEROMETER and p.path == channel.path:
+            elif p.kind == BIAS and channel.kind == ACCELEROMETER and p.path == path:
                 out[:, p.axis, m] = p.spread
-            elif p.kind == PLACE and channel.kind == MARKER and p.path == channel.path:
+            elif p.kind == PLACE and channel.kind == MARKER and p.path == path:
                 out[:, :, m] = p.spread * signals.axes_at(sensor.index, times)[:, :, p.axis]
         return out
 
-    def residuals(self, signals: Signals, x: Array) -> Array:
+    def residuals(self, motions: Motions, x: Array) -> Array:
         """(measured - predicted) / sigma of all values that are fitted, shape [N]."""
         parts = []
         for sensor in self.sensors:
-            off = sensor.channel.values - self.predicted(signals, sensor, x)
+            off = sensor.channel.values - self.predicted(motions, sensor, x)
             parts.append(off[sensor.fitted] / sensor.sigma)
         return np.concatenate(parts)
 

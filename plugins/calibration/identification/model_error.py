@@ -11,7 +11,6 @@ Source: Tapley, Schutz, Born, Statistical Orbit Determination, 2004, section 6.3
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,9 +18,6 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.multibody import SimulationFailure, in_parallel
 from calmotion.reduction import ReducedBody, with_mode_stiffness, with_scaled_stiffness
-
-from .robots import robot_at
-from .signals import signals_of
 
 if TYPE_CHECKING:
     from .problem import Calibrated
@@ -47,33 +43,43 @@ def covariance_of_model(problem: Calibrated, z: Array, jacobian: Array, weights:
     if here is None:
         return found
 
-    def residuals(bodies: tuple[ReducedBody, ...]) -> Array | None:
-        robot = robot_at(problem.shot.with_bodies(bodies), problem.parameters, z[:count])
+    def residuals(error: tuple[int, int]) -> Array | None:
         try:
-            signals = signals_of(robot, problem.options, problem.after)
+            shots = [take.shot.with_bodies(_softer(take.shot.bodies, *error)) for take in problem.takes]
+            motions = problem.simulated(z[:count], shots)
         except (ShotError, SimulationFailure):
             return None
-        return problem.measurement.residuals(signals, z[count:])
+        return problem.measurement.residuals(motions, z[count:])
 
-    for other in in_parallel(residuals, list(_softer(problem.shot.bodies))):
+    for other in in_parallel(residuals, _errors(problem.shot.bodies)):
         if other is not None:
             off = gain @ (jacobian.T @ (weights * (other - here))) / SMALL
             found += np.outer(off, off)
     return found
 
 
-def _softer(bodies: tuple[ReducedBody, ...]) -> Iterator[tuple[ReducedBody, ...]]:
-    """The bodies with `SMALL` standard deviations of each error: of a link as a whole, and of each of its modes."""
+def _errors(bodies: tuple[ReducedBody, ...]) -> list[tuple[int, int]]:
+    """Errors of a link as a whole, and of each of its lowest modes: the body, and -1 or the place of the mode."""
+    found = []
     for index, body in enumerate(bodies):
-        size = SMALL * ((body.mesh_error or 0.0) + body.patch_error)
-        if not size or not len(body.stiffness):
-            continue
-        yield _with(bodies, index, with_scaled_stiffness(body, 1.0 - size))
-        for mode in np.argsort(body.stiffness)[:MODES]:
-            factors = np.ones(len(body.stiffness))
-            factors[mode] -= OWN * size
-            yield _with(bodies, index, with_mode_stiffness(body, factors))
+        if _size(body) and len(body.stiffness):
+            found += [(index, rank) for rank in range(-1, min(MODES, len(body.stiffness)))]
+    return found
 
 
-def _with(bodies: tuple[ReducedBody, ...], index: int, body: ReducedBody) -> tuple[ReducedBody, ...]:
-    return (*bodies[:index], body, *bodies[index + 1 :])
+def _softer(bodies: tuple[ReducedBody, ...], index: int, rank: int) -> tuple[ReducedBody, ...]:
+    """The bodies with `SMALL` standard deviations of an error."""
+    body = bodies[index]
+    size = SMALL * _size(body)
+    if rank < 0:
+        other = with_scaled_stiffness(body, 1.0 - size)
+    else:
+        factors = np.ones(len(body.stiffness))
+        factors[np.argsort(body.stiffness)[rank : rank + 1]] -= OWN * size
+        other = with_mode_stiffness(body, factors)
+    return (*bodies[:index], other, *bodies[index + 1 :])
+
+
+def _size(body: ReducedBody) -> float:
+    """Relative error of the stiffness of a link."""
+    return (body.mesh_error or 0.0) + body.patch_error

@@ -18,10 +18,10 @@ from calmotion.multibody import SimulationFailure, in_parallel
 from calmotion.simulation import CompiledShot
 from calmotion.support import check
 
-from .measurement import Measurement
-from .parameters import Parameter
+from .measurement import Measurement, Motions
 from .robots import robot_at
-from .signals import Signals, signals_of
+from .signals import signals_of
+from .takes import Take
 
 DIFFERENCE = 1e-4  # of the prior's standard deviation
 
@@ -32,15 +32,15 @@ class Differences:
 
     Attributes:
         at: x, shape [n].
-        here: Signals there.
-        ahead: One for each parameter of the robot.
+        here: Signals there, of each shot.
+        ahead: The same for each parameter of the robot.
     """
 
     at: Array
-    here: Signals
-    ahead: tuple[Signals, ...]
+    here: Motions
+    ahead: tuple[Motions, ...]
 
-    def of(self, values: Callable[[Signals], Array]) -> list[Array]:
+    def of(self, values: Callable[[Motions], Array]) -> list[Array]:
         """Derivatives by the parameters of values of the signals."""
         here = values(self.here)
         return [np.asarray((values(ahead) - here) / DIFFERENCE) for ahead in self.ahead]
@@ -50,21 +50,19 @@ class Calibrated:
     """A robot and its recordings, as a `least_squares.Problem`: z has the robot's parameters, then the measurement's.
 
     Args:
-        shot: The compiled shot.
-        parameters: Of the robot.
+        takes: Shots of one robot.
         measurement: Its sensors.
         options: With step and integrator.
-        after: How long the robot is simulated after the end of the shot [s].
         tell: Called with each simulation.
     """
 
     def __init__(
-        self, shot: CompiledShot, parameters: Sequence[Parameter], measurement: Measurement, options: RunSettings,
-        after: float, tell: Callable[[], None] = lambda: None,
+        self, takes: Sequence[Take], measurement: Measurement, options: RunSettings,
+        tell: Callable[[], None] = lambda: None,
     ):  # fmt: skip
-        self.shot, self.parameters, self.measurement = shot, tuple(parameters), measurement
-        self.options, self.after, self.tell = options, after, tell
-        self._last: tuple[Array, Signals] | None = None
+        self.takes, self.measurement, self.options, self.tell = tuple(takes), measurement, options, tell
+        self.shot, self.parameters = self.takes[0].shot, self.takes[0].parameters
+        self._last: tuple[Array, Motions] | None = None
         self.differences: Differences | None = None
         self._own = False  # whether they were made with these options
         self.simulations = 0
@@ -81,19 +79,19 @@ class Calibrated:
 
     def with_measurement(self, measurement: Measurement) -> Calibrated:
         """The same with other noise of the sensors; what was simulated is kept."""
-        other = Calibrated(self.shot, self.parameters, measurement, self.options, self.after, self.tell)
+        other = Calibrated(self.takes, measurement, self.options, self.tell)
         other._last, other.differences, other._own = self._last, self.differences, self._own
         other.simulations = self.simulations
         return other
 
     def with_options(self, options: RunSettings) -> Calibrated:
         """The same with another step; the differences are kept."""
-        other = Calibrated(self.shot, self.parameters, self.measurement, options, self.after, self.tell)
+        other = Calibrated(self.takes, self.measurement, options, self.tell)
         other.differences, other.simulations = self.differences, self.simulations
         return other
 
-    def signals(self, z: Array) -> Signals:
-        """Of the robot at z, in the thread of the caller.
+    def signals(self, z: Array) -> Motions:
+        """Of the robot at z in each shot, in the thread of the caller.
 
         Raises:
             ShotError: It cannot be simulated.
@@ -139,21 +137,34 @@ class Calibrated:
         by_robot = np.stack(columns, axis=1) if columns else np.zeros((len(by_measurement), 0))
         return measurement.residuals(here, y), np.concatenate([by_robot, by_measurement], axis=1)
 
-    def _differences(self, x: Array, here: Signals) -> Differences:
+    def _differences(self, x: Array, here: Motions) -> Differences:
         points = [x + unit for unit in DIFFERENCE * np.eye(len(self.parameters))]
         return Differences(x.copy(), here, tuple(in_parallel(self._simulated, points)))
 
-    def _simulated(self, x: Array) -> Signals:
-        self.simulations += 1
-        self.tell()
-        return signals_of(robot_at(self.shot, self.parameters, x), self.options, self.after)
+    def _simulated(self, x: Array) -> Motions:
+        return self.simulated(x, [take.shot for take in self.takes])
+
+    def simulated(self, x: Array, shots: Sequence[CompiledShot]) -> Motions:
+        """Signals of the robot at x in shots that stand for those of the takes.
+
+        Raises:
+            ShotError: It cannot be simulated.
+            SimulationFailure: A step fails.
+        """
+        found = []
+        for take, shot in zip(self.takes, shots, strict=True):
+            self.simulations += 1
+            self.tell()
+            robot = robot_at(shot, take.parameters, x)
+            found.append(signals_of(robot, self.options, take.after, take.start, take.begin))
+        return found
 
 
 class Measured:
     """The parameters of the measurement alone, for one motion: nothing is simulated."""
 
-    def __init__(self, measurement: Measurement, signals: Signals):
-        self._measurement, self._signals = measurement, signals
+    def __init__(self, measurement: Measurement, motions: Motions):
+        self._measurement, self._signals = measurement, motions
 
     @property
     def counts(self) -> Array:

@@ -27,6 +27,7 @@ from ..model.estimates import (
     FRICTION,
     GEAR_STIFFNESS,
     HIGHER_MODES,
+    LOAD_FRICTION,
     MASS,
     MATERIAL_KINDS,
     MODULUS,
@@ -131,16 +132,18 @@ def _motor(motor: Motor, values: Values) -> Motor:
     def of(kind: str, own: float) -> float:
         return values.get((kind, motor.path, -1), own)
 
+    motor = motor.with_gain(of(POSITION_GAIN, motor.position_gain))
+    law = motor.rotor.law
     rotor = replace(
         motor.rotor,
         gear_stiffness=of(GEAR_STIFFNESS, motor.rotor.gear_stiffness),
         armature=of(ARMATURE, motor.rotor.armature),
         friction=of(FRICTION, motor.rotor.friction),
         viscous_friction=of(VISCOUS_FRICTION, motor.rotor.viscous_friction),
+        law=law.with_share(of(LOAD_FRICTION, law.share)),
     )
     return replace(
         motor,
-        position_gain=of(POSITION_GAIN, motor.position_gain),
         velocity_gain=of(VELOCITY_GAIN, motor.velocity_gain),
         delay=of(DELAY, motor.delay),
         rotor=rotor,

@@ -6,19 +6,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from calmotion.arrays import Array
+from calmotion.arrays import Array, BoolArray
 from calmotion.errors import ShotError
 from calmotion.multibody import SimulationFailure, in_parallel
 
-from ..model.estimates import DAMPING, GEAR_STIFFNESS, MODULUS, POSITION_GAIN
+from ..model.estimates import DAMPING
+from .disagreement import widened
 from .least_squares import Solution, chord, loss_of, minimize, posterior, weights_of
 from .measurement import Measurement, Sensor
 from .model_error import covariance_of_model
 from .problem import Calibrated, Measured
 from .recordings.free_decay import decay_factors
 from .recordings.noise import correlation_time, least_sigma, spread_of
+from .takes import STIFF
 
-STIFF = (MODULUS, POSITION_GAIN, GEAR_STIFFNESS)  # what decides about frequencies
 TRIED = np.linspace(-2.4, 2.4, 17)  # of all of them at once, in standard deviations of their priors
 FARTHEST = 5.0  # that the free decay may be away from the shot, in standard deviations
 BEST = 3  # of these, from which searches begin until one explains the recordings
@@ -28,6 +29,7 @@ ROUNDS, STEADY = 5, 0.05  # of the noise, and its relative change at which they 
 COARSE = 0.3  # error of a step, over the noise, with which no search begins but for a first guess
 HALVINGS, SHIFT = 5, 0.2  # of the step, and the change of an estimate at which they end, over its standard deviation
 ORDER = 2  # of the integrators
+DISAGREES = 1.5  # times as wide as noise makes it: pieces of the recordings tell other values
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +43,8 @@ class Found:
         covariance: Of z.
         iterations: In all.
         shift: Largest change by the last halving of the step, over its standard deviation.
+        disagrees: Entries of z that pieces of the recordings tell differently, by more than the rest of the covariance,
+            shape [n].
     """
 
     z: Array
@@ -49,6 +53,7 @@ class Found:
     covariance: Array
     iterations: int
     shift: float
+    disagrees: BoolArray
 
 
 def search(problem: Calibrated, tell: Callable[[float, str], None], halvings: int = HALVINGS) -> Found:
@@ -118,7 +123,8 @@ def _converged(problem: Calibrated, solution: Solution, iterations: int, halving
             break
     problem = problem.with_measurement(correlated(problem, solution.z))
     covariance = posterior(solution.jacobian, solution.residuals, problem.counts) + of_model
-    return Found(limit, problem, solution, covariance, iterations, shift)
+    wider = widened(problem, solution, covariance)
+    return Found(limit, problem, solution, wider[:, None] * covariance * wider, iterations, shift, wider > DISAGREES)
 
 
 def step_of(problem: Calibrated) -> float:
@@ -142,27 +148,37 @@ def _deviations(problem: Calibrated, solution: Solution) -> tuple[Array, Array]:
 def correlated(problem: Calibrated, z: Array) -> Measurement:
     """The measurement with the number of successive samples that count as one, as the residuals have it."""
     measurement, y = problem.measurement, z[len(problem.parameters) :]
-    signals = problem.signals(z)
+    motions = problem.signals(z)
 
     def of(sensor: Sensor) -> Sensor:
-        off = sensor.channel.values - measurement.predicted(signals, sensor, y)
+        off = sensor.channel.values - measurement.predicted(motions, sensor, y)
         return replace(sensor, count=correlation_time(np.where(sensor.fitted, off, np.nan)[sensor.used]))
 
     return measurement.with_sensors([of(sensor) for sensor in measurement.sensors])
 
 
 def renoised(problem: Calibrated, z: Array) -> Measurement:
-    """The measurement with the noise of its sensors as the residuals have it, where it is not given."""
-    measurement, y = problem.measurement, z[len(problem.parameters) :]
-    signals = problem.signals(z)
+    """The measurement with the noise of its sensors as the residuals have it, where it is not given.
 
-    def of(sensor: Sensor) -> Sensor:
+    A sensor has one noise in all shots: a shot that the model does not explain would else count as noise.
+    """
+    measurement, y = problem.measurement, z[len(problem.parameters) :]
+    motions, left, places = problem.signals(z), dict[object, list[Array]](), []
+    for sensor in measurement.sensors:
+        off = sensor.channel.values - measurement.predicted(motions, sensor, y)
+        rank = sum(other[:3] == (sensor.channel.kind, sensor.channel.path, sensor.take) for other in places)
+        places.append((sensor.channel.kind, sensor.channel.path, sensor.take, rank))
+        left.setdefault((sensor.channel.kind, sensor.channel.path, rank), []).append(off[sensor.fitted])
+    spreads = {key: spread_of(np.concatenate(values)) for key, values in left.items()}
+
+    def of(sensor: Sensor, place: tuple[str, str, int, int]) -> Sensor:
         if sensor.channel.sigma is not None:
             return replace(sensor, sigma=sensor.channel.sigma)
-        off = sensor.channel.values - measurement.predicted(signals, sensor, y)
-        return replace(sensor, sigma=max(spread_of(off[sensor.fitted]), least_sigma(sensor.channel.values)))
+        spread = spreads[place[0], place[1], place[3]]
+        return replace(sensor, sigma=max(spread, least_sigma(sensor.channel.values)))
 
-    return measurement.with_sensors([of(sensor) for sensor in measurement.sensors])
+    sensors = [of(*item) for item in zip(measurement.sensors, places, strict=True)]
+    return measurement.with_sensors(sensors)
 
 
 def profiled(problem: Calibrated, z: Array) -> tuple[Array, float]:
@@ -230,7 +246,7 @@ def _of_decay(problem: Calibrated) -> list[Array]:
     """The robot whose free decay has the frequency and the damping of the recordings', where these tell it."""
     z = np.zeros(len(problem.parameters) + len(problem.measurement.parameters))
     try:
-        found = decay_factors(problem.measurement, problem.signals(z), float(problem.shot.animation.frame_times[-1]))
+        found = decay_factors(problem.measurement, problem.signals(z), [take.end for take in problem.takes])
     except (ShotError, SimulationFailure):
         return []
     if found is None:

@@ -82,13 +82,17 @@ class Signals:
         return self.rotations[:, index].reshape(-1, 9)
 
 
-def signals_of(robot: Robot, options: RunSettings, after: float = 0.0) -> Signals:
+def signals_of(
+    robot: Robot, options: RunSettings, after: float = 0.0, start: Array | None = None, begin: float = 0.0
+) -> Signals:
     """Simulate a robot in its shot, and for some time after its end [s], in which the motors hold.
 
     Args:
         robot: The robot.
         options: With step and integrator.
         after: [s].
+        start: What is added to the commands up to a time [rad or m], shape [M]: the robot then stands elsewhere.
+        begin: That time [s].
 
     Raises:
         ShotError: The shot cannot be simulated.
@@ -97,6 +101,8 @@ def signals_of(robot: Robot, options: RunSettings, after: float = 0.0) -> Signal
     prepared = prepare(_lengthened(robot, after), options)
     model, grid = prepared.model, prepared.grid
     angles, rates = _commands(robot, prepared)
+    if start is not None:
+        angles = angles + start * (grid.times <= begin)[:, None]
     workspace = Workspace.for_system(model.system)
     run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, integrator=options.scheme)
     return _measured(robot, prepared, run)

@@ -12,6 +12,7 @@ from calmotion.arrays import Array, BoolArray
 MODULUS, DAMPING, DENSITY, MASS, CENTRE = "modulus", "damping", "density", "mass", "centre"
 POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS = "position_gain", "velocity_gain", "gear_stiffness"
 ARMATURE, FRICTION, VISCOUS_FRICTION, DELAY = "armature", "friction", "viscous_friction", "delay"
+LOAD_FRICTION = "load_friction"  # at rest, over the mean of the torques on both sides of the gear
 ENCODER_OFFSET = "encoder_offset"
 # what the model of the robot has wrong, and no attribute of a shot takes
 HIGHER_MODES = "higher_modes"
@@ -21,12 +22,14 @@ CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE = "clock_offset", "clock_drift", "bias", 
 MATERIAL_KINDS = (MODULUS, DAMPING, DENSITY)
 BODY_KINDS = (MASS, CENTRE)
 MOTOR_KINDS = (
-    POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION, DELAY, ENCODER_OFFSET,
+    POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION, LOAD_FRICTION, DELAY,
+    ENCODER_OFFSET,
 )  # fmt: skip
 ROBOT_KINDS = (*MATERIAL_KINDS, *BODY_KINDS, *MOTOR_KINDS)
 MODEL_KINDS = (HIGHER_MODES,)
 MEASUREMENT_KINDS = (CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE)
 AXES = "xyz"
+WITH_THIS_MODEL_ONLY = "with this model only"
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,8 @@ class Estimate:
         standard_deviation: Of the value.
         logarithmic: Whether its logarithm has a normal distribution.
         identifiable: Whether the recordings tell more about it than the prior.
+        disagrees: Whether pieces of the recordings tell other values, by more than noise: another model would have
+            another value, and the standard deviation is that of what other recordings tell.
         advice: A measurement that would tell it, as a sentence; empty where it is identifiable or none would.
     """
 
@@ -58,6 +63,7 @@ class Estimate:
     logarithmic: bool
     identifiable: bool
     advice: str = ""
+    disagrees: bool = False
 
     @property
     def name(self) -> str:
@@ -134,6 +140,7 @@ class Calibration:
         step_shift: Largest change of an estimate by the last halving of the step, over its standard deviation.
         wall_s: Time it took [s].
         notes: What the user must know, as sentences.
+        gain_factors: Motors whose position gains differ from shot to shot; the estimate is that of the first shot.
     """
 
     estimates: tuple[Estimate, ...]
@@ -148,6 +155,7 @@ class Calibration:
     step_shift: float
     wall_s: float
     notes: tuple[str, ...] = ()
+    gain_factors: tuple[str, ...] = ()
 
     @property
     def correlations(self) -> Array:

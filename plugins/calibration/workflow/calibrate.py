@@ -16,7 +16,7 @@ from calmotion.simulation import CompiledShot
 from calmotion.tolerance import ConvergedReduction, compiled_in
 from calmotion.workflow import Given, Hooks, Outcome, Path, Progress, Shot, again, carry_out, read_settings
 
-from ..identification.calibrate import CalibrationSettings, calibrate_shot
+from ..identification.calibrate import CalibrationSettings, calibrate_shots
 from ..identification.measurement import refuse_unknown_channels
 from ..identification.parameters import DEFAULT, refuse_unknown
 from ..identification.recordings.plausible import refuse_long
@@ -111,6 +111,44 @@ def calibrate(
         ShotError: The shot cannot be processed, or a recording does not fit it.
         SettingError: An argument does not fit.
     """
+    return calibrate_together(
+        [(shot, recordings)], layer=layer, parameters=parameters, priors=priors, validate=validate,
+        by_motor_type=by_motor_type, tolerance=tolerance, step=step, integrator=integrator, figures=figures,
+        operators=operators, settings=settings, progress=progress, on_operator=on_operator, cancel=cancel,
+    )  # fmt: skip
+
+
+# parameters: those of `calibrate`
+def calibrate_together(
+    performed: Sequence[tuple[Shot | Path, Sequence[Path] | Path]],
+    *,
+    layer: Path | None = None,
+    parameters: Sequence[str] = DEFAULT,
+    priors: Mapping[str, float] | None = None,
+    validate: bool = True,
+    by_motor_type: bool = False,
+    tolerance: float | str | None = None,
+    step: float | str | None = None,
+    integrator: str | None = None,
+    figures: Path | None = None,
+    operators: Sequence[str] = (),
+    settings: Given = None,
+    progress: Callable[[Progress], None] | None = None,
+    on_operator: Callable[[Any], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+) -> CalibratedShot:
+    """`calibrate` from several shots of one robot, each with its recordings.
+
+    Nominal values may differ from shot to shot by known factors, as gains of the firmware; clocks, biases and places of
+    sensors are those of each shot. The layer lies over the first shot, and over any other of the robot.
+
+    Args:
+        performed: Shots and their recordings, as of `calibrate`, which has the other arguments.
+
+    Raises:
+        ShotError: A shot cannot be processed, a recording does not fit it, or the shots are not of one robot.
+        SettingError: An argument does not fit.
+    """
     begin = time.perf_counter()
     chosen, hooks = read_settings(settings), Hooks(progress, on_operator, cancel)
     refuse_unknown(parameters, priors or {})
@@ -119,33 +157,49 @@ def calibrate(
             f"calibrate supports only {', '.join(IMPLICIT)}", path="--integrator", found=integrator,
             remedy=f"{nearest(integrator, IMPLICIT)}Remove the option, or use one of these.",
         )  # fmt: skip
-    files = [recordings] if isinstance(recordings, (str, os.PathLike)) else recordings
-    names = [os.fspath(file) for file in files]
-    opened = with_sensors(shot)
-    read = read_recordings(opened.host, names, merge([opened.settings, chosen]))
     options = RunSettings(
         tolerance=quantity_of(tolerance, "m", "tolerance"), step=quantity_of(step, "s", "step"), integrator=integrator
     )
     target = None if layer is None else os.fspath(layer)
-    outcome = compiled_with_sensors(opened, read, options, target, operators, chosen, hooks)
+    opened, taken, outcomes = [], list[tuple[CompiledShot, Sequence[SensorRecording]]](), []
+    for shot, recordings in performed:
+        files = [recordings] if isinstance(recordings, (str, os.PathLike)) else recordings
+        names = [os.fspath(file) for file in files]
+        opened.append(with_sensors(shot))
+        read = read_recordings(opened[-1].host, names, merge([opened[-1].settings, chosen]))
+        _refuse_twice(read, [recording for _, earlier in taken for recording in earlier])
+        outcomes.append(compiled_with_sensors(opened[-1], read, options, target, operators, chosen, hooks))
+        taken.append((compiled_in(outcomes[-1].run.get), read))
+    outcome = outcomes[0]
 
     def tell(fraction: float, message: str) -> None:
         if cancel is not None and cancel():
             from calmotion.workflow import Cancelled
 
-            raise Cancelled(f"{opened.path}: cancelled")
+            raise Cancelled(f"{opened[0].path}: cancelled")
         if progress is not None:
             progress(Progress("Estimate the parameters", fraction, message))
 
-    calibration = calibrate_shot(
-        compiled_in(outcome.run.get), read, CalibrationSettings(
-            tuple(parameters), dict(priors or {}), validate, by_motor_type=by_motor_type
-        ),
-        options, tell,
-    )  # fmt: skip
+    given = CalibrationSettings(tuple(parameters), dict(priors or {}), validate, by_motor_type=by_motor_type)
+    calibration = calibrate_shots(taken, given, options, tell)
     written = None if target is None else _written(outcome, calibration, target)
     drawn = () if figures is None else _drawn(outcome, calibration, os.fspath(figures), chosen)
     return CalibratedShot(calibration, written, drawn, time.perf_counter() - begin, outcome)
+
+
+def _refuse_twice(recordings: Sequence[SensorRecording], earlier: Sequence[SensorRecording]) -> None:
+    """Refuse a recording of two shots: the clock of a recording goes by its file.
+
+    Raises:
+        SettingError: There is one.
+    """
+    known = {os.path.realpath(recording.file) for recording in earlier}
+    for recording in recordings:
+        if os.path.realpath(recording.file) in known:
+            raise SettingError(
+                "this recording is given twice", path="--recording", found=recording.file,
+                remedy="Name it once, behind the shot that was performed",
+            )  # fmt: skip
 
 
 def compiled_with_sensors(

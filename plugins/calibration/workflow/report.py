@@ -8,7 +8,7 @@ from typing import Any
 from calmotion.model import WrittenLayer
 from calmotion.version import __version__
 
-from ..model.estimates import Calibration
+from ..model.estimates import WITH_THIS_MODEL_ONLY, Calibration
 
 
 def calibration_report(
@@ -30,7 +30,7 @@ def calibration_report(
                     "value": item.value,
                     "standard_deviation": item.standard_deviation,
                     "prior": {"value": item.nominal, "standard_deviation": item.prior},
-                    "identifiable": item.identifiable,
+                    "identifiable": WITH_THIS_MODEL_ONLY if item.disagrees else item.identifiable,
                     "of_robot": item.of_robot,
                     "advice": item.advice,
                 }

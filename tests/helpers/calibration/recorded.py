@@ -15,6 +15,7 @@ from calmotion_plugins.calibration.identification.parameters import robot_parame
 from calmotion_plugins.calibration.identification.problem import Calibrated
 from calmotion_plugins.calibration.identification.robots import robot_with
 from calmotion_plugins.calibration.identification.signals import signals_of
+from calmotion_plugins.calibration.identification.takes import Take
 
 LOAD, MOTOR, PLASTIC = "/Arm/Load", "/Arm/Joint0", "/Arm/Plastic"
 TRUTH = {("modulus", PLASTIC, -1): 2.15e9, ("damping", PLASTIC, -1): 0.014, ("mass", LOAD, -1): 0.188}
@@ -74,7 +75,7 @@ def problem_of(shot, recordings, step=1 / 240):
         measurement_parameters(recordings, clocks),
     )  # fmt: skip
     options = RunSettings(step=step, integrator="generalized-alpha")
-    return Calibrated(shot, robot_parameters(shot), measurement, options, 0.5)
+    return Calibrated([Take(shot, robot_parameters(shot), 0.5)], measurement, options)
 
 
 @pytest.fixture(scope="session")

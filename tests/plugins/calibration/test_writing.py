@@ -123,3 +123,37 @@ def test_metadata_that_were_damaged_tell_nothing(shot, tmp_path):
     file.write_text(file.read_text().replace(name, f"{name}-1, "))
     Sdf.Layer.FindOrOpen(layer).Reload(True)
     assert read_shot(root)[0].retarget.uncertainty.calibrated.names == ()
+
+
+def test_a_servo_fed_with_a_voltage_gets_a_factor_of_its_gain_that_any_shot_of_it_takes(tmp_path):
+    def edit(gain):
+        def author(stage):
+            make_target(stage)
+            joint = stage.GetPrimAtPath(SHOULDER)
+            joint.AddAppliedSchema("CalmMotorAPI")
+            for name, value in (("model", "servo"), ("type", "xl330-m288")):
+                joint.CreateAttribute(f"calm:motor:{name}", Sdf.ValueTypeNames.Token).Set(value)
+            set_float(stage, SHOULDER, "calm:motor:positionGain", gain)
+            set_float(stage, SHOULDER, "calm:motor:maxTorque", 0.7)
+
+        return author
+
+    shot, other = (str(write_arm(tmp_path / f"{k}.usda", edit(gain))) for k, gain in enumerate((0.01, 0.04)))
+    character, _, provenance = read_shot(shot)
+    own = character.motors[0]
+    rows = (
+        estimate("position_gain", SHOULDER, own.position_gain, 1.2 * own.position_gain),
+        estimate("viscous_friction", SHOULDER, own.rotor.viscous_friction, 0.01),
+        estimate("load_friction", SHOULDER, own.rotor.law.share, 0.3),
+    )
+    layer, _ = write_calibration(character, provenance, calibration_of(*rows), str(tmp_path / "robot.usda"))
+    stage = Usd.Stage.CreateNew(str(tmp_path / "both.usda"))
+    stage.GetRootLayer().subLayerPaths = [layer, other]
+    for name in ("defaultPrim", "metersPerUnit", "kilogramsPerUnit", "upAxis", "timeCodesPerSecond", "endTimeCode"):
+        stage.GetRootLayer().pseudoRoot.SetInfo(name, Sdf.Layer.FindOrOpen(other).pseudoRoot.GetInfo(name))
+    stage.Save()
+    found = read_shot(str(tmp_path / "both.usda"))[0].motors[0]
+    assert found.position_gain == pytest.approx(4.0 * 1.2 * own.position_gain, rel=1e-6)
+    assert found.max_torque == pytest.approx(1.2 * 0.7) and found.rotor.law.share == pytest.approx(0.3)
+    assert found.rotor.back_emf == pytest.approx(1.2 * own.rotor.back_emf, rel=1e-6)
+    assert found.rotor.viscous_friction == pytest.approx(0.01, rel=1e-6)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ GAINS = ("position_gain", "velocity_gain")
 OF_MOTOR, OF_ROTOR = (*GAINS, "delay"), (
     "gear_stiffness", "armature", "friction", "viscous_friction",
 )  # fmt: skip
+LOAD_FRICTION = "load_friction"  # the share of the load in the friction of a rotor
 _SEED = 20190704  # of the draws, which are the same in every run
 
 
@@ -80,7 +82,9 @@ def _calibrated(shot: CompiledShot) -> tuple[Parameter, ...]:
     paths = {
         **dict.fromkeys((MODULUS, DAMPING), [b.flexible.material.path for b in flexible if b.flexible]),
         MASS: [b.path for b in character.bodies if not (b.simulated_flexible or b.between)],
-        **dict.fromkeys((*OF_MOTOR, *OF_ROTOR), [m.path for m in character.motors if m.model != PRESCRIBED]),
+        **dict.fromkeys(
+            (*OF_MOTOR, *OF_ROTOR, LOAD_FRICTION), [m.path for m in character.motors if m.model != PRESCRIBED]
+        ),
     }
     own = [k for k, name in enumerate(given.names) if name.partition(" ")[2] in paths.get(name.partition(" ")[0], ())]
     if not own:
@@ -133,12 +137,18 @@ def shot_of(shot: CompiledShot, scenario: Scenario) -> CompiledShot:
 def _other_motor(motor: Motor, factors: Mapping[str, float]) -> Motor:
     """A motor with other gains, rotor or delay; itself where nothing is other."""
     own = {
-        name: factors[f"{name} {motor.path}"] for name in (*OF_MOTOR, *OF_ROTOR) if f"{name} {motor.path}" in factors
+        name: factors[f"{name} {motor.path}"]
+        for name in (*OF_MOTOR, *OF_ROTOR, LOAD_FRICTION)
+        if f"{name} {motor.path}" in factors
     }
     if not own:
         return motor
-    rotor = {name: own[name] * getattr(motor.rotor, name) for name in OF_ROTOR if name in own}
-    of_motor = {name: own[name] * getattr(motor, name) for name in OF_MOTOR if name in own}
+    if GAINS[0] in own:
+        motor = motor.with_gain(own[GAINS[0]] * motor.position_gain)
+    rotor: dict[str, Any] = {name: own[name] * getattr(motor.rotor, name) for name in OF_ROTOR if name in own}
+    if LOAD_FRICTION in own:
+        rotor["law"] = motor.rotor.law.with_share(own[LOAD_FRICTION] * motor.rotor.law.share)
+    of_motor = {name: own[name] * getattr(motor, name) for name in OF_MOTOR[1:] if name in own}
     return replace(motor, rotor=replace(motor.rotor, **rotor), **of_motor)
 
 

@@ -24,13 +24,13 @@ from calmotion.simulation import CompiledShot, pose_modes
 from ...model.estimates import ROBOT_KINDS
 from ...model.excitation import Clear, Excitation, MotorUse, PlannedSensor, Predicted
 from ..advice import IDENTIFIABLE
-from ..calibrate import simulable
 from ..measurement import Measurement, measurement_parameters, sensors_of
 from ..model_error import covariance_of_model
 from ..motor_groups import grouped
 from ..parameters import DEFAULT, Parameter, robot_parameters
 from ..problem import Calibrated
 from ..signals import Signals, refuse_cyclic
+from ..takes import Take, simulable
 from .clearance import Clearance
 from .evolution import least_point
 from .superposition import Superposition
@@ -196,7 +196,7 @@ class _Trial:
     def problem(self, values: Array) -> Calibrated:
         """The robot and its sensors with a motion."""
         return Calibrated(
-            _performing(self.shot, self.family, values), self.parameters, self._measurement, self.options, AFTER
+            [Take(_performing(self.shot, self.family, values), self.parameters, AFTER)], self._measurement, self.options
         )
 
     def rate(self, values: Array) -> _Rated | None:
@@ -206,7 +206,7 @@ class _Trial:
             problem = self.problem(values)
             z = np.zeros(len(problem.lower))
             try:
-                signals = problem.signals(z)
+                (signals,) = problem.signals(z)
                 if self._kept(signals) and self.clearance.kept(problem.shot):
                     J = problem.linearized(z)[1]
                     break

@@ -41,7 +41,9 @@ class Superposition:
         for leader in range(len(family.leading)):
             values, height = family.pulse(leader, LEAD, SHAPE, SHARE)
             pulsed = problem(values)
-            self._times: Array = frame * np.arange(len(family.times) + round(pulsed.after / frame), dtype=np.float64)
+            self._times: Array = frame * np.arange(
+                len(family.times) + round(pulsed.takes[0].after / frame), dtype=np.float64
+            )
             found.append((_readings(pulsed, self._times), height))
         self._rest = found[0][0][0]  # by how the robot sags: at the first frame nothing has begun to move
         self._responses = np.concatenate([
@@ -106,6 +108,6 @@ def _readings(problem: Calibrated, times: Array) -> Array:
     parts = []
     for sensor in problem.measurement.sensors:
         kind, index = sensor.channel.kind, sensor.index
-        columns = differences.of(lambda signals, kind=kind, index=index: signals.at(kind, index, times))  # type: ignore[misc]
-        parts.append(np.stack([*columns, here.at(kind, index, times, 1)], axis=2))
+        columns = differences.of(lambda motions, kind=kind, index=index: motions[0].at(kind, index, times))  # type: ignore[misc]
+        parts.append(np.stack([*columns, here[0].at(kind, index, times, 1)], axis=2))
     return np.concatenate(parts, axis=1)

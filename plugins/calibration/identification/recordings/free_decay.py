@@ -7,6 +7,7 @@ what the simulated robot does, so that its error is much the same in both: only 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +15,7 @@ from calmotion.arrays import Array
 from calmotion.recordings import ACCELEROMETER, MARKER
 from scipy.signal import decimate
 
-from ..measurement import Measurement, Sensor
-from ..signals import Signals
+from ..measurement import Measurement, Motions, Sensor
 
 ORDER = 8  # exponentials: four modes, or fewer and noise
 FASTEST, MOST, FEWEST = 400.0, 400, 40  # samples in a second, and most and fewest samples that are used
@@ -72,23 +72,23 @@ def strongest_mode(values: Array, rate: float) -> Decay | None:
     return Decay(float(frequencies[best]), float(damping[best]))
 
 
-def decay_factors(measurement: Measurement, signals: Signals, end: float) -> tuple[float, float] | None:
+def decay_factors(measurement: Measurement, motions: Motions, ends: Sequence[float]) -> tuple[float, float] | None:
     """By what frequency and damping of the recordings' decays differ from a simulated robot's; None where they tell
     neither.
 
     Args:
         measurement: With the recordings.
-        signals: Of the robot.
-        end: Of the motion, on the robot's clock [s].
+        motions: Of the robot.
+        ends: Of the motions, on the robot's clock [s].
     """
     found = []
     zero = np.zeros(len(measurement.parameters))
     for sensor in measurement.sensors:
         if sensor.channel.kind not in (MARKER, ACCELEROMETER):
             continue
-        times = measurement.robot_times(sensor, zero)
+        times, end = measurement.robot_times(sensor, zero), ends[sensor.take]
         measured = _decay(sensor, times, sensor.channel.values, end)
-        simulated = _decay(sensor, times, measurement.predicted(signals, sensor, zero), end)
+        simulated = _decay(sensor, times, measurement.predicted(motions, sensor, zero), end)
         if measured is not None and simulated is not None:
             found.append((measured.frequency / simulated.frequency, measured.damping / simulated.damping))
     if not found:

@@ -59,17 +59,17 @@ def test_the_parameters_are_clocks_places_and_biases(measurement):
 def test_derivatives_are_those_of_what_is_predicted(measurement, signals):
     x = 0.1 * np.arange(1.0, len(measurement.parameters) + 1.0)
     for sensor in measurement.sensors:
-        exact = measurement.derivatives(signals, sensor, x)
+        exact = measurement.derivatives([signals], sensor, x)
         scale = np.abs(exact).max(axis=(0, 1)) + 1e-12
         for k in range(len(x)):
             h = 1e-4 * np.eye(len(x))[k]
-            up, down = (measurement.predicted(signals, sensor, x + s * h) for s in (1.0, -1.0))
+            up, down = (measurement.predicted([signals], sensor, x + s * h) for s in (1.0, -1.0))
             assert np.abs((up - down) / 2e-4 - exact[:, :, k]).max() < 2e-3 * scale[k]
 
 
 def test_residuals_leave_out_gaps_and_what_is_held_out(measurement, signals):
     counts = [int(sensor.fitted.sum()) for sensor in measurement.sensors]
-    assert len(measurement.residuals(signals, np.zeros(len(measurement.parameters)))) == sum(counts)
+    assert len(measurement.residuals([signals], np.zeros(len(measurement.parameters)))) == sum(counts)
     for sensor, count in zip(measurement.sensors, counts, strict=True):
         held = int(sensor.validated.sum())
         assert 0.1 < held / (held + count) < 0.3

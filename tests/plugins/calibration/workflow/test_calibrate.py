@@ -72,6 +72,14 @@ def test_what_does_not_fit_is_refused_before_any_mesh(calmotion, take, tmp_path)
     assert calmotion("calibrate", shot, "--recording", tmp_path / "none.csv").returncode == 2
     assert calmotion("calibrate", shot, "--recording", recording, "-o", shot).returncode == 1
     assert calmotion("calibrate", shot).returncode == 2
+    for arguments, match in (
+        (("--recording", recording), "no shot is named"),
+        ((shot, "--shot", shot, "--recording", recording), "named twice"),
+        (("--shot", shot, "--shot", shot, "--recording", recording), "has no recording"),
+        (("--shot", shot, "--recording", recording, "--shot", shot, "--recording", recording), "given twice"),
+    ):
+        done = calmotion("calibrate", *arguments)
+        assert done.returncode == 2 and match in done.stderr
     with pytest.raises(ShotError, match="modulus"):
         calibrate(shot, recording, parameters=("modul",))
 

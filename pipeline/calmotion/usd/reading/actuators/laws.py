@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _SCHEMA, _MODEL = "CalmMotorAPI", "calm:motor:frictionModel"
 _REMEDY = "Correct the value, or remove the attribute"
+_FACTOR = "calm:motor:gainFactor"
 _VOLTAGE = "calm:motor:voltage"
 
 
@@ -108,6 +109,20 @@ def direct_current(joint: JointPrim, units: StageUnits, kind: MotorType) -> Dire
         value("voltage"), value("resistance", "resistance"), value("torqueConstant", "torque_constant"),
         value("dutyGain") / float(length(1.0)), value("maxDuty", "", 1.0),
     )  # fmt: skip
+
+
+def gain_factor(prim: Usd.Prim) -> float:
+    """By what a calibration found the position gain to differ; 1 where nothing is authored.
+
+    Raises:
+        ShotError: It is not positive.
+    """
+    found = authored(prim, Spelling("Calmotion", _FACTOR), "")
+    if found is None:
+        return 1.0
+    if not (math.isfinite(found[1]) and found[1] > 0.0):
+        _refuse(prim, "must be positive and finite", _FACTOR, found[1], _REMEDY)
+    return found[1]
 
 
 def _spelled(field: str) -> str:

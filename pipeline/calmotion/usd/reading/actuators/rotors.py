@@ -102,20 +102,13 @@ def read_rotor(
     """The rotor of a servo, SI; of an ideal motor the one that it would have as a servo, and of a drive an empty one.
 
     Args:
-        current: The motor, where it is fed with a voltage. Viscous friction of a named motor then comes without what
-            its torque constant and its resistance make of it.
+        current: The motor, where it is fed with a voltage.
 
     Raises:
         ShotError: A value out of its range, of a servo or a motor whose type is named.
     """
     if model == SERVO or kind.values:
-        found = _rotor(joint, units, model, kind, newton, notes)
-        if current is None:
-            return found
-        viscous = found.viscous_friction
-        if viscous == kind.get("viscous_friction", -1.0) and "resistance" in kind.values:
-            viscous = max(0.0, viscous - kind.values["torque_constant"] ** 2 / kind.values["resistance"])
-        return replace(found, viscous_friction=viscous, back_emf=current.back_emf)
+        return _with_back_emf(_rotor(joint, units, model, kind, newton, notes), joint, units, kind, current)
     try:
         found = _rotor(joint, units, model, kind, newton, [])
     except ShotError:
@@ -128,6 +121,23 @@ def read_rotor(
             f"has; calm:motor:model = {SERVO} has them"
         )
     return Rotor()
+
+
+def _with_back_emf(
+    rotor: Rotor, joint: JointPrim, units: StageUnits, kind: MotorType, current: DirectCurrent | None
+) -> Rotor:
+    """The rotor with its back-EMF, which is a part of the viscous friction of a named motor, and of one that is
+    authored where no voltage and no back-EMF are."""
+    linear = joint.kind == "prismatic"
+    unit = units.force(1.0) / units.length(1.0) if linear else units.torque(1.0) / np.deg2rad(1.0)
+    authored_emf = _own(joint.prim, "backEmf", False)
+    induced = 0.0
+    if "resistance" in kind.values and _own(joint.prim, "viscousFriction", False) is None:
+        induced = min(kind.values["torque_constant"] ** 2 / kind.values["resistance"], rotor.viscous_friction)
+        rotor = replace(rotor, viscous_friction=rotor.viscous_friction - induced)
+    if current is not None:
+        induced = current.back_emf
+    return replace(rotor, back_emf=induced if authored_emf is None else float(unit * authored_emf))
 
 
 def _rotor(

@@ -14,7 +14,7 @@ from calmotion.model import Follows, Motor
 from calmotion.model.motor import SERVO
 from calmotion.usd import schemas
 from calmotion.usd.dialects import number_of
-from calmotion.usd.reading.actuators.laws import direct_current
+from calmotion.usd.reading.actuators.laws import direct_current, gain_factor
 from calmotion.usd.reading.actuators.motor_models import motor_model, read_gains
 from calmotion.usd.reading.actuators.named_types import named_type
 from calmotion.usd.reading.actuators.newton_actuators import ACTUATOR, TARGETS, newton_actuator
@@ -233,7 +233,7 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
     current = direct_current(drive.joint, reading.units, kind) if model == SERVO else None
     gains = read_gains(drive.joint, mujoco, newton, reading.units, model, kind, current)
     limit = effort_limit(drive.joint, reading.units, reading.notes, kind, newton, mujoco)
-    return Motor(
+    motor = Motor(
         joint=index,
         path=drive.joint.path,
         attribute=_WRITTEN_AS.get(drive.source, target_attribute(drive.joint)),
@@ -255,6 +255,8 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
         backlash=read_backlash(drive.joint, reading.units, kind),
         kind=kind.name,
     )
+    factor = gain_factor(prim)
+    return motor if factor == 1.0 else motor.with_gain(factor * motor.position_gain)
 
 
 def _drive(

@@ -13,6 +13,7 @@ from calmotion_plugins.calibration.identification.measurement import Measurement
 from calmotion_plugins.calibration.identification.parameters import robot_parameters
 from calmotion_plugins.calibration.identification.problem import Calibrated
 from calmotion_plugins.calibration.identification.robots import robot_with
+from calmotion_plugins.calibration.identification.takes import Take
 from recorded import LOAD, MOTOR, PLASTIC
 
 AFTER, OPTIONS = 0.5, RunSettings(step=1 / 240, pre_roll=0.0, integrator="generalized-alpha")
@@ -52,7 +53,7 @@ def problem(soft, family):
     def of(values):
         tracks = tuple(Track(family.times, column) for column in values.T)
         shot = dataclasses.replace(soft, animation=Animation(family.times, tracks, tracks))
-        return Calibrated(shot, parameters, measurement, OPTIONS, AFTER)
+        return Calibrated([Take(shot, parameters, AFTER)], measurement, OPTIONS)
 
     return of
 

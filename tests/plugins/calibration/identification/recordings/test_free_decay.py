@@ -35,7 +35,7 @@ def test_a_stiffer_robot_with_more_damping_is_told_by_its_decay(recorded_shot):
     truth = {("modulus", PLASTIC, -1): 1.8e9 * 1.5, ("damping", PLASTIC, -1): 0.03}
     problem = problem_of(recorded_shot, only(recordings_of(recorded_shot, truth), ACCELEROMETER))
     end = float(recorded_shot.animation.frame_times[-1])
-    factors = decay_factors(problem.measurement, problem.signals(np.zeros(len(problem.lower))), end)
+    factors = decay_factors(problem.measurement, problem.signals(np.zeros(len(problem.lower))), [end])
     assert factors[0] ** 2 == pytest.approx(1.5, rel=0.05) and factors[1] == pytest.approx(3.0, rel=0.15)
 
 

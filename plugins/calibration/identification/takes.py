@@ -1,0 +1,119 @@
+"""Shots that were performed and recorded, with the parameters of the robot in each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.errors import ShotError
+from calmotion.model import RunSettings
+from calmotion.multibody import IMPLICIT, SimulationFailure
+from calmotion.simulation import MAX_STEP, CompiledShot, failure_error, prepare
+
+from ..model.estimates import GEAR_STIFFNESS, MODULUS, POSITION_GAIN
+from .motor_groups import grouped
+from .parameters import Parameter, robot_parameters
+from .robots import robot_at, robot_with
+from .signals import Signals, ends_at_rest, signals_of
+
+if TYPE_CHECKING:
+    from .calibrate import CalibrationSettings
+
+STIFF = (MODULUS, POSITION_GAIN, GEAR_STIFFNESS)  # what decides about frequencies
+SCHEME = "generalized-alpha"  # a quarter of BDF2's error, and no damping to speak of
+STIFFER = 30.0  # times as stiff as the shot's: a robot that hardly shakes, by which clocks are found
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """A shot that was performed and recorded.
+
+    Attributes:
+        shot: The compiled shot.
+        parameters: Of the robot: the same for all shots, but for nominal values, such as gains of the firmware.
+        after: How long the robot is simulated after the end of the shot [s].
+        start: What is added to the commands of the motors before the recording begins [rad or m], shape [M].
+        begin: When that is, on the robot's clock [s].
+    """
+
+    shot: CompiledShot
+    parameters: tuple[Parameter, ...]
+    after: float
+    start: Array | None = None
+    begin: float = 0.0
+
+    @property
+    def end(self) -> float:
+        """Of the shot [s]."""
+        return float(self.shot.animation.frame_times[-1])
+
+
+def takes_of(shots: Sequence[CompiledShot], settings: CalibrationSettings) -> tuple[list[Take], tuple[str, ...]]:
+    """The shots with the parameters of the robot, and the motors whose position gains differ from shot to shot.
+
+    Raises:
+        ShotError: The shots have other parameters than the first one: they are not of one robot.
+    """
+    takes: list[Take] = []
+    for shot in shots:
+        parameters = robot_parameters(shot, settings.parameters, settings.priors)
+        if settings.by_motor_type:
+            parameters = grouped(parameters, shot.character)
+        # what a robot does that is stopped amid a motion is not known
+        after = settings.after if ends_at_rest(shot.animation) else 0.0
+        takes.append(Take(shot, parameters, after))
+        missing = {p.name for p in takes[0].parameters} ^ {p.name for p in parameters}
+        if missing:
+            raise ShotError(
+                "the shots are not of one robot: a parameter is not in both", path=shot.character.path,
+                attribute="--shot", found=min(missing),
+                remedy="Give them the same bodies, materials and motors, or name the shared ones with --parameters",
+            )  # fmt: skip
+    names = [p.name for p in takes[0].parameters]
+    takes = [
+        replace(take, parameters=tuple(sorted(take.parameters, key=lambda p: names.index(p.name)))) for take in takes
+    ]
+    other = [
+        row[0].path
+        for row in zip(*(take.parameters for take in takes), strict=True)
+        if row[0].kind == POSITION_GAIN and not np.allclose([p.nominal for p in row], row[0].nominal, rtol=1e-6)
+    ]
+    return takes, tuple(other)
+
+
+def simulable(shot: CompiledShot, options: RunSettings, after: float) -> tuple[RunSettings, Signals]:
+    """Options with a step and an integrator that simulate the shot, and its signals."""
+    step = options.step or shot.character.retarget.time_step or MAX_STEP
+    given = options.integrator
+    schemes = (given,) if given is not None else (SCHEME, "bdf2")
+    for scheme in schemes:
+        chosen = replace(options, step=step, integrator=scheme)
+        try:
+            return chosen, signals_of(robot_with(shot, {}), chosen, after)
+        except (SimulationFailure, ShotError) as failure:
+            if scheme == schemes[-1] or scheme not in IMPLICIT:
+                if isinstance(failure, SimulationFailure):
+                    raise failure_error(prepare(shot, chosen), failure) from failure
+                raise
+    raise AssertionError("a scheme either simulates or raises")
+
+
+def all_simulable(takes: Sequence[Take], options: RunSettings) -> tuple[RunSettings, list[Signals]]:
+    """Options with a step and an integrator that simulate all shots, and the signals of each."""
+    for take in takes:
+        options = simulable(take.shot, options, take.after)[0]
+    return options, [simulable(take.shot, options, take.after)[1] for take in takes]
+
+
+def hardly_shaking(take: Take, options: RunSettings) -> list[Signals]:
+    """Signals of a robot of which all that is estimated and gives is far stiffer; none where it cannot be simulated."""
+    x = np.array([np.log(STIFFER) / p.spread if p.kind in STIFF else 0.0 for p in take.parameters])
+    if not x.any():
+        return []
+    try:
+        return [signals_of(robot_at(take.shot, take.parameters, x), options, take.after)]
+    except (SimulationFailure, ShotError):
+        return []
