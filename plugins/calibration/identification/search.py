@@ -163,7 +163,8 @@ def renoised(problem: Calibrated, z: Array) -> Measurement:
     A sensor has one noise in all shots: a shot that the model does not explain would else count as noise.
     """
     measurement, y = problem.measurement, z[len(problem.parameters) :]
-    motions, left, places = problem.signals(z), dict[object, list[Array]](), []
+    motions, left = problem.signals(z), dict[object, list[Array]]()
+    places: list[tuple[str, str, int, int]] = []
     for sensor in measurement.sensors:
         off = sensor.channel.values - measurement.predicted(motions, sensor, y)
         rank = sum(other[:3] == (sensor.channel.kind, sensor.channel.path, sensor.take) for other in places)

@@ -75,4 +75,4 @@ def test_shots_that_disagree_widen_the_interval_over_both_and_say_so(shots):
 def test_shots_of_other_robots_are_refused(shots, recorded_shot):
     performed = [(shot, [recorded(shots[0], f"{k}.csv", 1.0)]) for k, shot in enumerate((shots[0], recorded_shot))]
     with pytest.raises(ShotError, match="not of one robot"):
-        calibrate_shots(performed, SETTINGS, RunSettings(step=1 / 240))
+        calibrate_shots(performed, CalibrationSettings(), RunSettings(step=1 / 240))
