@@ -31,7 +31,7 @@ from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stack
 from calmotion.usd.reading.motors.tracks import read_track, sample_codes
 from calmotion.usd.reading.motors.turns import unwrapped
 from calmotion.usd.reading.motors.unused_animation import target_positions
-from calmotion.usd.reading.plausibility.motions import motion_doubts
+from calmotion.usd.reading.plausibility.motions import limit_doubts, motion_doubts
 from calmotion.usd.reading.provenance import notes_of_results, provenance_of
 from calmotion.usd.reading.targets import weight_tracks
 from calmotion.usd.reading.unread import misplaced_schemas, unread_attributes
@@ -133,7 +133,7 @@ def read_stage(
         moving = moving_frames(reading, skeleton.joints, skeleton.poses, clock)
         _note_dense_samples(tracks, clock, reading)
         character = build_character(reading, skeleton)
-        notes = (*character.notes, *motion_doubts(character, tracks))
+        notes = (*character.notes, *limit_doubts(character), *motion_doubts(character, tracks))
         if not character.motors and (chosen := physics_elsewhere(whole or stage)):
             notes += (f"another variant has more physics. {chosen}",)
         return StageReading(reading, clock, skeleton, dataclasses.replace(character, notes=notes), tracks, moving)

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 from calmotion.model import Character
 from calmotion.usd.reading.context import Reading
@@ -54,17 +55,17 @@ def test_metres_in_a_stage_of_a_smaller_unit_are_denser_than_any_solid(arm, mass
     assert f"Lengths times {1.0 / length:g} would fit (metersPerUnit = 1)" in warning.remedy
 
 
-@pytest.mark.parametrize(("length", "factor"), [(100.0, 0.01), (1000.0, 0.001)])
-def test_centimetres_and_millimetres_in_a_stage_in_metres_are_lighter_than_air(arm, length, factor):
+@pytest.mark.parametrize(("length", "factor"), [(10.0, 0.1), (100.0, 0.01), (1000.0, 0.001)])
+def test_decimetres_centimetres_and_millimetres_in_a_stage_in_metres_are_lighter_than_air(arm, length, factor):
     warnings = warned(scaled(arm, length))
     (warning,) = (warning for warning in warnings if "lighter than air" in warning.problem)
     assert f"Lengths times {factor:g} would fit (metersPerUnit = {factor:g})" in warning.remedy
 
 
-def test_grams_that_were_taken_for_kilograms_are_named_too(arm):
-    warnings = warned(scaled(arm, mass=1000.0))
-    (warning,) = (warning for warning in warnings if "denser" in warning.problem)
-    assert "masses times 0.001 (kilogramsPerUnit = 0.001)" in warning.remedy
+@pytest.mark.parametrize(("mass", "problem", "factor"), [(1e3, "denser", "0.001"), (1e-3, "lighter than air", "1000")])
+def test_grams_that_were_taken_for_kilograms_and_the_reverse_are_named_too(arm, mass, problem, factor):
+    (warning,) = (warning for warning in warned(scaled(arm, mass=mass)) if problem in warning.problem)
+    assert f"masses times {factor} (kilogramsPerUnit = {factor})" in warning.remedy
 
 
 def test_one_link_whose_mesh_is_too_small_is_named(arm):
@@ -74,9 +75,11 @@ def test_one_link_whose_mesh_is_too_small_is_named(arm):
 
 @pytest.mark.parametrize(
     ("inertia", "factor"), [(1e4, "0.0001 (kg cm^2)"), (1e6, "1e-06 (kg mm^2)"), (1e7, "1e-07 (g cm^2)"),
-                            (1e9, "1e-09 (g mm^2)"), (1e3, "0.001 (masses in grams)")],
+                            (1e9, "1e-09 (g mm^2)"), (1e3, "0.001 (masses in grams)"),
+                            (1e-3, "1000 (masses in kg"), (1e-4, "10000 (kg m^2 where the stage has centi"),
+                            (1e-6, "1e+06 (kg m^2 where the stage has milli"), (1e-9, "1e+09 (")],
 )  # fmt: skip
-def test_inertias_beyond_the_link_are_told_with_their_unit(arm, inertia, factor):
+def test_inertias_of_another_size_than_the_link_are_told_with_their_unit(arm, inertia, factor):
     (warning,) = warned(scaled(arm, inertia=inertia, only=(UPPER,)))
     assert warning.path == UPPER and warning.attribute == "physics:diagonalInertia"
     assert f"Inertias times {factor}" in warning.remedy and "radius of gyration" in warning.found
@@ -85,6 +88,37 @@ def test_inertias_beyond_the_link_are_told_with_their_unit(arm, inertia, factor)
 def test_an_inertia_that_no_unit_makes_right_is_told_without_one(arm):
     (warning,) = warned(scaled(arm, inertia=70.0, only=(UPPER,)))
     assert "larger link" in warning.problem and warning.remedy.startswith("Correct it, unless")
+
+
+@pytest.mark.parametrize("inertia", [0.05, 0.3, 3.0])
+def test_inertias_of_odd_but_real_links_are_not_questioned(arm, inertia):
+    assert warned(scaled(arm, inertia=inertia)) == []
+
+
+@pytest.mark.parametrize(
+    ("gravity", "meters", "right"), [(0.0981, 0.01, "981"), (981.0, 1.0, "9.81"), (9810.0, 1.0, "9.81"),
+                                     (0.00981, 0.001, "9810"), (1.62, 1.0, ""), (0.0, 1.0, ""), (24.8, 1.0, "")],
+)  # fmt: skip
+def test_a_gravity_that_no_planet_has_is_told(arm, gravity, meters, right):
+    warnings = warned(dataclasses.replace(arm, gravity=np.array([0.0, 0.0, -gravity])), meters)
+    assert [warning.remedy.split("author ")[1] for warning in warnings] == ([right] if right else [])
+
+
+MODULI = [
+    (2.3, 1.0, "1e+09"), (766.0, 1.0, "1e+06"), (7e16, 1.0, "1e-06"), (2.1e13, 0.01, "0.01"), (2.1e14, 0.001, "0.001"),
+    (210.0, 1.0, "1e+09"), (2.3e9, 1.0, ""), (3e4, 1.0, ""), (1.1e12, 1.0, ""),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("modulus", "meters", "factor"), MODULI)
+def test_a_modulus_that_no_solid_has_is_told_with_its_factor(tmp_path, modulus, meters, factor):
+    arm = read_shot(str(write_arm(tmp_path / "arm.usda", make_flexible)))[0]
+    fore = next(body for body in arm.bodies if body.path == FORE)
+    material = dataclasses.replace(fore.flexible.material, youngs_modulus=modulus)
+    fore = dataclasses.replace(fore, flexible=dataclasses.replace(fore.flexible, material=material))
+    bodies = tuple(fore if body.path == FORE else body for body in arm.bodies)
+    warnings = warned(dataclasses.replace(arm, bodies=bodies), meters)
+    assert [warning.remedy.split(" ")[0] for warning in warnings] == ([factor] if factor else [])
 
 
 def test_what_rests_stands_for_a_frame_or_has_no_geometry_is_not_questioned(arm):

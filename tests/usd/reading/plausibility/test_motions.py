@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.model import MotorTracks, Track
-from calmotion.usd.reading.plausibility.motions import motion_doubts
+from calmotion.usd.reading.plausibility.motions import limit_doubts, motion_doubts
 from calmotion.usd.reading.shot import read_shot
 from small_shots import ELBOW, SHOULDER, write_arm
 
@@ -100,3 +100,37 @@ def test_every_reading_tells_it(tmp_path):
     assert any("milliseconds taken for seconds" in note for note in notes)
     notes = read_shot(path, given=MotorTracks("table.csv", TIMES, {"elbow": 90.0 * SWING}))[0].notes
     assert any(note.startswith(ELBOW) and "degrees taken for radians" in note for note in notes)
+
+
+HALF_TURNS = [(-np.pi, np.pi), (-1.5708, 1.5708), (-2.618, 0.0), (0.0, 3.1416), (-0.7854, 0.7854)]
+
+
+def with_limits(arm, limits):
+    """The arm with these limits [rad], the last pair of all further joints."""
+    pairs = [*limits, *[limits[-1]] * len(arm.joints)]
+    joints = [dataclasses.replace(j, lower=low, upper=high) for j, (low, high) in zip(arm.joints, pairs, strict=False)]
+    return limit_doubts(dataclasses.replace(arm, joints=tuple(joints)))
+
+
+@pytest.mark.parametrize("low", [-90.0, -180.0, -45.0, 0.0])
+@pytest.mark.parametrize("high", [90.0, 150.0, 360.0])
+def test_limits_in_degrees_that_were_taken_for_radians_are_told(arm, low, high):
+    (note,) = with_limits(arm, [(low, high)])
+    assert "degrees taken for radians" in note and f"would be {low:.4g} and {high:.4g} deg" in note
+
+
+@pytest.mark.parametrize("limits", HALF_TURNS)
+def test_limits_in_radians_that_were_taken_for_degrees_are_told(arm, limits):
+    (note,) = with_limits(arm, [np.radians(limits)])
+    assert "radians taken for degrees" in note and "times 57.3" in note
+    assert with_limits(arm, [limits]) == ()
+
+
+@pytest.mark.parametrize("limits", [(-5.0, 5.0), (-3.0, 2.0), (-1.0, 1.0), (-10.0, 10.0), (-2.5, 2.5)])
+def test_narrow_limits_of_few_joints_are_not_told(arm, limits):
+    assert with_limits(arm, [np.radians(limits)]) == ()
+
+
+@pytest.mark.parametrize("limits", [(-12.57, 12.57), (-31.4, 31.4), (-20.0, 20.0), (-np.inf, np.inf), (-np.inf, 1.0)])
+def test_limits_of_several_turns_are_not_told(arm, limits):
+    assert with_limits(arm, [limits]) == ()

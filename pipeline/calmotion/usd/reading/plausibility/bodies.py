@@ -9,19 +9,31 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import Body, Character
+from calmotion.model import Body, Character, ElasticMaterial
 from calmotion.model.tolerance import reach
 from calmotion.usd.reading.context import Reading
+from calmotion.usd.units import EARTH_GRAVITY
 
 LIGHTEST, HEAVIEST = 1e-3, 1e3  # [kg]
 SMALLEST, LARGEST = 1e-3, 1e2  # [m]
 DENSEST = 22_600.0  # osmium [kg/m^3]
 _LIGHTEST_SOLID = 10.0  # a foam of polystyrene [kg/m^3]
-_EMPTIEST = 0.05  # mass of a robot over the boxes around its links [kg/m^3]; those of robots have 50 to 2000
+_EMPTIEST = 5.0  # mass of a robot over the boxes around its links [kg/m^3]; those of robots have 40 to 2000
 _USUAL = 1000.0  # [kg/m^3]
 _FRAME = 1e-5  # of a link that stands for a frame [kg]
-_GYRATION = 2.0  # radius of gyration, of the distance of the farthest point from the centre of mass
-_INERTIAS = {1e-3: "masses in grams", 1e-4: "kg cm^2", 1e-6: "kg mm^2", 1e-7: "g cm^2", 1e-9: "g mm^2"}
+_GYRATION = 2.0  # largest radius of gyration, of the distance of the farthest point from the centre of mass
+_NO_INERTIA = 1e-30  # [kg m^2]
+_LEAST_GYRATION = 0.1  # of that of a solid box; those of links of robots are 0.38 and more
+_INERTIAS = {
+    1e-3: "masses in grams", 1e-4: "kg cm^2", 1e-6: "kg mm^2", 1e-7: "g cm^2", 1e-9: "g mm^2",
+    1e3: "masses in kg where the stage has grams", 1e4: "kg m^2 where the stage has centimetres",
+    1e6: "kg m^2 where the stage has millimetres", 1e7: "kg m^2 where the stage has grams and centimetres",
+    1e9: "kg m^2 where the stage has grams and millimetres",
+}  # fmt: skip
+_WEAKEST, _STRONGEST = 0.3, 30.0  # gravity on moons and planets [m/s^2]
+_SOFTEST, _STIFFEST = 1e3, 1.3e12  # a gel, diamond: Young's modulus [Pa]
+_USUAL_MODULUS = 1e10  # [Pa]
+_MODULI = (1e-6, 1e-3, 1e3, 1e6, 1e9)  # kPa, MPa, GPa that were taken for Pa, and the reverse
 
 
 @dataclass(frozen=True)
@@ -48,6 +60,12 @@ class _Link:
         return float(np.prod(self.size))
 
     @property
+    def box_gyration(self) -> float:
+        """Largest radius of gyration of the solid box [m]."""
+        edges = np.sort(self.size)[1:]
+        return float(np.sqrt(edges @ edges / 12.0))
+
+    @property
     def density(self) -> float:
         """The least that its mean density can be [kg/m^3]."""
         return self.mass / self.volume
@@ -65,9 +83,12 @@ def warn_of_units(reading: Reading, path: str, character: Character, resting: Se
     _warn_of_weight(reading, path, character.bodies)
     _warn_of_size(reading, path, far)
     _tell_assumed_unit(reading, far)
+    _warn_of_gravity(reading, path, character.gravity)
     for body in character.bodies:
         if body.flexible is not None and body.mass is None:
             _warn_of_material(reading, body)
+        if body.flexible is not None:
+            _warn_of_modulus(reading, body.flexible.material)
     links = [link for body in character.bodies if body.path not in resting and (link := _link(body))]
     _warn_of_density(reading, links)
     _warn_of_inertia(reading, links)
@@ -132,6 +153,38 @@ def _warn_of_material(reading: Reading, body: Body) -> None:
     )  # fmt: skip
 
 
+def _warn_of_modulus(reading: Reading, material: ElasticMaterial) -> None:
+    modulus = material.youngs_modulus
+    if _SOFTEST <= modulus <= _STIFFEST:
+        return
+    factor = 1.0 / reading.units.pressure(1.0)  # as though it were authored in Pa
+    if not _SOFTEST <= factor * modulus <= _STIFFEST:
+        factor = min(_MODULI, key=lambda factor: abs(np.log10(factor * modulus / _USUAL_MODULUS)))
+    reading.warn(
+        ShotError(
+            "no solid has this Young's modulus", path=material.path, attribute="physics:youngsModulus",
+            found=f"{modulus:.3g} Pa in the units of the stage, metersPerUnit {reading.units.meters:g} and "
+            f"kilogramsPerUnit {reading.units.kilograms:g}",
+            remedy=f"{factor:g} times that would be {factor * modulus:.4g} Pa",
+        )
+    )  # fmt: skip
+
+
+def _warn_of_gravity(reading: Reading, path: str, gravity: Array) -> None:
+    """Warn of a gravity that no planet has: mostly one in metres in a stage of another unit."""
+    size = float(np.linalg.norm(gravity))
+    if size == 0.0 or _WEAKEST <= size <= _STRONGEST:
+        return
+    reading.warn(
+        ShotError(
+            "no planet has this gravity", path=path, attribute="physics:gravityMagnitude",
+            found=f"{size:.3g} m/s^2, {size / reading.units.meters:.4g} in units of {reading.units.meters:g} m",
+            remedy=f"On the Earth it is {EARTH_GRAVITY / size:.3g} times that: "
+            f"author {EARTH_GRAVITY / reading.units.meters:g}",
+        )
+    )  # fmt: skip
+
+
 def _warn_of_density(reading: Reading, links: Sequence[_Link]) -> None:
     """Warn of links that weigh more than a solid box around them can, and of a robot that weighs less than air."""
     dense = sorted((link for link in links if link.density > DENSEST), key=lambda link: -link.density)
@@ -145,7 +198,8 @@ def _warn_of_length(reading: Reading, links: Sequence[_Link], problem: str) -> N
     """Warn of links whose masses and sizes do not belong together, with the unit of lengths that would."""
     first, units, power = links[0], reading.units, round(np.log10(_density(links) / _USUAL) / 3.0)
     factor = 10.0 ** (power or 1)
-    grams = f", or masses times 0.001 (kilogramsPerUnit = {1e-3 * units.kilograms:g})" if factor == 10.0 else ""
+    mass = {10.0: 1e-3, 0.1: 1e3}.get(factor)
+    grams = f", or masses times {mass:g} (kilogramsPerUnit = {mass * units.kilograms:g})" if mass else ""
     size = " x ".join(f"{length:.3g}" for length in first.size)
     reading.warn(
         ShotError(
@@ -158,21 +212,25 @@ def _warn_of_length(reading: Reading, links: Sequence[_Link], problem: str) -> N
 
 
 def _warn_of_inertia(reading: Reading, links: Sequence[_Link]) -> None:
-    """Warn of links whose radius of gyration is beyond all their points, with a unit that fits within a decade."""
+    """Warn of links whose radius of gyration is beyond all their points, or far below that of a box, with a unit that
+    fits within a decade."""
     beyond = [link for link in links if link.gyration > _GYRATION * link.farthest]
-    if not beyond:
-        return
-    worst = max(beyond, key=lambda link: link.gyration / link.farthest)
-    edges = np.sort(worst.size)[1:]
-    usual = float(np.sqrt(edges @ edges / 12.0))  # radius of gyration of a box
-    power = {factor: abs(np.log10(factor * (worst.gyration / usual) ** 2)) for factor in _INERTIAS}
+    below = [link for link in links if link.gyration < _LEAST_GYRATION * link.box_gyration]
+    for found, problem in ((beyond, "an inertia of a larger link"), (below, "an inertia of a smaller link")):
+        if found:
+            _warn_of_one_inertia(reading, found, problem)
+
+
+def _warn_of_one_inertia(reading: Reading, links: Sequence[_Link], problem: str) -> None:
+    worst = max(links, key=lambda link: abs(np.log(link.gyration / link.box_gyration)))
+    power = {factor: abs(np.log10(factor * (worst.gyration / worst.box_gyration) ** 2)) for factor in _INERTIAS}
     factor = min(power, key=power.__getitem__)
     fits = f"Inertias times {factor:g} ({_INERTIAS[factor]}) would fit" if power[factor] < 1.0 else "Correct it"
     reading.warn(
         ShotError(
-            f"an inertia of a larger link{_others(beyond)}", path=worst.path, attribute="physics:diagonalInertia",
-            found=f"a radius of gyration of {worst.gyration:.3g} m, and no point is farther than "
-            f"{worst.farthest:.3g} m from its centre of mass",
+            f"{problem}{_others(links)}", path=worst.path, attribute="physics:diagonalInertia",
+            found=f"a radius of gyration of {worst.gyration:.3g} m, where a box of this size has "
+            f"{worst.box_gyration:.3g} m",
             remedy=f"{fits}, unless the geometry is not that of the link",
         )
     )  # fmt: skip
@@ -198,5 +256,5 @@ def _link(body: Body) -> _Link | None:
     if not np.prod(size) > 0.0:
         return None
     farthest = float(np.linalg.norm(points - body.mass.center, axis=1).max())
-    gyration = float(np.sqrt(np.linalg.eigvalsh(body.mass.inertia)[-1] / body.mass.mass))
+    gyration = float(np.sqrt(max(np.linalg.eigvalsh(body.mass.inertia)[-1], _NO_INERTIA) / body.mass.mass))
     return _Link(body.path, body.mass.mass, size, farthest, gyration)

@@ -1,4 +1,4 @@
-"""Animations in other units: degrees or millimetres that were taken for radians or metres, milliseconds for seconds."""
+"""Animations and limits in other units: degrees taken for radians, millimetres for metres, milliseconds for seconds."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.model import Character, Joint, Motor, Track
 
 _RADIANS = ((np.pi / 180.0, "degrees taken for radians"),)
@@ -14,6 +15,10 @@ _FASTEST = 100.0  # mean speed of a joint without a limit of its speed [rad/s or
 _OVER_LIMIT = 10.0  # mean speed of a joint, of its limit, at which the animation cannot be meant
 _SLOWEST = 0.01  # peak speed of the fastest motor of a robot that moves [rad/s or m/s]
 _SPARSE = 0.5  # time between samples of an animation [s]
+_MANY_TURNS = 30.0  # a limit of an angle beyond which it was rather written in degrees [rad]
+_TURN = 2.0 * np.pi + 0.01  # a limit within which it may have been written in radians [deg]
+_FEW = 3  # limited hinges, all of which are within that
+_ROUND = 5.0  # what limits are multiples of [deg]
 SECONDS = ((1e-3, "milliseconds", "ms"), (1e-6, "microseconds", "us"), (1e-9, "nanoseconds", "ns"))
 
 
@@ -33,6 +38,38 @@ def motion_doubts(character: Character, tracks: Sequence[Track]) -> tuple[str, .
         more = f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""
         notes.append(f"{texts[0]}{more}; {factor:.4g} times that would be within: {name}? {_remedy(name)}")
     return (*notes, *_almost_still(led))
+
+
+def limit_doubts(character: Character) -> tuple[str, ...]:
+    """Sentences about limits of angles that were written in the other unit."""
+    hinges = [joint for joint in character.joints if joint.kind == "revolute" and joint.lower < joint.upper]
+    limits = [(j, np.array([v for v in (j.lower, j.upper) if np.isfinite(v) and v != 0.0])) for j in hinges]
+    limited = [(joint, values) for joint, values in limits if len(values)]
+    wide = [joint for joint, v in limited if np.abs(v).max() > _MANY_TURNS and _is_round(v)]
+    if wide:
+        return (_limits_text(wide, np.pi / 180.0, "degrees taken for radians"),)
+    narrow = [(joint, v) for joint, v in limited if np.degrees(np.abs(v)).max() <= _TURN]
+    sure = [
+        joint for joint, v in narrow if _is_round(180.0 / np.pi * np.degrees(v)) and not _is_round(2.0 * np.degrees(v))
+    ]
+    if len(narrow) == len(limited) and (sure or len(narrow) >= _FEW):
+        return (_limits_text([joint for joint, _ in narrow], 180.0 / np.pi, "radians taken for degrees"),)
+    return ()
+
+
+def _is_round(values: Array) -> bool:
+    """Whether values are multiples of 5, but for the digits that are left out."""
+    away = np.abs(values - _ROUND * np.round(values / _ROUND))
+    return bool(np.all(away <= 1e-3 * np.abs(values)) and np.all(np.abs(values) >= _ROUND - 0.1))
+
+
+def _limits_text(joints: Sequence[Joint], factor: float, name: str) -> str:
+    low, high = np.degrees([joints[0].lower, joints[0].upper])
+    more = f" (and {len(joints) - 1} more)" if len(joints) > 1 else ""
+    return (
+        f"{joints[0].path}: its limits are {low:.4g} and {high:.4g} deg{more}; {name}? Limits times {factor:.4g} would "
+        f"be {low * factor:.4g} and {high * factor:.4g} deg"
+    )
 
 
 def _remedy(name: str) -> str:
