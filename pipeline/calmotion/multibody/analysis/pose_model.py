@@ -13,7 +13,7 @@ from calmotion.multibody.analysis.modes import Matrices, matrices_at
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, start_angles
 from calmotion.multibody.model.phases import system_held
-from calmotion.multibody.model.system import FRICTION, JOINT_ROWS, RATE_SHARE, VELOCITY_GAIN, System
+from calmotion.multibody.model.system import BEYOND_COULOMB, FRICTION, JOINT_ROWS, RATE_SHARE, VELOCITY_GAIN, System
 from calmotion.multibody.statics.equilibrium import equilibrium
 
 
@@ -67,13 +67,15 @@ def pose_model(model: Model, values: Array, world: Array | None = None, highest:
         system = system_held(system, world)
     state, _ = equilibrium(system, rigid_state(model, angles, world), angles, workspace)
     # friction has a slope at rest alone; the robot moves
-    smooth = system._replace(servo=np.where(np.arange(system.servo.shape[1]) == FRICTION, 0.0, system.servo))
+    servo = system.servo.copy()
+    servo[:, [FRICTION, BEYOND_COULOMB]] = 0.0
+    smooth = system._replace(servo=servo)
     found = matrices_at(smooth, state, angles, workspace)
     squares, shapes = found.modes()
     kept = squares <= (2.0 * np.pi * highest) ** 2
     omega, shapes = np.sqrt(np.maximum(squares[kept], 0.0)), shapes[:, kept]
     follows, on_rate = _by_inputs(model, system, found, workspace)
-    at = (part[None] for part in (state.c, state.q, state.u))
+    at = [part[None] for part in (state.c, state.q, state.u)]
     J = _in_all_coordinates(model, target_jacobians(model, *at)[0])
     return PoseModel(
         omega=omega,

@@ -11,7 +11,7 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.assembly import assemble
 from calmotion.multibody.kernels.so3 import logarithm, matrix_of
 from calmotion.multibody.model.model import Model, moves_freely
-from calmotion.multibody.model.system import VELOCITY_GAIN, State, allocate_state
+from calmotion.multibody.model.system import BACK_EMF, VELOCITY_GAIN, State, allocate_state
 from calmotion.support.compilation import allocating_kernel
 
 
@@ -43,8 +43,9 @@ class VelocityForces:
     def __init__(self, model: Model, world: Array | None = None):
         system, self._model = model.system, model
         self.known = len(system.rows) == len(system.parent) and not np.any(moves_freely(model))
-        undamped = np.where(np.arange(system.servo.shape[1]) == VELOCITY_GAIN, 0.0, system.servo)
-        self._system = system._replace(damping=np.zeros_like(system.damping), servo=undamped)
+        servo = system.servo.copy()
+        servo[:, [VELOCITY_GAIN, BACK_EMF]] = 0.0
+        self._system = system._replace(damping=np.zeros_like(system.damping), servo=servo)
         self._workspace, self._world = Workspace.for_system(system), world
         if world is not None:
             self._workspace.work.world[:] = world
