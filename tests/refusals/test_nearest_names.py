@@ -62,5 +62,5 @@ def test_the_nearest_name_is_suggested(tmp_path, name):
 def test_a_given_motion_gets_the_nearest_joint(tmp_path):
     shot = write_arm(tmp_path / "shot.usda")
     tracks = MotorTracks("walk.bvh", np.array([0.0, 1.0]), {"sholder": np.zeros(2)})
-    with pytest.raises(ShotError, match=f"Did you mean {SHOULDER}"):
+    with pytest.raises(ShotError, match="Did you mean shoulder"):
         read_shot(str(shot), given=tracks)
