@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from arms import chain, compiled
 from calmotion.model.motor import Coulomb, DirectCurrent, Directional, Load, Quadratic, Rotor, Stribeck, StribeckLoad
 from calmotion.multibody.model.system import FRICTION, FRICTION_SPEED, FRICTION_TERMS, SERVO_COLUMNS
 from calmotion.multibody.motors.friction import gear_friction, largest_friction
+from calmotion.rigging.motor_types import motor_types
 from motor_runs import INERTIA, LENGTH, MASS, G, pendulum, pitch, run, smooth
 from scipy.integrate import solve_ivp
 
@@ -94,3 +96,46 @@ def test_a_pendulum_on_a_servo_with_each_law_moves_as_its_differential_equations
     expected = [motor(t, exact.sol(t)) for t in times]
     assert np.abs(loads.efforts[:, 0] - expected).max() < 1e-2 * np.abs(expected).max()
     assert errors[1] < 1e-3 and errors[0] / errors[1] > 2.5, errors
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "mass", "length"),
+    [("xl330", "xl330-m288", 0.49, 0.1), ("xl320", "", 0.1, 0.1), ("mx64", "mx-64", 1.0, 0.15)],
+)
+@pytest.mark.parametrize(("variant", "tolerance"), [("m1", 0.02), ("m3", 0.06)])
+def test_the_simulator_of_the_authors_moves_a_pendulum_alike(name, kind, mass, length, variant, tolerance):
+    """M3 differs by what accelerates the link, which counts as load here and not there."""
+    bam = pytest.importorskip("bam.model", reason="better-actuator-models is not installed")
+    from bam.simulate import Simulator
+
+    model = bam.load_model(motor_name=name, model=variant)
+    model.q_offset.value = 0.0
+    actuator, other = model.actuator, Simulator(model)
+    volts, gain, step = actuator.vin, 400.0 if name == "xl330" else 32.0, 1e-3
+    actuator.load_log({"mass": mass, "arm_mass": 0.0, "length": length, "kp": gain, "vin": volts})
+    times = np.arange(0.0, 3.0, step)
+    goal = 0.8 * np.sin(2.0 * times) ** 2
+    theirs = []
+    for target in goal:
+        theirs.append(float(other.q))
+        control = actuator.compute_control(target, other.q, other.dq, step)
+        other.step(control, True, step)
+    current = DirectCurrent(volts, model.R.value, model.kt.value, gain * actuator.error_gain, actuator.max_pwm)
+    rotor = Rotor(
+        model.armature.value, viscous_friction=model.friction_viscous.value, friction=model.friction_base.value,
+        friction_speed=np.radians(0.5), back_emf=current.back_emf,
+        law=Load(model.load_friction_base.value) if variant == "m3" else Coulomb(),
+    )  # fmt: skip
+    character = chain(1, driven=(0,), mass=mass, length=length)
+    gains = {"model": "servo", "position_gain": current.position_gain, "max_torque": current.largest_torque}
+    motors = tuple(replace(m, **gains, rotor=rotor) for m in character.motors)
+    # there the angle of a link that hangs down is zero, here that of a level one
+    command = (goal + np.pi / 2)[:, None]
+    found, _ = run(compiled(replace(character, motors=motors)), command, np.gradient(command, step, axis=0), step)
+    ours = pitch(found.states) - np.pi / 2
+    assert np.abs(ours - theirs).max() < tolerance * np.ptp(theirs)
+    if kind and variant == "m3":
+        values = motor_types()[kind].values
+        assert values["torque_constant"] == pytest.approx(model.kt.value, rel=1e-3)
+        assert values["load"] == pytest.approx(model.load_friction_base.value, rel=1e-3)
+        assert values["armature"] == pytest.approx(model.armature.value, rel=1e-3)
