@@ -21,7 +21,7 @@ _NO_BREAK = "joints do not break; the table of --csv has their reactions"
 _EXACT = "limits are exact"
 _CURVE = "the velocity of a motor is that of its curve"
 # attribute, `{drive}` being that of the joint; values that change nothing, from and to; why it is not used
-_OF_BODIES = (
+OF_BODIES = (
     ("physics:velocity", 0.0, 0.0, _AT_REST),
     ("physics:angularVelocity", 0.0, 0.0, _AT_REST),
     ("physxRigidBody:disableGravity", 0.0, 0.0, _ALL_WEIGH),
@@ -32,7 +32,7 @@ _OF_BODIES = (
     ("physxRigidBody:lockedPosAxis", 0.0, 0.0, "a joint to the world holds a body"),
     ("physxRigidBody:lockedRotAxis", 0.0, 0.0, "a joint to the world holds a body"),
 )
-_OF_JOINTS = (
+OF_JOINTS = (
     ("physics:breakForce", _NEVER, math.inf, _NO_BREAK),
     ("physics:breakTorque", _NEVER, math.inf, _NO_BREAK),
     ("drive:{drive}:physics:targetVelocity", 0.0, 0.0, _CURVE),
@@ -54,12 +54,12 @@ def tell_what_is_not_used(reading: Reading, bodies: Iterable[Usd.Prim], joints: 
         joints: Its joints.
     """
     for prim in bodies:
-        _tell(reading, prim, "", _OF_BODIES)
+        _tell(reading, prim, "", OF_BODIES)
     told: set[tuple[str, str]] = set()
     for joint in joints:
         if joint.prim is not None and (joint.prim_path, joint.drive) not in told:
             told.add((joint.prim_path, joint.drive))
-            _tell(reading, joint.prim, joint.drive, _OF_JOINTS)
+            _tell(reading, joint.prim, joint.drive, OF_JOINTS)
 
 
 def _tell(reading: Reading, prim: Usd.Prim, drive: str, rows: Sequence[tuple[str, float, float, str]]) -> None:
