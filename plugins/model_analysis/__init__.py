@@ -227,7 +227,7 @@ class CompareWithLimits(Operator):
 
         character, animation = context.get(Character), context.get(Animation)
         part = animation if character.retarget.cyclic else busiest(animation, LONG_SHOT)
-        return [ExceededLimits(exceeded_limits(character, part, run_settings(context.get(Source))))]
+        return [exceeded_limits(character, part, run_settings(context.get(Source)))]
 
 
 class VerifyResult(Operator):

@@ -297,7 +297,8 @@ def test_inspect_finds_animations_beyond_the_limits_of_motors(tmp_path, attribut
         "rel physics:body1", f"float calm:motor:{attribute} = {share * peak:.9g}\n        rel physics:body1"
     )
     (tmp_path / "shot.usda").write_text(text)
-    rows = cm.inspect(tmp_path / "shot.usda").report()["limits"]
+    report = cm.inspect(tmp_path / "shot.usda").report()
+    rows, tempo = report["limits"], report["tempo"]
     findings = cm.inspect(tmp_path / "shot.usda", strict=True).findings.items
     found = [finding for finding in findings if quantity in finding.problem]
     assert len(rows) == len(found) == (share < 1.0)
@@ -305,6 +306,10 @@ def test_inspect_finds_animations_beyond_the_limits_of_motors(tmp_path, attribut
         assert rows[0]["quantity"] == quantity and rows[0]["exceeded"]
         assert abs(rows[0]["before"]) == pytest.approx(peak if quantity == "effort" else np.radians(peak), rel=0.02)
         assert found[0].path == HINGE and found[0].attribute == f"calm:motor:{attribute}" and found[0].remedy
+        assert tempo["possible"] and tempo["uniform_stretch"] == pytest.approx(share ** (-1 / order), rel=0.02)
+        assert 0.0 <= tempo["least_added_s"] < tempo["uniform_added_s"]
+    else:
+        assert tempo is None
 
 
 def test_inspecting_a_robot_with_gains_and_without_animation_is_no_problem(tmp_path):

@@ -65,6 +65,7 @@ from calmotion.model.outputs import Recording as Recording
 from calmotion.model.outputs import Rig as Rig
 from calmotion.model.outputs import ShapedTracks as ShapedTracks
 from calmotion.model.outputs import SystemModes as SystemModes
+from calmotion.model.outputs import Tempo as Tempo
 from calmotion.model.outputs import Verification as Verification
 from calmotion.model.outputs import Video as Video
 from calmotion.model.outputs import WrittenLayer as WrittenLayer

@@ -151,10 +151,36 @@ class MotorEffects:
 
 
 @dataclass(frozen=True, eq=False)
+class Tempo:
+    """How much slower a motion has to be.
+
+    Attributes:
+        uniform: Least stretch of the whole that keeps all limits, 1 where they are kept; infinite where a motor cannot
+            hold the robot in a pose.
+        uniform_added_s, least_added_s: Time that this adds, and the least that is added where only what must is slower
+            [s]. The latter does not know limits of jerk.
+        times: Of the animation [s], shape [T].
+        stretch: Of the fastest performance at these, shape [T].
+    """
+
+    uniform: float
+    uniform_added_s: float
+    least_added_s: float
+    times: Array
+    stretch: Array
+
+
+@dataclass(frozen=True, eq=False)
 class ExceededLimits:
-    """The limits of motors that the animation exceeds, each where it does most."""
+    """The limits of motors that the animation exceeds.
+
+    Attributes:
+        uses: Each where it does most.
+        tempo: How much slower it has to be; None where that would not help (positions), or is not known.
+    """
 
     uses: tuple[LimitUse, ...]
+    tempo: Tempo | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,3 +48,6 @@ from calmotion.simulation.simulate import shape_tracks as shape_tracks
 from calmotion.simulation.simulate import simulate_shot as simulate_shot
 from calmotion.simulation.simulator import Simulator as Simulator
 from calmotion.simulation.target_errors import Objective as Objective
+from calmotion.simulation.tempo import MotorEfforts as MotorEfforts
+from calmotion.simulation.tempo import TempoLimits as TempoLimits
+from calmotion.simulation.tempo import needed_tempo as needed_tempo

@@ -102,6 +102,20 @@ def _beyond(character: Character, exceeded: ExceededLimits) -> Iterator[Finding]
         )  # fmt: skip
 
 
+def _tempo_report(exceeded: ExceededLimits | None) -> dict[str, Any] | None:
+    """How much slower the animation has to be; None where it need not, or that is not known."""
+    tempo = None if exceeded is None else exceeded.tempo
+    if tempo is None:
+        return None
+    possible = bool(np.isfinite(tempo.uniform))
+    return {
+        "possible": possible,
+        "uniform_stretch": tempo.uniform if possible else None,
+        "uniform_added_s": tempo.uniform_added_s if possible else None,
+        "least_added_s": tempo.least_added_s if possible else None,
+    }
+
+
 def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]:
     """The object of `inspect --json`; SI units and radians, as the names of the keys say.
 
@@ -162,6 +176,7 @@ def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]
             for target in character.targets
         ],
         "limits": [limit_row(character, use) for use in exceeded.uses] if exceeded else [],
+        "tempo": _tempo_report(exceeded),
         "effects_of_gains": _effects(character, run.get(MotorEffects)),
         "expected": _expected(character, animation, modes, settings),
         "system_frequencies_hz": modes.frequencies[:SHOWN_MODES].tolist() if modes else [],

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from calmotion.cli.quantities import angle, counted, frequency, length
 from calmotion.cli.reports.left_out import print_left_out
-from calmotion.cli.reports.limits import print_limits
+from calmotion.cli.reports.limits import print_limits, print_tempo
 from calmotion.cli.reports.run import print_notes
 from calmotion.cli.reports.verdict import NOTHING_SHAKES
 from calmotion.cli.tables import print_table, say
@@ -96,6 +96,7 @@ def _print_contents(console: Console, report: dict[str, Any], verbose: bool) -> 
         )
         say(console, f"natural frequencies of the character in its first pose (damping ratios): {shown}, ...")
     print_limits(console, report["limits"], False)
+    print_tempo(console, report["tempo"])
     _print_gains(console, report)
     print_left_out(console, report["left_out"], verbose)
     if report["mode_shapes"]:

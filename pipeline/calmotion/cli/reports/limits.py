@@ -26,6 +26,19 @@ def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: 
     print_table(console, "Active limits of motors", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
 
 
+def print_tempo(console: Console, tempo: dict[str, Any] | None) -> None:
+    """How much slower the animation would have to be for motors to keep their limits on rigid links."""
+    if tempo is None:
+        return
+    if not tempo["possible"]:
+        say(console, "No tempo helps: in some pose a motor is too weak to hold the robot.")
+        return
+    whole, parts = tempo["uniform_added_s"], tempo["least_added_s"]
+    stretch = f"{tempo['uniform_stretch']:.0%} of its time ({whole:.2f} s more)"
+    say(console, f"On rigid links the whole shot at {stretch} keeps these limits.")
+    say(console, f"Slowed down only where it must be, it takes at least {parts:.2f} s more.")
+
+
 def print_reason(console: Console, report: dict[str, Any]) -> None:
     """Why the curves of `optimize` exceed limits or are worse than the animation, and what to do; else nothing."""
     limits, worse = report["limits"], not report["improved"]

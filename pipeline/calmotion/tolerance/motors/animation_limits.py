@@ -2,31 +2,40 @@
 
 from __future__ import annotations
 
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from calmotion.arrays import Array
 from calmotion.model import Animation, Character
 from calmotion.model.character import with_ideal_motors
 from calmotion.model.limits.base import CurveLimit
 from calmotion.model.limits.kinds import kinds_of_limits
-from calmotion.model.limits.use import LimitUse, is_exceeded
+from calmotion.model.limits.use import is_exceeded
+from calmotion.model.outputs import ExceededLimits
 from calmotion.model.run import RunSettings
+from calmotion.multibody.analysis.motor_response import motor_responses
+from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import body_anchors, rigid_body
 from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.cyclic import SteadyState
-from calmotion.simulation.forward import limited_values, run_forward
-from calmotion.simulation.inputs.curves import sample_curves
+from calmotion.simulation.forward import ForwardRun, limited_values, run_forward
+from calmotion.simulation.inputs.curves import Curves, sample_curves
 from calmotion.simulation.motor_limits import excesses, motor_bounds
-from calmotion.simulation.preparation import prepare
+from calmotion.simulation.preparation import Prepared, prepare
 from calmotion.simulation.report import limit_uses
+from calmotion.simulation.tempo import MOST_INSTANTS, MotorEfforts, TempoLimits, needed_tempo
 from calmotion.tolerance.simplification.by_rigid_poses import with_rough_masses
 
 
-def exceeded_limits(character: Character, animation: Animation, options: RunSettings) -> tuple[LimitUse, ...]:
+def exceeded_limits(character: Character, animation: Animation, options: RunSettings) -> ExceededLimits:
     """The limits that an animation exceeds on a rigid robot with ideal motors, each where it does most.
 
     Efforts are those of rigid links: flexible ones swing about them. Links without a stated mass have that of their
-    closed surface, or of half of the box around it. Where the robot cannot follow the animation, efforts are unknown.
+    closed surface, or of half of the box around it. Where the robot cannot follow the animation, efforts are unknown,
+    and so is the tempo at which it could where efforts are limited.
 
     Args:
         character, animation: The shot.
@@ -34,7 +43,7 @@ def exceeded_limits(character: Character, animation: Animation, options: RunSett
     """
     bounds = motor_bounds(character)
     if not bounds:
-        return ()
+        return ExceededLimits(())
     tree, rough = span_tree(character), with_rough_masses(with_ideal_motors(character))
     rigid = [rigid_body(body, own) for body, own in zip(rough.bodies, body_anchors(rough, tree), strict=True)]
     prepared = prepare(compile_shot(rough, animation, rigid), options)
@@ -44,9 +53,48 @@ def exceeded_limits(character: Character, animation: Animation, options: RunSett
     try:
         run = run_forward(model, workspace, curves.angles, curves.rates, grid.h, world, steady=steady)
         values = limited_values(model, bounds, curves, run)
+        efforts = _efforts(prepared, run, values["effort"], curves) if "effort" in values and steady is None else None
     except SimulationFailure:
+        efforts = None
         kinds = {name: kind for name, kind in kinds_of_limits().items() if isinstance(kind, CurveLimit)}
         values = {name: curves.derivatives[kinds[name].order] for name in bounds if name in kinds}
         bounds = {name: bounds[name] for name in values}
     found = excesses(bounds, values, grid.judged)
-    return tuple(use for use in limit_uses(found, found, grid) if is_exceeded(use))
+    uses = tuple(use for use in limit_uses(found, found, grid) if is_exceeded(use))
+    slower = [use for use in uses if use.quantity != "position"]
+    known = efforts is not None or all(use.quantity != "effort" for use in slower)
+    if not slower or not known:
+        return ExceededLimits(uses)
+    largest = {
+        name: bounds[name].upper if name in bounds else np.full(len(character.motors), np.inf) for name in _NAMES
+    }
+    judged = grid.judged
+    if efforts is not None:
+        efforts = MotorEfforts(*(part[judged] for part in (efforts.at_rest, efforts.by_square, efforts.by_change)))
+    return ExceededLimits(
+        uses, needed_tempo(grid.times[judged], curves.angles[judged], TempoLimits(**largest), efforts)
+    )  # fmt: skip
+
+
+_NAMES = ("velocity", "acceleration", "jerk", "effort")
+
+
+def _efforts(prepared: Prepared, run: ForwardRun, efforts: Array, curves: Curves) -> MotorEfforts:
+    """What the motors of the rigid robot have to do: at rest, by the square of the tempo, and by its change.
+
+    Raises:
+        SimulationFailure: A pose in which the robot finds no rest, or its system is singular.
+    """
+    model, grid, states = prepared.model, prepared.grid, run.trajectory.states
+    slow = 1e3  # at which nothing but weight is left
+    rest = run_forward(
+        model, Workspace.for_system(model.system), curves.angles, curves.rates / slow, slow * grid.h, prepared.world
+    )
+    weight = model.motor_values(reactions(model.system, rest.trajectory, rest.joint_angles, rest.joint_rates).efforts)
+    few = np.unique(np.linspace(0, len(grid.times) - 1, MOST_INSTANTS).round().astype(int))
+    motors = np.arange(curves.angles.shape[1], dtype=np.int32)
+    _, inertia = motor_responses(
+        model, states.c[few], states.q[few], run.joint_angles[few], motors, prepared.world[few], grid.times[few]
+    )  # fmt: skip
+    change = CubicSpline(grid.times[few], np.einsum("tmk,tk->tm", inertia, curves.rates[few]))(grid.times)
+    return MotorEfforts(weight, efforts - weight, change)
