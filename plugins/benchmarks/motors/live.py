@@ -71,8 +71,9 @@ class _Robot:
 
     def __init__(self, prepared: Prepared, frequencies: float):
         system, self._grid, self._world = prepared.model.system, prepared.grid, prepared.world
-        tables = {"stiffness": frequencies**2 * system.stiffness, "data": frequencies**2 * system.data}
-        self._model: Model = replace(prepared.model, system=system._replace(**tables))
+        square = frequencies**2
+        stiffer = system._replace(stiffness=square * system.stiffness, data=square * system.data)
+        self._model: Model = replace(prepared.model, system=stiffer)
         curves = sample_curves(prepared.shot.animation.current, prepared.grid)
         rigid = rigid_motion(prepared.model, curves.angles, curves.rates, self._grid.h, self._world, False)
         always = np.ones(len(self._grid.times), bool)
