@@ -85,8 +85,9 @@ def round_up(value: float) -> float:
     return float(next(step for step in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if step * power >= value * (1 - 1e-9)) * power)
 
 
-def draw_chart(chart: Chart, time: float) -> Image.Image:
-    """The chart at a time of the shot: what was played is drawn in full, what comes is faint."""
+@cache
+def _curves(chart: Chart, played: bool) -> Image.Image:
+    """The chart with its curves as they look before, or after they were played, `SMOOTH` times as large."""
     large = Image.new("RGB", (SMOOTH * chart.size[0], SMOOTH * chart.size[1]), "white")
     draw = ImageDraw.Draw(large, "RGBA")
     left, top, right, bottom = (SMOOTH * side for side in chart.box)
@@ -96,29 +97,44 @@ def draw_chart(chart: Chart, time: float) -> Image.Image:
     draw.line((left, bottom, right, bottom), fill=GRID, width=SMOOTH)
     draw.line((left, top, right, top), fill=GRID, width=SMOOTH)
     for curve in chart.curves:
-        draw_curve(draw, chart, curve, time)
-    x = SMOOTH * chart.place(np.array([time]), np.zeros(1))[0][0]
-    draw.line((x, top, x, bottom), fill=INK, width=SMOOTH)
-    for curve in chart.curves:
-        value = float(np.interp(time, curve.times, curve.values))
-        ((_, y),) = chart.place(np.array([time]), np.array([value]))
-        radius = SMOOTH * chart.text / 3.2
-        draw.ellipse((x - radius, SMOOTH * y - radius, x + radius, SMOOTH * y + radius), fill=curve.color)
-    picture = large.reduce(SMOOTH)
+        points = [(SMOOTH * x, SMOOTH * y) for x, y in chart.place(curve.times, curve.values)]
+        draw.line(points, fill=(*curve.color, 80), width=SMOOTH, joint="curve")
+        if played:
+            draw.polygon([*points, (points[-1][0], bottom), (points[0][0], bottom)], fill=(*curve.color, 40))
+            draw.line(points, fill=(*curve.color, 255), width=2 * SMOOTH, joint="curve")
+    return large
+
+
+@cache
+def _shown(chart: Chart, played: bool) -> Image.Image:
+    """The same in the size of the video, with title, scale and legend."""
+    picture = _curves(chart, played).reduce(SMOOTH)
     write_labels(picture, chart)
     return picture
 
 
-def draw_curve(draw: ImageDraw.ImageDraw, chart: Chart, curve: Curve, time: float) -> None:
-    """One curve with the area below it."""
-    points = [(SMOOTH * x, SMOOTH * y) for x, y in chart.place(curve.times, curve.values)]
-    bottom = SMOOTH * chart.box[3]
-    played = int(np.searchsorted(curve.times, time, side="right"))
-    draw.line(points, fill=(*curve.color, 80), width=SMOOTH, joint="curve")
-    if played > 1:
-        area = [*points[:played], (points[played - 1][0], bottom), (points[0][0], bottom)]
-        draw.polygon(area, fill=(*curve.color, 40))
-        draw.line(points[:played], fill=(*curve.color, 255), width=2 * SMOOTH, joint="curve")
+def draw_chart(chart: Chart, time: float) -> Image.Image:
+    """The chart at a time of the shot: what was played is drawn in full, what comes is faint."""
+    picture, now = _shown(chart, False).copy(), chart.place(np.array([time]), np.zeros(1))[0][0]
+    left, top, _, bottom = chart.box
+    part = (0, int(top), round(now), chart.size[1] - chart.text)
+    picture.paste(_shown(chart, True).crop(part), part)
+    # the line and the dots of this moment, smooth: on the large curves around it
+    radius = chart.text / 3.2
+    low, high = int(now - radius) - 1, int(now + radius) + 2
+    strip = (low, int(top - radius) - 1, high, int(bottom + radius) + 2)
+    large = picture.crop(strip).resize(
+        (SMOOTH * (high - low), SMOOTH * (strip[3] - strip[1])), Image.Resampling.NEAREST
+    )
+    draw = ImageDraw.Draw(large)
+    x = SMOOTH * (now - low)
+    draw.line((x, SMOOTH * (top - strip[1]), x, SMOOTH * (bottom - strip[1])), fill=INK, width=SMOOTH)
+    for curve in chart.curves:
+        value = float(np.interp(time, curve.times, curve.values))
+        y = SMOOTH * (chart.place(np.array([time]), np.array([value]))[0][1] - strip[1])
+        draw.ellipse((x - SMOOTH * radius, y - SMOOTH * radius, x + SMOOTH * radius, y + SMOOTH * radius), curve.color)
+    picture.paste(large.reduce(SMOOTH), strip[:2])
+    return picture
 
 
 def write_labels(picture: Image.Image, chart: Chart) -> None:

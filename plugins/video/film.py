@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from calmotion.model import Animation, Character, Result, Simulation
-from calmotion.multibody import in_parallel
+from calmotion.multibody import processors
 from calmotion.support import distinct_names
 from PIL import Image, ImageDraw
 
 from .chart import FAINT, GRID, INK, Chart, Color, Curve, draw_chart, font
 from .encoding import encode
-from .stage import Stage, draw_panel, set_stage
+from .stage import Stage, draw_panels, set_stage
 from .timeline import AFTER_WORST, BEFORE_WORST, Moment, largest_errors, moments, worst_moment
 
 # Okabe and Ito's colors, as in the figures and recordings.
@@ -21,7 +25,8 @@ BEFORE, AFTER, INTENDED = (213, 94, 0), (0, 114, 178), (0, 158, 115)
 HEIGHTS = (0.55, 1.15)  # of a panel, as shares of its width
 CHART = 0.13  # height of the chart, as a share of the width of the video
 LEAST_CHART = 100  # [pixels]
-AT_ONCE = 4  # frames that are drawn in threads, each of which takes some 200 MB meanwhile
+ENCODING = 2e-8  # time of WebP's encoder for a pixel of a square as wide as the video, on a processor of 2020 [s]
+AHEAD = 3  # frames that are drawn before the encoder needs them, each of which takes some 50 MB meanwhile
 Progress = Callable[[float, str], None]
 
 
@@ -81,18 +86,36 @@ def write_video(
         ShotError: The file cannot be written.
     """
     film, frames = plan(character, animation, result, settings)
-
+    seconds = expected_time(film, frames)
+    progress(0.0, f"about {seconds:.0f} s for {len(frames)} frames" if seconds >= 1.0 else f"{len(frames)} frames")
     encode(path, _drawn(film, frames, progress), len(frames), settings.rate, settings.quality)
 
 
+def expected_time(film: Film, frames: Sequence[Moment]) -> float:
+    """How long a video takes to write, of the order of the real time [s]; threads draw, and one encodes meanwhile."""
+    draw_frame(film, frames[0])  # loads the kernels
+    begin = time.perf_counter()
+    draw_frame(film, frames[0])
+    draw_frame(film, frames[-1])
+    drawing = 0.5 * (time.perf_counter() - begin) * len(set(frames)) / processors()
+    return max(drawing, ENCODING * film.width**2 * len(frames))
+
+
 def _drawn(film: Film, frames: Sequence[Moment], progress: Progress) -> Iterator[Image.Image]:
-    """The frames in order; some are drawn at once."""
-    for first in range(0, len(frames), AT_ONCE):
-
-        def done(number: int, first: int = first) -> None:
-            progress((first + number) / len(frames), f"frame {first + number + 1} of {len(frames)}")
-
-        yield from in_parallel(lambda moment: draw_frame(film, moment), frames[first : first + AT_ONCE], done)
+    """The frames in order, which threads draw ahead of the encoder; a moment that stays is drawn once."""
+    with ThreadPoolExecutor(processors()) as pool:
+        ahead: deque[tuple[Moment, Future[Image.Image]]] = deque()
+        coming = iter(frames)
+        try:
+            for number in range(len(frames)):
+                for moment in islice(coming, 1 + AHEAD - len(ahead)):
+                    same = ahead and ahead[-1][0] == moment
+                    ahead.append((moment, ahead[-1][1] if same else pool.submit(draw_frame, film, moment)))
+                progress(number / len(frames), f"frame {number + 1} of {len(frames)}")
+                yield ahead.popleft()[1].result()
+        finally:
+            for _, drawing in ahead:
+                drawing.cancel()
 
 
 def plan(character: Character, animation: Animation, result: Result, settings: Settings) -> tuple[Film, list[Moment]]:
@@ -122,7 +145,7 @@ def plan(character: Character, animation: Animation, result: Result, settings: S
 
 def draw_frame(film: Film, moment: Moment) -> Image.Image:
     """One frame: a panel for each motion with its error above, and the curve below."""
-    panels = [draw_panel(film.stage, run, moment, color, INTENDED) for run, color, _ in film.runs]
+    panels = draw_panels(film.stage, [(run, color) for run, color, _ in film.runs], moment, INTENDED)
     head = round(3.4 * film.text)
     chart = draw_chart(film.chart, moment.time) if film.chart else None
     height = head + panels[0].height + (chart.height if chart else 0)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from calmotion.arrays import Array
@@ -10,15 +12,19 @@ from calmotion.model import Animation, Character, Motion, Result, Simulation
 from calmotion.views import (
     Camera,
     Model,
+    Seen,
     View,
     choose_viewpoint,
     draw_over_ghost,
     fit_camera,
     floor_below,
+    ghost_of,
     moving_cloud,
     near_scenery,
     prepare,
     sample_motion,
+    see,
+    with_picture,
 )
 from PIL import Image, ImageDraw
 
@@ -51,6 +57,13 @@ class Stage:
     zoom: float
     target: int
     floor: float | None
+
+    @cached_property
+    def wide(self) -> Seen:
+        """The scenery as the camera of the whole motion sees it."""
+        nothing = sample_motion(self.reference, np.zeros(1))
+        view = View(self.model, nothing, nothing, 0, self.camera, SMOOTH, floor=self.floor)
+        return with_picture(view, see(view, None))
 
     def camera_at(self, moment: Moment) -> Camera:
         """The camera of a moment; the near view keeps the intended place of the worst target in its middle."""
@@ -102,27 +115,59 @@ def set_stage(
     return Stage(model, result.reference, camera, zoom, worst.target, floor)
 
 
-def draw_panel(stage: Stage, run: Simulation, moment: Moment, color: Color, ghost: Color) -> Image.Image:
-    """One motion at one moment, over the intended motion, with the trails of the targets."""
+def draw_panels(
+    stage: Stage, runs: Sequence[tuple[Simulation, Color]], moment: Moment, ghost: Color
+) -> list[Image.Image]:  # fmt: skip
+    """Motions at one moment, each over the intended motion, with the trails of the targets."""
     now = np.array([moment.time])
-    camera = stage.camera_at(moment)
-    motion, reference = sample_motion(run.motion, now), sample_motion(stage.reference, now)
-    view = View(stage.model, motion, reference, 0, camera, SMOOTH, floor=stage.floor)
-    picture = Image.fromarray(draw_over_ghost(view))
-    marks = Image.new("RGBA", camera.size)
-    draw = ImageDraw.Draw(marks)
+    camera, reference = stage.camera_at(moment), sample_motion(stage.reference, now)
+    first = View(stage.model, reference, reference, 0, camera, SMOOTH, floor=stage.floor)
+    backdrop = stage.wide if camera is stage.camera else see(first, None)
+    intended = ghost_of(first, backdrop)
+    pictures = []
+    for run, color in runs:
+        motion = sample_motion(run.motion, now)
+        picture = Image.fromarray(draw_over_ghost(replace(first, motion=motion), backdrop, intended))
+        draw_marks(picture, stage, run, moment, (reference, motion), camera, (ghost, color))
+        pictures.append(picture)
+    return pictures
+
+
+def draw_marks(
+    picture: Image.Image, stage: Stage, run: Simulation, moment: Moment, poses: Sequence[Motion], camera: Camera,
+    colors: tuple[Color, Color],
+) -> None:  # fmt: skip
+    """Draw the trails of the targets, and in a near view the target's places, the intended motion's below.
+
+    Args:
+        picture: To draw on, in place.
+        stage: For the target of the near view.
+        run: The motion that is shown.
+        moment: Of the picture.
+        poses: The intended motion and that of the run at this moment.
+        camera: Of the moment.
+        colors: Of both.
+    """
     width = max(camera.size[0] / 260.0, 2.0)
-    for motion_, tint, share in ((stage.reference, ghost, 0.6), (run.motion, color, 1.0)):
-        trail = recent(motion_, moment.time)
+    trails = [camera.project(recent(motion, moment.time))[..., :2] for motion in (stage.reference, run.motion)]
+    points = np.concatenate([trail.reshape(-1, 2) for trail in trails])
+    # only the part of the picture that is drawn on, from a pixel of the picture on
+    low = SMOOTH * np.floor(np.clip((points.min(axis=0, initial=0.0) - 3.0 * width) / SMOOTH, 0, None)).astype(int)
+    high = np.minimum(np.ceil(points.max(axis=0, initial=0.0) + 3.0 * width), camera.size).astype(int)
+    if np.any(high <= low):
+        return
+    marks = Image.new("RGBA", tuple((high - low).tolist()))
+    draw = ImageDraw.Draw(marks)
+    for trail, tint, share in zip(trails, colors, (0.6, 1.0), strict=True):
         for k in range(trail.shape[1]):
-            draw_trail(draw, camera.project(trail[:, k])[:, :2], tint, share * width)
+            draw_trail(draw, trail[:, k] - low, tint, share * width)
     if moment.near > 0.0:
-        ends = [camera.project(m.target_positions[0, stage.target])[:2] for m in (reference, motion)]
-        draw.line([tuple(end) for end in ends], fill=(*color, 255), width=round(0.8 * width))
-        for end, tint in zip(ends, (ghost, color), strict=True):
+        ends = [camera.project(pose.target_positions[0, stage.target])[:2] - low for pose in poses]
+        draw.line([tuple(end) for end in ends], fill=(*colors[1], 255), width=round(0.8 * width))
+        for end, tint in zip(ends, colors, strict=True):
             draw_dot(draw, end, 1.9 * width, tint)
-    picture.paste(marks.reduce(SMOOTH), mask=marks.reduce(SMOOTH).getchannel("A"))
-    return picture
+    small = marks.reduce(SMOOTH)
+    picture.paste(small, tuple((low // SMOOTH).tolist()), small)
 
 
 def recent(motion: Motion, time: float) -> Array:

@@ -25,3 +25,15 @@ def test_details_are_for_those_who_ask(verbose, capsys):
     ProgressDisplay(False, verbose=verbose).done(OperatorResult("a.b", "Make it", "a", Outcome.DONE, records=records))
     told = capsys.readouterr().err
     assert "note: no target" in told and ("note: 413 points" in told) == verbose
+
+
+def test_a_log_tells_how_long_a_stage_takes_and_what_it_does_where_that_takes_long(capsys, monkeypatch):
+    from calmotion.cli import progress
+    from calmotion.workflow.run import Progress
+
+    clock = iter([0.0, 1.0, 2.0, 30.0])
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
+    with progress.ProgressDisplay(False) as display:
+        for stage, message in (("Film", "about 12 s for 9 frames"), ("Mesh", "/a"), ("Mesh", "/b"), ("Mesh", "/c")):
+            display(Progress(stage, 0.0, message))
+    assert capsys.readouterr().err.splitlines() == ["Film: about 12 s for 9 frames", "Mesh: /c"]

@@ -10,13 +10,14 @@ import synthetic
 from calmotion.model import SurfaceMesh
 from calmotion.views.rendering import (
     View,
-    draw,
     draw_over_ghost,
     fit_camera,
     floor_below,
+    ghost_of,
     pose,
     prepare,
-    visible_surfaces,
+    see,
+    with_picture,
 )
 from calmotion.views.viewpoint import choose_viewpoint
 
@@ -65,11 +66,11 @@ def seen():
 def test_scenery_is_drawn_and_hides_what_is_behind_it(seen):
     character, result, camera = seen
     model, row = prepare(character, result.skins), len(result.before.motion.times) - 1
-    _, _, surface = draw(View(model, result.before.motion, result.before.motion, row, camera, 1))
+    surface = see(View(model, result.before.motion, result.reference, row, camera, 1), result.before.motion).surface
     x, y = camera.project(result.before.motion.target_positions[row, 0])[:2].astype(int)
     assert surface[y, x] == len(model.parts), "the wall stands before the target"
     bare = prepare(dataclasses.replace(character, scenery=()), result.skins)
-    _, _, surface = draw(View(bare, result.before.motion, result.before.motion, row, camera, 1))
+    surface = see(View(bare, result.before.motion, result.reference, row, camera, 1), result.before.motion).surface
     assert 0 <= surface[y, x] < len(bare.parts)
 
 
@@ -92,9 +93,16 @@ def test_the_shadow_falls_on_the_floor_and_on_what_lies_there(seen):
     model = prepare(dataclasses.replace(character, scenery=()), result.skins)
     floor = floor_below(model, result.reference)
     assert floor == pytest.approx(min(float(pose(model, result.reference, 0)[0][..., 2].min()), 0.0))
-    view = View(model, result.before.motion, result.reference, 60, camera, 1)
-    plain, hits, _ = draw(view)
-    dark = draw(dataclasses.replace(view, floor=floor - 0.05))[0]
-    darker = dark.sum(axis=-1) < plain.sum(axis=-1) - 1e-6
-    assert darker.any() and not np.any(darker & hits.filled)
-    assert visible_surfaces(hits, np.zeros(10_000, dtype=np.int32)).max() == 0
+    view = View(model, result.before.motion, result.before.motion, 60, camera, 1)
+    plain, dark = (draw_over_ghost(dataclasses.replace(view, floor=height)) for height in (None, floor - 0.05))
+    darker = dark.astype(int).sum(axis=-1) < plain.astype(int).sum(axis=-1)
+    assert darker.any() and not np.any(darker & see(view, view.motion).hits.filled)
+
+
+def test_a_pose_before_scenery_that_was_drawn_is_the_same_picture(seen):
+    character, result, camera = seen
+    view = View(prepare(character, result.skins), result.before.motion, result.reference, 60, camera, 2, floor=-0.1)
+    backdrop = see(view, None)
+    ghost = ghost_of(view, backdrop)
+    for before in (backdrop, with_picture(view, backdrop)):
+        np.testing.assert_array_equal(draw_over_ghost(view, before, ghost), draw_over_ghost(view))

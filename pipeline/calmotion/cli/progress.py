@@ -6,6 +6,7 @@ A program that runs calmotion reads lines `progress<tab>stage<tab>fraction<tab>m
 from __future__ import annotations
 
 import sys
+import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
     from calmotion.cli.bars import Bars
+
+QUIET_S = 10.0  # after which a log says what a stage does
 
 
 class ProgressDisplay:
@@ -35,6 +38,7 @@ class ProgressDisplay:
         self._farm = FarmProgress() if openjd else None
         self._bars: Bars | None = None
         self._tasks: dict[str, TaskID] = {}
+        self._stage, self._since = "", 0.0
 
     def __enter__(self) -> ProgressDisplay:
         if not self._quiet and not self._machine and sys.stderr.isatty():
@@ -58,15 +62,26 @@ class ProgressDisplay:
         if self._farm:
             self._farm.show(state)
         if self._machine:
-            line = "\t".join(("progress", stage, f"{fraction:.4f}", message)).replace("\n", " ")
+            line = "\t".join(("progress", stage, f"{fraction:.4f}", message or stage)).replace("\n", " ")
             print(line, file=sys.stderr, flush=True)
         if self._bars is None:
+            self._log(stage, message)
             return
         self._bars.message = message
         left = time_left(state.time_left_s)
         if stage not in self._tasks:
             self._tasks[stage] = self._bars.add_task(stage, total=1.0, left=left)
         self._bars.update(self._tasks[stage], completed=fraction, left=left)
+
+    def _log(self, stage: str, message: str) -> None:
+        """In a log, tell what takes long: a message that begins with an estimate (`about 20 s`), or after `QUIET_S`."""
+        now, new = time.monotonic(), stage != self._stage
+        if new:
+            self._stage, self._since = stage, now
+        told = message.startswith("about ") or (message and now - self._since > QUIET_S)
+        if told and not self._quiet and not self._machine:
+            self._tell(f"{stage}: {message}")
+            self._since = now
 
     def done(self, result: OperatorResult) -> None:
         """Show the outcome of an operator, and its messages."""

@@ -10,12 +10,16 @@ from calmotion.views.raster import rasterize as rasterize
 from calmotion.views.rendering import Camera as Camera
 from calmotion.views.rendering import Mask as Mask
 from calmotion.views.rendering import Model as Model
+from calmotion.views.rendering import Seen as Seen
 from calmotion.views.rendering import View as View
 from calmotion.views.rendering import draw_over_ghost as draw_over_ghost
 from calmotion.views.rendering import fit_camera as fit_camera
 from calmotion.views.rendering import floor_below as floor_below
+from calmotion.views.rendering import ghost_of as ghost_of
 from calmotion.views.rendering import pose as pose
 from calmotion.views.rendering import prepare as prepare
+from calmotion.views.rendering import see as see
+from calmotion.views.rendering import with_picture as with_picture
 from calmotion.views.shading import split_at_creases as split_at_creases
 from calmotion.views.spectrum import error_spectrum as error_spectrum
 from calmotion.views.spectrum import highest_frequency as highest_frequency

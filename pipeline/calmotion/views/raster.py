@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from calmotion.arrays import Array, IntArray
 from calmotion.support.compilation import kernel
 
+CLOSE = 1e-9  # [pixels]: rounding, by which neighbours overlap rather than leave a gap
+
 
 @dataclass(frozen=True, eq=False)
 class Hits:
@@ -17,46 +19,64 @@ class Hits:
 
     Attributes:
         triangle: Index of the triangle, -1 for none, shape [height, width].
-        shares: Barycentric coordinates in it on the picture, shape [height, width, 2]; the third is one minus both.
-        depth: Distance, infinite for none, shape [height, width].
+        nearness: One over the distance, 0 for none, shape [height, width].
+        corners: Of the triangles, as they were given.
     """
 
     triangle: IntArray
-    shares: NDArray[np.float32]
-    depth: Array
+    nearness: NDArray[np.float32]
+    corners: Array
 
     @property
     def filled(self) -> NDArray[np.bool_]:
         """Whether there is a triangle, shape [height, width]."""
         return self.triangle >= 0
 
+    @property
+    def depth(self) -> Array:
+        """Distance, infinite for none, shape [height, width]."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / self.nearness.astype(float))
 
-def rasterize(corners: Array, width: int, height: int, *, both_sides: bool = False) -> Hits:
+    @property
+    def shares(self) -> Array:
+        """Barycentric coordinates on the picture, shape [height, width, 2]; the third is one minus both."""
+        found = np.zeros((*self.triangle.shape, 2))
+        for row, column in zip(*np.nonzero(self.filled), strict=True):
+            found[row, column] = barycentric(self.corners[self.triangle[row, column]], column + 0.5, row + 0.5)
+        return found
+
+
+def rasterize(
+    corners: Array, width: int, height: int, *, both_sides: bool = False, before: Hits | None = None
+) -> Hits:  # fmt: skip
     """Find the nearest triangle in each pixel.
 
     Args:
         corners: Pixel coordinates (x right, y down) and distance of the corners, shape [m, 3, 3].
         width, height: Size of the picture [pixels].
         both_sides: Whether triangles that face away (clockwise on an upright picture) are drawn as well.
+        before: Hits of the first triangles of `corners`, which are there already; the others alone are drawn.
 
     Returns:
         The hits. Triangles with a corner behind the eye are not drawn.
     """
-    hits = Hits(
-        np.full((height, width), -1, dtype=np.int32),
-        np.zeros((height, width, 2), dtype=np.float32),
-        np.full((height, width), np.inf),
-    )
     given = np.ascontiguousarray(corners, dtype=float)
-    fill(given, bool(both_sides), hits.triangle, hits.shares, hits.depth)
+    if before is None:
+        hits = Hits(np.full((height, width), -1, dtype=np.int32), np.zeros((height, width), dtype=np.float32), given)
+        fill(given, 0, bool(both_sides), hits.triangle, hits.nearness)
+        return hits
+    hits = Hits(before.triangle.copy(), before.nearness.copy(), given)
+    fill(given, len(before.corners), bool(both_sides), hits.triangle, hits.nearness)
     return hits
 
 
 @kernel
-def fill(corners: Array, both_sides: bool, triangle: IntArray, shares: NDArray[np.float32], depth: Array) -> None:
-    """Write the triangles into the buffers of `Hits`, each pixel where its center is inside one that is nearer."""
+def fill(corners: Array, first: int, both_sides: bool, triangle: IntArray, nearness: NDArray[np.float32]) -> None:
+    """Write triangles, from the first one on, into the buffers of `Hits`, where one has a pixel's center, and is nearer
+    than what is there."""
     height, width = triangle.shape
-    for t in range(corners.shape[0]):
+    for t in range(first, corners.shape[0]):
         ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
         bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
         cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
@@ -68,19 +88,36 @@ def fill(corners: Array, both_sides: bool, triangle: IntArray, shares: NDArray[n
         if not (top < height and bottom > 0.0 and left < width and right > 0.0):
             continue
         first_row, last_row = int(np.ceil(max(top, 0.0) - 0.5)), int(np.floor(min(bottom, height) - 0.5))
-        first, last = int(np.ceil(max(left, 0.0) - 0.5)), int(np.floor(min(right, width) - 0.5))
+        # the shares of a and b are linear on the picture, and so is one over the distance
+        a_x, a_y = (by - cy) / area, (cx - bx) / area
+        b_x, b_y = (cy - ay) / area, (ax - cx) / area
+        a_0, b_0 = (bx * cy - by * cx) / area, (cx * ay - cy * ax) / area
+        step = a_x / az + b_x / bz - (a_x + b_x) / cz
         for row in range(max(first_row, 0), min(last_row, height - 1) + 1):
             y = row + 0.5
-            for column in range(max(first, 0), min(last, width - 1) + 1):
-                x = column + 0.5
-                a = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / area
-                b = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / area
-                c = 1.0 - a - b
-                if a < 0.0 or b < 0.0 or c < 0.0:
-                    continue
-                distance = 1.0 / (a / az + b / bz + c / cz)  # its inverse is linear on the picture
-                if distance < depth[row, column]:
-                    depth[row, column] = distance
+            a, b = a_0 + a_y * y, b_0 + b_y * y  # at x = 0
+            low, high = max(left, 0.0), min(right, float(width))
+            for constant, slope in ((a, a_x), (b, b_x), (1.0 - a - b, -a_x - b_x)):
+                if slope > 0.0:
+                    low = max(low, -constant / slope)
+                elif slope < 0.0:
+                    high = min(high, -constant / slope)
+                elif constant < 0.0:
+                    high = -1.0
+            begin, end = int(np.ceil(low - 0.5 - CLOSE)), int(np.floor(high - 0.5 + CLOSE))
+            at_zero = a / az + b / bz + (1.0 - a - b) / cz + 0.5 * step
+            for column in range(max(begin, 0), min(end, width - 1) + 1):
+                near = np.float32(at_zero + step * column)
+                if near > nearness[row, column]:
+                    nearness[row, column] = near
                     triangle[row, column] = t
-                    shares[row, column, 0] = a
-                    shares[row, column, 1] = b
+
+
+@kernel
+def barycentric(corners: Array, x: float, y: float) -> tuple[float, float]:
+    """Shares of the first two corners of a triangle, shape [3, 3], at a pixel."""
+    area = (corners[1, 0] - corners[0, 0]) * (corners[2, 1] - corners[0, 1])
+    area -= (corners[1, 1] - corners[0, 1]) * (corners[2, 0] - corners[0, 0])
+    a = (corners[1, 0] - x) * (corners[2, 1] - y) - (corners[1, 1] - y) * (corners[2, 0] - x)
+    b = (corners[2, 0] - x) * (corners[0, 1] - y) - (corners[2, 1] - y) * (corners[0, 0] - x)
+    return a / area, b / area

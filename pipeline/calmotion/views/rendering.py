@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from calmotion.arrays import Array, IntArray
 from calmotion.model.character import Character
 from calmotion.model.result import Motion, Skin
+from calmotion.views.painting import LEVELS, Light, Marks, Visible, develop, mark, outlines
 from calmotion.views.playback import deformed_points, modes_of, rotation_matrices
 from calmotion.views.raster import Hits, rasterize
 from calmotion.views.shading import split_at_creases
@@ -17,13 +19,7 @@ from calmotion.views.viewpoint import Viewpoint
 
 Pixels = NDArray[np.uint8]  # sRGB, shape [height, width, 3]
 Mask = NDArray[np.bool_]
-Light = NDArray[np.float32]  # linear RGB, shape [height, width, 3]
-
-PAPER: Light = np.ones(3, dtype=np.float32)
 DEFAULT_COLOR = (0.55, 0.55, 0.57)
-AMBIENT, KEY, FILL = 0.34, 0.62, 0.16
-SHADOW = 0.30  # of the light that the floor loses in the shadow
-FILLED, OUTLINED = 0.35, 0.80  # strength of the intended motion's color beside the character, and of its outline
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,18 +133,12 @@ def pose(model: Model, motion: Motion, row: int) -> tuple[Array, Array, IntArray
 
 
 def scene(model: Model, motion: Motion, row: int) -> tuple[Array, Array, IntArray]:
-    """The same of the bodies at one row, and of the scenery after them."""
-    corners, normals, owners = pose(model, motion, row)
+    """The same of the scenery, and of the bodies at one row after it."""
+    still, bodies = model.still, pose(model, motion, row)
     return (
-        np.concatenate([corners, model.still[0]]),
-        np.concatenate([normals, model.still[1]]),
-        np.concatenate([owners, model.still[2]]),
-    )
-
-
-def visible_surfaces(hits: Hits, owners: IntArray) -> IntArray:
-    """The visible surface of each pixel, -1 for none, from the surface of each triangle; shape [height, width]."""
-    return np.asarray(np.append(owners, -1)[hits.triangle], dtype=np.int32)  # the index -1 is the last one
+        np.concatenate([still[0], bodies[0]]), np.concatenate([still[1], bodies[1]]),
+        np.concatenate([still[2], bodies[2]]),
+    )  # fmt: skip
 
 
 def fit_camera(view: Viewpoint, cloud: Array, width: int, height: int, margin: float = 0.04) -> Camera:
@@ -172,34 +162,146 @@ def floor_below(model: Model, motion: Motion) -> float | None:
     return float((corners @ model.up).min()) if len(corners) and np.any(model.up) else None
 
 
-def draw(view: View) -> tuple[Light, Hits, IntArray]:
-    """The motion in full color.
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a camera sees of a pose.
 
-    Returns:
-        Linear RGB of each pixel, shape [height, width, 3]; the visible triangles; and the visible surface of each
-        pixel, -1 for none.
+    Attributes:
+        hits: The visible triangles.
+        visible: The same with normals and surfaces of the triangles, for kernels.
+        shadow: The floor in its shadow, in pixels of the picture; None for no shadow.
+        still: How many of the triangles are scenery; they come first.
+        picture: Of the scenery alone, where it was made for many poses; sRGB, 8 bits.
+    """
+
+    hits: Hits
+    visible: Visible
+    shadow: Hits | None
+    still: int
+    picture: Pixels | None = None
+
+    @property
+    def surface(self) -> IntArray:
+        """The visible surface of each pixel, -1 for none, shape [height, width]."""
+        return np.asarray(np.append(self.visible.owners, -1)[self.hits.triangle], dtype=np.int32)
+
+    @property
+    def part(self) -> IntArray:
+        """First row, first column, and the ends of rows and columns in which the bodies are."""
+        return _part(self.hits, self.still, 0)
+
+    def outlines(self, count: int) -> Marks:
+        """Where the character and its edges are, see `painting.outlines`; `count` is its number of surfaces."""
+        found = np.zeros(self.hits.triangle.shape, dtype=np.uint8)
+        outlines(self.visible, count, self.part, found)
+        return found
+
+
+def _part(hits: Hits, first: int, margin: int) -> IntArray:
+    """First row, first column, and the ends of rows and columns of the triangles from the first on, with a margin."""
+    height, width = hits.triangle.shape
+    pixels = hits.corners[first:, :, :2][hits.corners[first:, :, 2].min(axis=1) > 0.0].reshape(-1, 2)
+    low, high = pixels.min(axis=0, initial=np.inf) - margin, pixels.max(axis=0, initial=-np.inf) + 1.0 + margin
+    return np.clip([low[1], low[0], high[1], high[0]], 0, [height, width, height, width]).astype(np.int32)
+
+
+def with_picture(view: View, backdrop: Seen) -> Seen:
+    """A backdrop with its picture, of which each pose before it changes a part."""
+    width, height = (side // view.smooth for side in view.camera.size)
+    shown, marks = np.empty((height, width, 3), np.uint8), np.zeros(backdrop.hits.triangle.shape, np.uint8)
+    whole = np.array([0, 0, height, width], dtype=np.int32)
+    marks = marks[: height * view.smooth, : width * view.smooth]
+    develop(backdrop.visible, light_of(view, backdrop.shadow), marks, whole, shown)
+    return replace(backdrop, picture=shown)
+
+
+def see(view: View, motion: Motion | None, backdrop: Seen | None = None, shadow: bool = True) -> Seen:
+    """What a camera sees.
+
+    Args:
+        view: For the model, the camera and the floor.
+        motion: The pose at the row of the view; None: the scenery alone.
+        backdrop: The scenery, where it was drawn before.
+        shadow: Whether the floor gets a shadow.
     """
     model, camera = view.model, view.camera
-    corners, normals, owners = scene(model, view.motion, view.row)
-    hits = rasterize(camera.project(corners), *camera.size)
-    picture = np.broadcast_to(PAPER, (*hits.triangle.shape, 3)).copy()
-    filled = np.flatnonzero(hits.triangle >= 0)
-    triangles = hits.triangle.reshape(-1)[filled]
-    # single precision throughout: this is most of the time of a video
-    slopes, shares = normals.astype(np.float32)[triangles], hits.shares.reshape(-1, 2)[filled]
-    normal = slopes[:, 2] + shares[:, :1] * (slopes[:, 0] - slopes[:, 2])
-    normal += shares[:, 1:] * (slopes[:, 1] - slopes[:, 2])
-    length = np.sqrt(np.einsum("pi,pi->p", normal, normal))
-    toward = (normal @ np.stack([key_light(camera), fill_light(camera)]).T.astype(np.float32)).T
-    key, fill = np.maximum(toward, 0.0) / np.maximum(length, 1e-12)
-    light = 1.15 * (AMBIENT + KEY * key + FILL * fill)
+    corners, normals, owners = model.still if motion is None else scene(model, motion, view.row)
+    before = (backdrop.hits, backdrop.shadow) if backdrop else (None, None)
+    hits = rasterize(camera.project(corners), *camera.size, before=before[0])
+    flat = np.all(normals[:, 0] == normals[:, 1], axis=1) & np.all(normals[:, 0] == normals[:, 2], axis=1)
+    visible = Visible(hits.triangle, hits.nearness, hits.corners, normals, owners, flat)
+    return Seen(hits, visible, _shadow(view, corners, before[1]) if shadow else None, len(model.still[0]))
+
+
+def draw_over_ghost(view: View, backdrop: Seen | None = None, ghost: tuple[Seen, Marks] | None = None) -> Pixels:
+    """The motion in full color, and the intended motion where it differs: filled beside the character, and outlined.
+
+    Args:
+        view: What is seen.
+        backdrop: The scenery, where it was drawn before.
+        ghost: The intended motion, where it was drawn before.
+
+    Returns:
+        sRGB of each pixel, 8 bits, shape [height, width, 3].
+    """
+    smooth, backdrop = view.smooth, backdrop or see(view, None)
+    (other, edges), seen = ghost or ghost_of(view, backdrop), see(view, view.motion, backdrop)
+    width, height = (side // smooth for side in view.camera.size)
+    marks = np.zeros(edges.shape, dtype=np.uint8)
+    mark(seen.outlines(len(view.model.parts)), edges, smooth, other.part, marks)
+    part, shown = np.array([0, 0, height, width], dtype=np.int32), backdrop.picture
+    if shown is None:
+        shown = np.empty((height, width, 3), dtype=np.uint8)
+    else:
+        shown, parts = shown.copy(), [seen.part // smooth, (other.part + smooth - 1) // smooth]
+        parts[0][2:] += 1
+        parts += [_part(seen.shadow, seen.still, round(3.0 * _blur(view)) + 2)] if seen.shadow is not None else []
+        ends = np.array(parts)
+        part = np.concatenate([ends[:, :2].min(axis=0), np.minimum(ends[:, 2:].max(axis=0), [height, width])])
+    develop(seen.visible, light_of(view, seen.shadow), marks[: height * smooth, : width * smooth], part, shown)
+    return shown
+
+
+def _blur(view: View) -> float:
+    """Standard deviation of the edge of shadows [pixels of the picture]."""
+    return max(view.camera.size[0] / 180.0, 1.0) / view.smooth
+
+
+def ghost_of(view: View, backdrop: Seen) -> tuple[Seen, Marks]:
+    """The intended motion of a view before the scenery, and where it and its edges are."""
+    seen = see(view, view.reference, backdrop, shadow=False)
+    return seen, seen.outlines(len(view.model.parts))
+
+
+def light_of(view: View, shadow: Hits | None) -> Light:
+    """How the surfaces of a view look.
+
+    Args:
+        view: For the colors, and the camera, by which the lights stand.
+        shadow: The floor in the shadow, in pixels of the picture.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    soft, near = np.zeros((0, 0), dtype=np.float32), np.zeros((0, 0), dtype=np.float32)
+    if shadow is not None and shadow.filled.any():
+        rows, columns = (np.flatnonzero(shadow.filled.any(axis=axis)) for axis in (1, 0))
+        blur = _blur(view)
+        edge = round(3.0 * blur) + 1
+        part = np.s_[max(rows[0] - edge, 0) : rows[-1] + edge + 1, max(columns[0] - edge, 0) : columns[-1] + edge + 1]
+        soft, near = np.zeros(shadow.triangle.shape, dtype=np.float32), shadow.nearness
+        gaussian_filter(shadow.filled[part].astype(np.float32), blur, truncate=3.0, output=soft[part])
     # Very dark colors are made slightly lighter; otherwise shading would be invisible.
-    paint = (0.03 + 0.97 * np.clip(model.colors, 0.0, 1.0)).astype(np.float32)
-    shaded = np.take(paint, owners[triangles], axis=0) * light[:, None]
-    picture.reshape(-1, 3)[filled] = np.minimum(shaded, 1.0, out=shaded)
-    if view.floor is not None:
-        cast_shadow(picture, hits, corners, view)
-    return picture, hits, visible_surfaces(hits, owners)
+    colors = 0.03 + 0.97 * np.clip(view.model.colors, 0.0, 1.0)
+    ways = np.stack([key_light(view.camera), fill_light(view.camera)])
+    return Light(colors, ways, soft, near, np.array(view.ghost), _srgb())
+
+
+@cache
+def _srgb() -> Pixels:
+    """sRGB, 8 bits, of levels of linear light."""
+    level = np.linspace(0.0, 1.0, LEVELS)
+    encoded = np.where(level <= 0.0031308, 12.92 * level, 1.055 * np.maximum(level, 1e-9) ** (1.0 / 2.4) - 0.055)
+    return np.asarray(np.round(255.0 * encoded), dtype=np.uint8)
 
 
 def key_light(camera: Camera) -> Array:
@@ -216,89 +318,26 @@ def fill_light(camera: Camera) -> Array:
     return np.asarray(way / np.linalg.norm(way))
 
 
-def cast_shadow(picture: Light, hits: Hits, corners: Array, view: View) -> None:
-    """Darken the floor of a picture, in place, where bodies or scenery are between it and the main light."""
-    from scipy.ndimage import gaussian_filter
+def _shadow(view: View, corners: Array, before: Hits | None) -> Hits | None:
+    """The floor in the shadow of world triangles [m], shape [m, 3, 3], in pixels of the picture; None for no shadow.
 
-    up, camera, floor = view.model.up, view.camera, view.floor or 0.0
+    Args:
+        before: That of the first triangles, where it is there already.
+    """
+    if view.floor is None:
+        return None
+    up, camera = view.model.up, view.camera
     light = key_light(camera)
     slope = float(light @ up)
     if slope < 0.1 or float(camera.axes[2] @ up) > -0.02:  # a low light, or no view of the floor
-        return
-    height = np.maximum(corners @ up - floor, 0.0)
-    above = height.max(axis=1) > 1e-3 * height.max(initial=0.0)  # what lies on the floor casts none
-    corners, height = corners[above], height[above]
-    flat = camera.project(corners - (height / slope)[..., None] * light)
-    mask = rasterize(flat, *camera.size, both_sides=True)
-    rows, columns = np.nonzero(mask.filled)
-    if not len(rows):
-        return
-    width = max(camera.size[0] / 180.0, 1.0)
-    edge = round(3.0 * width)
-    part = np.s_[max(rows.min() - edge, 0) : rows.max() + edge, max(columns.min() - edge, 0) : columns.max() + edge]
-    # what lies on the floor, such as a carpet, takes the shadow as well; what stands before it does not
-    takes = np.logical_not(hits.filled[part]) | (hits.depth[part] > mask.depth[part] * (1.0 - 2e-3))
-    soft = gaussian_filter(mask.filled[part].astype(np.float32), width, truncate=3.0)
-    picture[part] *= (1.0 - SHADOW * np.where(takes, soft, 0.0))[..., None]
-
-
-def draw_over_ghost(view: View) -> Pixels:
-    """The motion in full color, and the intended motion where it differs: filled beside the character, and outlined."""
-    picture, _, front = draw(view)
-    corners, _, owners = scene(view.model, view.reference, view.row)
-    hits = rasterize(view.camera.project(corners), *view.camera.size)
-    ghost = visible_surfaces(hits, owners)
-    return develop(lay_ghost(picture, front, ghost, len(view.model.parts), view.ghost, view.smooth), view.smooth)
-
-
-def lay_ghost(
-    picture: Light, front: IntArray, ghost: IntArray, bodies: int, color: tuple[float, float, float], smooth: int
-) -> Light:
-    """Draw another pose of the character on a picture.
-
-    Args:
-        picture: Linear RGB, shape [height, width, 3].
-        front: The visible surface of each pixel, -1 for none.
-        ghost: The same of the other pose.
-        bodies: Surfaces of the character; those from this number on are scenery.
-        color: Of the other pose, linear RGB.
-        smooth: Pixels of the picture for one that will be shown.
-    """
-    own, ghost = np.where(front < bodies, front, -1), np.where(ghost < bodies, ghost, -1)
-    beside = (ghost >= 0) & (own < 0)
-    # Where both poses have the same edge, nothing differs; an edge of the ghost alone is drawn.
-    edge = (ghost >= 0) & borders(ghost, smooth) & np.logical_not(grown(borders(own, 1), 2 * smooth))
-    beside &= np.logical_not(grown(own >= 0, smooth)) | edge
-    mixed = picture.copy()
-    mixed[beside] = (1.0 - FILLED) * picture[beside] + FILLED * np.array(color)
-    mixed[edge] = (1.0 - OUTLINED) * picture[edge] + OUTLINED * np.array(color)
-    return mixed
-
-
-def borders(surface: IntArray, width: int) -> Mask:
-    """Pixels within `width` of one with another surface."""
-    border = np.zeros(surface.shape, dtype=bool)
-    border[1:] |= surface[1:] != surface[:-1]
-    border[:, 1:] |= surface[:, 1:] != surface[:, :-1]
-    return grown(border, width - 1)
-
-
-def grown(mask: Mask, width: int) -> Mask:
-    """The mask and all pixels within `width` of it."""
-    for _ in range(width):
-        wider = mask.copy()
-        wider[1:] |= mask[:-1]
-        wider[:-1] |= mask[1:]
-        wider[:, 1:] |= mask[:, :-1]
-        wider[:, :-1] |= mask[:, 1:]
-        mask = wider
-    return mask
-
-
-def develop(picture: Light, factor: int) -> Pixels:
-    """Average blocks of `factor` x `factor` pixels and encode as sRGB, 8 bits."""
-    height, width = picture.shape[0] // factor, picture.shape[1] // factor
-    whole = picture[: height * factor, : width * factor]
-    small = sum(whole[i::factor, j::factor] for i in range(factor) for j in range(factor)) / factor**2
-    encoded = np.where(small <= 0.0031308, 12.92 * small, 1.055 * np.maximum(small, 1e-9) ** (1.0 / 2.4) - 0.055)
-    return np.asarray(np.round(255.0 * np.clip(encoded, 0.0, 1.0)), dtype=np.uint8)
+        return None
+    width, height = (side // view.smooth for side in camera.size)
+    camera = replace(camera, scale=camera.scale / view.smooth, center=camera.center / view.smooth, size=(width, height))
+    still = 0 if before is None else len(before.corners)
+    own = corners[still:]
+    above = np.maximum(own @ up - view.floor, 0.0)
+    flat = camera.project(own - (above / slope)[..., None] * light)
+    flat[above.max(axis=1) <= 1e-3 * above.max(initial=0.0)] = 0.0  # what lies on the floor casts none
+    if before is not None:
+        flat = np.concatenate([before.corners, flat])
+    return rasterize(flat, width, height, both_sides=True, before=before)

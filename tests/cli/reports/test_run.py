@@ -155,7 +155,7 @@ def test_how_far_motors_move_and_why_errors_remain_are_told():
     stream = io.StringIO()
     print_remaining(console_on(stream), two_targets() | {"motors": motors, "remaining_errors": remaining})
     lines = stream.getvalue().splitlines()
-    assert lines[0].startswith("Angles of motors change by at most: J7 4.011°, J6") and "2 more by less" in lines[0]
+    assert lines[0].startswith("Angles of motors change by at most: J7 4.01°, J6") and "2 more by less" in lines[0]
     assert lines[1].startswith(
         "What remains, 5.5 mm at /Elbow, 1.4 mm at /Cup: 5 motors cannot follow all 9 directions"
     )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from rich.console import Console
 
-from calmotion.cli.quantities import about, angle, counted, length
+from calmotion.cli.quantities import about, counted, length
 from calmotion.cli.reports.limits import print_reason
 from calmotion.cli.tables import say
 from calmotion.model.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
@@ -103,9 +104,10 @@ def print_remaining(console: Console, report: dict[str, Any]) -> None:
     if not is_optimized(report):
         return
     names = distinct_names([row["path"] for row in report["motors"]])
-    for kind, shown, key in (("Angles", angle, "max_offset_rad"), ("Lengths", length, "max_offset_m")):
+    angles, lengths = ("Angles", "max_offset_rad", math.degrees(1.0), "°"), ("Lengths", "max_offset_m", 1e3, " mm")
+    for kind, key, scale, unit in (angles, lengths):
         changed = sorted((r for r in report["motors"] if r["changed"] and key in r), key=lambda row: -row[key])
-        told = [f"{names[row['path']]} {shown(float(f'{row[key]:.2g}'))}" for row in changed[:MOTORS]]
+        told = [f"{names[row['path']]} {scale * row[key]:.3g}{unit}" for row in changed[:MOTORS]]
         told += [f"{len(changed) - MOTORS} more by less"] if len(changed) > MOTORS else []
         if told:
             say(console, f"{kind} of motors change by at most: {', '.join(told)}.")
