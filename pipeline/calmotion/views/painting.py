@@ -135,7 +135,7 @@ def develop(seen: Visible, light: Light, marks: Marks, part: IntArray, shown: Ma
         run, brightness = -1, 0.0  # a triangle that goes on, whose light changes little from pixel to pixel
         for column in range(part[1], part[3]):
             top, left = factor * row, factor * column
-            soft = light.soft[row, column] if light.soft.shape[0] > 0 else np.float32(0.0)
+            soft = float(light.soft[row, column]) if light.soft.shape[0] > 0 else 0.0
             t, even = seen.triangle[top, left], True
             for i in range(top, top + factor):
                 for j in range(left, left + factor):
@@ -182,4 +182,4 @@ def _brightness(seen: Visible, ways: Array, t: int, row: int, column: int) -> fl
     scale = 1.0 / max(np.sqrt(x * x + y * y + z * z), 1e-12)
     key = max(x * ways[0, 0] + y * ways[0, 1] + z * ways[0, 2], 0.0) * scale
     weak = max(x * ways[1, 0] + y * ways[1, 1] + z * ways[1, 2], 0.0) * scale
-    return BRIGHTNESS * (AMBIENT + KEY * key + FILL * weak)
+    return float(BRIGHTNESS * (AMBIENT + KEY * key + FILL * weak))

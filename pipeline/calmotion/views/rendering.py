@@ -202,7 +202,8 @@ def _part(hits: Hits, first: int, margin: int) -> IntArray:
     height, width = hits.triangle.shape
     pixels = hits.corners[first:, :, :2][hits.corners[first:, :, 2].min(axis=1) > 0.0].reshape(-1, 2)
     low, high = pixels.min(axis=0, initial=np.inf) - margin, pixels.max(axis=0, initial=-np.inf) + 1.0 + margin
-    return np.clip([low[1], low[0], high[1], high[0]], 0, [height, width, height, width]).astype(np.int32)
+    ends = np.clip([low[1], low[0], high[1], high[0]], 0, [height, width, height, width])
+    return np.asarray(ends, dtype=np.int32)
 
 
 def with_picture(view: View, backdrop: Seen) -> Seen:
