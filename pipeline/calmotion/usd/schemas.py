@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from calmotion.errors import ShotError
 from calmotion.support.memory import require_address_space
+from calmotion.support.naming import nearest
 
 if TYPE_CHECKING:
     from pxr import Usd
 
 _LIBRARIES = 0.6e9  # address space of the libraries that USD loads here, and of its threads on two cores [bytes]
+CORRECT = "Correct the value, or remove the attribute"  # the usual remedy
 NAMES = ("CalmFlexibleBodyAPI", "CalmDampingAPI", "CalmMotorAPI", "CalmTargetAPI", "CalmRetargetAPI")
 
 
@@ -91,6 +95,48 @@ def value(prim: Usd.Prim, schema: str, attribute: str, time: float | None = None
             return authored_value
     definition = Usd.SchemaRegistry().FindAppliedAPIPrimDefinition(schema)
     return definition.GetAttributeFallbackValue(attribute) if definition else None
+
+
+def require(holds: bool, prim: Usd.Prim, attribute: str, found: object, problem: str, remedy: str = CORRECT) -> None:
+    """Refuse what was found in an attribute, unless it keeps a rule.
+
+    Raises:
+        ShotError: It does not.
+    """
+    if not holds:
+        raise ShotError(problem, path=str(prim.GetPath()), attribute=attribute, found=found, remedy=remedy)
+
+
+def choice(
+    prim: Usd.Prim, schema: str, attribute: str, allowed: Sequence[str], problem: str, fallback: str = ""
+) -> str:
+    """The value of an attribute that has one of some names.
+
+    Raises:
+        ShotError: Another one; the problem says which kind of name it is.
+    """
+    found = str(value(prim, schema, attribute))
+    require(
+        found in allowed, prim, attribute, found, problem, f"{nearest(found, allowed)}Use one of {', '.join(allowed)}"
+    )
+    return found
+
+
+def automatic(prim: Usd.Prim, schema: str, attribute: str, *, zero: bool = False) -> float | None:
+    """The value of an attribute that is positive; None where it is -1, or nothing, for automatic.
+
+    Args:
+        zero: Whether it may be 0.
+
+    Raises:
+        ShotError: It is neither.
+    """
+    found = value(prim, schema, attribute)
+    if found is None or found == -1:
+        return None
+    right = math.isfinite(found) and (found > 0.0 or (zero and found == 0.0))
+    require(right, prim, attribute, found, "must be positive, or -1 for automatic")
+    return float(found)
 
 
 def is_applied(prim: Usd.Prim, schema: str) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING
@@ -13,7 +12,6 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import RetargetSettings
 from calmotion.model.robust.settings import Uncertainty
-from calmotion.support.naming import nearest
 from calmotion.usd import gf, schemas
 from calmotion.usd.calibrations import known_factors
 from calmotion.usd.reading.context import Reading, prims_of
@@ -100,27 +98,15 @@ def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
         time_step=_positive(prim, "timeStep"),
         knot_spacing=_positive(prim, "knotSpacing"),
         smoothness=_positive(prim, "smoothness", zero=True),
-        reference=_choice(prim, "reference", ("rigid", "static")),
-        endpoints=_choice(prim, "endpoints", ("free", "kept")),
+        reference=schemas.choice(prim, _SCHEMA, "calm:retarget:reference", ("rigid", "static"), "has an unknown value"),
+        endpoints=schemas.choice(prim, _SCHEMA, "calm:retarget:endpoints", ("free", "kept"), "has an unknown value"),
         cyclic=bool(schemas.value(prim, _SCHEMA, "calm:retarget:cyclic")),
         uncertainty=_uncertainty(prim),
     )
 
 
 def _positive(prim: Usd.Prim, name: str, *, zero: bool = False) -> float | None:
-    attribute = f"calm:retarget:{name}"
-    value = schemas.value(prim, _SCHEMA, attribute)
-    if value is None or value == -1:
-        return None
-    if not math.isfinite(value) or value < 0.0 or (value == 0.0 and not zero):
-        raise ShotError(
-            "must be positive, or -1 for automatic",
-            path=prim.GetPath(),
-            attribute=attribute,
-            found=value,
-            remedy="Correct the value, or remove the attribute",
-        )
-    return float(value)
+    return schemas.automatic(prim, _SCHEMA, f"calm:retarget:{name}", zero=zero)
 
 
 def _uncertainty(prim: Usd.Prim) -> Uncertainty:
@@ -129,17 +115,3 @@ def _uncertainty(prim: Usd.Prim) -> Uncertainty:
     given = {name: _positive(prim, f"uncertainty:{name}", zero=True) for name in names}
     known = {name: value for name, value in given.items() if value is not None}
     return Uncertainty(**known, calibrated=known_factors(prim.GetStage()))
-
-
-def _choice(prim: Usd.Prim, name: str, allowed: tuple[str, ...]) -> str:
-    attribute = f"calm:retarget:{name}"
-    value = str(schemas.value(prim, _SCHEMA, attribute))
-    if value not in allowed:
-        raise ShotError(
-            "has an unknown value",
-            path=prim.GetPath(),
-            attribute=attribute,
-            found=value,
-            remedy=f"{nearest(value, allowed)}Use {' or '.join(allowed)}",
-        )
-    return value

@@ -107,14 +107,11 @@ def read_target(reading: Reading, prim: Usd.Prim, body: int, pose: Pose) -> Targ
     if moves_on_body(prim):
         reading.notes.append(f"{prim.GetPath()}: it moves on its body; its place at the first frame is used")
     weights = [_weight(reading, prim, name) for name in WEIGHTS]
-    if weights == [0.0, 0.0] and not any(_counts_later(prim, name) for name in WEIGHTS):
-        raise ShotError(
-            "both weights of the target are zero",
-            path=prim.GetPath(),
-            attribute="calm:target:positionWeight",
-            found="0, and calm:target:rotationWeight 0",
-            remedy="Give it a positive weight, or remove CalmTargetAPI",
-        )
+    some = weights != [0.0, 0.0] or any(_counts_later(prim, name) for name in WEIGHTS)
+    schemas.require(
+        some, prim, "calm:target:positionWeight", "0, and calm:target:rotationWeight 0",
+        "both weights of the target are zero", "Give it a positive weight, or remove CalmTargetAPI",
+    )  # fmt: skip
     return Target(
         path=str(prim.GetPath()),
         body=body,
@@ -234,15 +231,9 @@ def weight_tracks(stage: Usd.Stage, targets: Sequence[Target], clock: Clock) -> 
 
 
 def _checked(prim: Usd.Prim, name: str, value: float | None) -> float:
-    if value is None or not (math.isfinite(value) and value >= 0.0):
-        raise ShotError(
-            "a weight must not be negative",
-            path=prim.GetPath(),
-            attribute=name,
-            found=value,
-            remedy="Author a weight of 0 or more",
-        )
-    return float(value)
+    right = value is not None and math.isfinite(value) and value >= 0.0
+    schemas.require(right, prim, name, value, "a weight must not be negative", "Author a weight of 0 or more")
+    return float(value or 0.0)
 
 
 def _weight(reading: Reading, prim: Usd.Prim, name: str) -> float:

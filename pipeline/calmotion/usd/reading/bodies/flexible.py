@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import os
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calmotion.errors import ShotError
 from calmotion.model import FlexibleSettings
-from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dependencies import refuse_place
 from calmotion.usd.reading.bodies.materials import elastic_material
@@ -41,55 +38,30 @@ def flexible_settings(reading: Reading, prim: Usd.Prim, pose: Pose) -> FlexibleS
     if not schemas.value(prim, _SCHEMA, "calm:flexible:enabled"):
         return None
     mesh_file = _mesh_file(prim)
-    section = _token(prim, "calm:flexible:section", _SECTION, "a section")
+    section = _named(prim, "section", _SECTION, "a section")
     wall, core = print_of(reading, prim, _length(reading, prim, "calm:flexible:wallThickness"), section)
     return FlexibleSettings(
         material=replace(elastic_material(reading, prim), core=core),
-        mode_count=int(_automatic(prim, "calm:flexible:modeCount")),
-        max_frequency=_automatic(prim, "calm:flexible:maxFrequency"),
+        mode_count=int(schemas.automatic(prim, _SCHEMA, "calm:flexible:modeCount") or -1),
+        max_frequency=schemas.automatic(prim, _SCHEMA, "calm:flexible:maxFrequency") or -1.0,
         element_size=_length(reading, prim, "calm:flexible:elementSize"),
         interface_radius=_length(reading, prim, "calm:flexible:interfaceRadius"),
         mesh_file=mesh_file,
         mesh_scale=_mesh_scale(reading, prim, pose) if mesh_file else 1.0,
-        elasticity=_token(prim, "calm:flexible:elasticity", _ELASTICITY, "an elasticity model"),
+        elasticity=_named(prim, "elasticity", _ELASTICITY, "an elasticity model"),
         wall_thickness=wall,
         section=section,
-        geometry=_token(prim, "calm:flexible:geometry", _GEOMETRY, "a source of geometry"),
+        geometry=_named(prim, "geometry", _GEOMETRY, "a source of geometry"),
     )
 
 
-def _token(prim: Usd.Prim, name: str, allowed: tuple[str, ...], what: str) -> str:
-    value = str(schemas.value(prim, _SCHEMA, name))
-    if value not in allowed:
-        raise ShotError(
-            f"names {what} that does not exist",
-            path=prim.GetPath(),
-            attribute=name,
-            found=value,
-            remedy=f"{nearest(value, allowed)}Use one of {', '.join(allowed)}",
-        )
-    return value
-
-
-def _automatic(prim: Usd.Prim, name: str) -> float:
-    """A positive value, or -1 for automatic."""
-    value = schemas.value(prim, _SCHEMA, name)
-    if value == -1:
-        return -1.0
-    if not (math.isfinite(value) and value > 0):
-        raise ShotError(
-            "must be positive, or -1 for automatic",
-            path=prim.GetPath(),
-            attribute=name,
-            found=value,
-            remedy="Correct the value, or remove the attribute",
-        )
-    return float(value)
+def _named(prim: Usd.Prim, name: str, allowed: tuple[str, ...], what: str) -> str:
+    return schemas.choice(prim, _SCHEMA, f"calm:flexible:{name}", allowed, f"names {what} that does not exist")
 
 
 def _length(reading: Reading, prim: Usd.Prim, name: str) -> float:
-    value = _automatic(prim, name)
-    return value if value == -1.0 else reading.units.length(value)
+    value = schemas.automatic(prim, _SCHEMA, name)
+    return -1.0 if value is None else reading.units.length(value)
 
 
 def _mesh_file(prim: Usd.Prim) -> str:
@@ -100,25 +72,18 @@ def _mesh_file(prim: Usd.Prim) -> str:
         return ""
     for path in filter(None, (asset.path, asset.resolvedPath)):
         refuse_place(path, str(prim.GetPath()), name)
-    if asset.resolvedPath and os.path.exists(asset.resolvedPath):
-        return str(asset.resolvedPath)
-    raise ShotError(
-        "names a mesh file that is missing",
-        path=prim.GetPath(),
-        attribute=name,
-        found=f"@{asset.path}@",
-        remedy="Put the file there, or correct or remove the attribute",
-    )
+    remedy = "Put the file there, or correct or remove the attribute"
+    found = bool(asset.resolvedPath) and os.path.exists(asset.resolvedPath)
+    schemas.require(found, prim, name, f"@{asset.path}@", "names a mesh file that is missing", remedy)
+    return str(asset.resolvedPath)
 
 
 def _mesh_scale(reading: Reading, prim: Usd.Prim, pose: Pose) -> float:
     """Metres per unit of an external mesh, which is in the body's own axes."""
-    if not np.allclose(pose.scale, pose.scale[0], rtol=1e-5) or pose.scale[0] < 0.0:
-        raise ShotError(
-            "an external mesh needs a body without a mirrored scale or one that differs by axis",
-            path=prim.GetPath(),
-            attribute="calm:flexible:meshFile",
-            found=pose.scale.tolist(),
-            remedy="Freeze the scale of the body, or put the mesh into the shot",
-        )
+    alike = bool(np.allclose(pose.scale, pose.scale[0], rtol=1e-5) and pose.scale[0] >= 0.0)
+    schemas.require(
+        alike, prim, "calm:flexible:meshFile", pose.scale.tolist(),
+        "an external mesh needs a body without a mirrored scale or one that differs by axis",
+        "Freeze the scale of the body, or put the mesh into the shot",
+    )  # fmt: skip
     return float(reading.units.length(pose.scale[0]))

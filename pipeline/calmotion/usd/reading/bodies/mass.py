@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.errors import ShotError
 from calmotion.model import MassProperties
-from calmotion.usd import gf
+from calmotion.usd import gf, schemas
 from calmotion.usd.reading.bodies.moments import Moments, sum_of, surface_moments
 from calmotion.usd.reading.bodies.primitives import TYPES
 from calmotion.usd.reading.bodies.shapes import MESH, Shape
@@ -20,6 +19,7 @@ from calmotion.usd.transforms import Pose, rotation_from_quaternion
 if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
+_FOLLOWS = "Correct it, or remove the attribute so that it follows from the geometry"
 _DEFAULT_DENSITY = 1000.0  # kg/m^3: what UsdPhysics assumes for a collider without any density
 
 
@@ -85,14 +85,10 @@ def _authored(prim: Usd.Prim, name: str, what: str) -> float | None:
     value = attribute.Get()
     if value is None or value == 0.0:
         return None
-    if not (np.isfinite(value) and value > 0.0):
-        raise ShotError(
-            f"the {what} must be positive",
-            path=prim.GetPath(),
-            attribute=name,
-            found=value,
-            remedy=f"Author a positive {what}, or remove the attribute so that it follows from geometry and density",
-        )
+    schemas.require(
+        bool(np.isfinite(value) and value > 0.0), prim, name, value, f"the {what} must be positive",
+        f"Author a positive {what}, or remove the attribute so that it follows from geometry and density",
+    )  # fmt: skip
     return float(value)
 
 
@@ -104,14 +100,8 @@ def _center(prim: Usd.Prim) -> Array | None:
     center = gf.vector(value)
     if np.all(np.isneginf(center)):
         return None
-    if not np.all(np.isfinite(center)):
-        raise ShotError(
-            "the centre of mass is not finite",
-            path=prim.GetPath(),
-            attribute="physics:centerOfMass",
-            found=value,
-            remedy="Correct it, or remove the attribute so that it follows from the geometry",
-        )
+    finite = bool(np.all(np.isfinite(center)))
+    schemas.require(finite, prim, "physics:centerOfMass", value, "the centre of mass is not finite", _FOLLOWS)
     return center
 
 
@@ -124,25 +114,15 @@ def _inertia(prim: Usd.Prim) -> Array | None:
     diagonal = gf.vector(value)
     if np.all(diagonal == 0.0):
         return None
-    if not (np.all(np.isfinite(diagonal)) and np.all(diagonal > 0.0)):
-        raise ShotError(
-            "every principal moment of inertia must be positive",
-            path=prim.GetPath(),
-            attribute="physics:diagonalInertia",
-            found=value,
-            remedy="Correct it, or remove the attribute so that it follows from the geometry",
-        )
+    schemas.require(
+        bool(np.all(np.isfinite(diagonal)) and np.all(diagonal > 0.0)), prim, "physics:diagonalInertia", value,
+        "every principal moment of inertia must be positive", _FOLLOWS,
+    )  # fmt: skip
     axes = prim.GetAttribute("physics:principalAxes")
     turn = axes.Get() if axes and axes.HasAuthoredValue() else None
     quaternion = np.array([1.0, 0.0, 0.0, 0.0]) if turn is None else gf.quaternion(turn)
-    if not np.all(np.isfinite(quaternion)):
-        raise ShotError(
-            "the principal axes are not finite",
-            path=prim.GetPath(),
-            attribute="physics:principalAxes",
-            found=turn,
-            remedy="Correct them, or remove the attribute",
-        )
+    finite = bool(np.all(np.isfinite(quaternion)))
+    schemas.require(finite, prim, "physics:principalAxes", turn, "the principal axes are not finite")
     if np.linalg.norm(quaternion) < 1e-6:  # (0, 0, 0, 0) means: not authored
         return np.diag(diagonal)
     rotation = rotation_from_quaternion(quaternion)

@@ -71,14 +71,10 @@ def _material(reading: Reading, prim: Usd.Prim) -> ElasticMaterial:
     ratio = _number(prim, "physics:poissonsRatio", lambda x: -1.0 < x < 0.5, "must lie between -1 and 0.5, exclusively")
     density = _number(prim, "physics:density", lambda x: x > 0.0, "must be positive")
     damping = float(schemas.value(prim, "CalmDampingAPI", "calm:damping:ratio"))
-    if not 0.0 <= damping < 1.0:
-        raise ShotError(
-            "must lie between 0 and 1 (critical damping)",
-            path=prim.GetPath(),
-            attribute="calm:damping:ratio",
-            found=damping,
-            remedy="Author a fraction of critical damping, such as 0.01",
-        )
+    schemas.require(
+        0.0 <= damping < 1.0, prim, "calm:damping:ratio", damping, "must lie between 0 and 1 (critical damping)",
+        "Author a fraction of critical damping, such as 0.01",
+    )  # fmt: skip
     rayleigh = [_rayleigh(prim, name) for name in ("calm:damping:rayleighMass", "calm:damping:rayleighStiffness")]
     return ElasticMaterial(
         path=str(prim.GetPath()),
@@ -94,8 +90,7 @@ def _number(prim: Usd.Prim, name: str, allowed: Callable[[float], bool], problem
     value = number_of(prim, name)
     if value is None:
         raise ShotError("is not authored", path=prim.GetPath(), attribute=name, remedy=_REMEDY)
-    if not (math.isfinite(value) and allowed(value)):
-        raise ShotError(problem, path=prim.GetPath(), attribute=name, found=value, remedy="Correct the value")
+    schemas.require(math.isfinite(value) and allowed(value), prim, name, value, problem)
     return value
 
 
@@ -103,8 +98,5 @@ def _rayleigh(prim: Usd.Prim, name: str) -> float | None:
     value = schemas.value(prim, "CalmDampingAPI", name)
     if value is None:
         return None
-    if not (math.isfinite(value) and value >= 0.0):
-        raise ShotError(
-            "must not be negative", path=prim.GetPath(), attribute=name, found=value, remedy="Correct the value"
-        )
+    schemas.require(math.isfinite(value) and value >= 0.0, prim, name, value, "must not be negative")
     return float(value)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from calmotion.errors import ShotError
 from calmotion.model.materials.printed import LINE_WIDTH, PERIMETERS, Core, core_of
 from calmotion.usd import schemas
 from calmotion.usd.reading.context import Reading
@@ -29,34 +28,22 @@ def print_of(reading: Reading, prim: Usd.Prim, wall: float, section: str) -> tup
     """
     infill = float(schemas.value(prim, _SCHEMA, _INFILL))
     perimeters = int(schemas.value(prim, _SCHEMA, _PERIMETERS))
-    if perimeters != -1 and perimeters < 1:
-        raise ShotError(
-            "must be a number of lines of at least 1, or -1 for automatic", path=prim.GetPath(),
-            attribute=_PERIMETERS, found=perimeters, remedy="Correct the value, or remove the attribute",
-        )  # fmt: skip
+    problem = "must be a number of lines of at least 1, or -1 for automatic"
+    schemas.require(perimeters == -1 or perimeters >= 1, prim, _PERIMETERS, perimeters, problem)
     if infill == -1.0:
-        if perimeters != -1:
-            raise ShotError(
-                "says how thick the skin of a printed part is, but the part has no infill", path=prim.GetPath(),
-                attribute=_PERIMETERS, found=perimeters,
-                remedy=f"Author {_INFILL} as well (1 for a part that is printed solid), or remove it",
-            )  # fmt: skip
+        schemas.require(
+            perimeters == -1, prim, _PERIMETERS, perimeters,
+            "says how thick the skin of a printed part is, but the part has no infill",
+            f"Author {_INFILL} as well (1 for a part that is printed solid), or remove it",
+        )  # fmt: skip
         return wall, None
-    if not 0.0 <= infill <= 1.0:
-        raise ShotError(
-            "must be a share between 0 and 1, or -1 for a part without infill", path=prim.GetPath(),
-            attribute=_INFILL, found=infill, remedy="Author 0.2 for 20%, or remove the attribute",
-        )  # fmt: skip
-    if wall > 0.0 and perimeters != -1:
-        raise ShotError(
-            "and calm:flexible:wallThickness both say how thick the skin of a printed part is", path=prim.GetPath(),
-            attribute=_PERIMETERS, found=f"{perimeters} lines and {wall:.3g} m", remedy="Remove one of them",
-        )  # fmt: skip
-    if section == "tube" and infill > 0.0:
-        raise ShotError(
-            "is that of a hollow part, but the part has infill", path=prim.GetPath(),
-            attribute="calm:flexible:section", found=section, remedy=f"Remove it, or set {_INFILL} to 0",
-        )  # fmt: skip
+    problem = "must be a share between 0 and 1, or -1 for a part without infill"
+    schemas.require(0.0 <= infill <= 1.0, prim, _INFILL, infill, problem, "Author 0.2 for 20%, or remove the attribute")
+    problem = "and calm:flexible:wallThickness both say how thick the skin of a printed part is"
+    both = f"{perimeters} lines and {wall:.3g} m"
+    schemas.require(wall <= 0.0 or perimeters == -1, prim, _PERIMETERS, both, problem, "Remove one of them")
+    problem, remedy = "is that of a hollow part, but the part has infill", f"Remove it, or set {_INFILL} to 0"
+    schemas.require(section != "tube" or infill <= 0.0, prim, "calm:flexible:section", section, problem, remedy)
     skin = wall if wall > 0.0 else LINE_WIDTH * (PERIMETERS if perimeters == -1 else perimeters)
     if infill == 1.0:
         return -1.0, None
