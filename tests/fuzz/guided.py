@@ -1,18 +1,15 @@
 """Fuzzing guided by coverage: `python tests/fuzz/guided.py TARGET SECONDS`, one target in one process.
 
-Atheris guides where it is installed (`pip install atheris`); elsewhere inputs are mutated at random. An input
-that raises anything but an error for users, or ends the process, or takes a minute of processor time, is written to
-`tests/fuzz/cases/TARGET/`, which tests then run for ever; an input that was only slow because other programs left it no
-processor is to be removed there. Inputs that reach new code stay in `build/fuzz/TARGET`.
+Atheris guides (`pip install atheris`). An input that raises anything but an error for users, or ends the process, or
+takes a minute of processor time, is written to `tests/fuzz/cases/TARGET/`, which tests then run for ever; an input that
+was only slow because other programs left it no processor is to be removed there. Inputs that reach new code stay in
+`build/fuzz/TARGET`.
 """
 
 from __future__ import annotations
 
 import argparse
-import hashlib
-import random
 import sys
-import time
 from pathlib import Path
 
 import targets
@@ -23,7 +20,7 @@ LONGEST = 60  # time of one input [s]
 _PACKAGES = ("calmotion", "bvh_reader", "recording_readers", "motion_table")
 
 
-def by_atheris(name: str, seconds: float) -> None:
+def fuzz(name: str, seconds: float) -> None:
     """Let Atheris guide, which keeps its findings by itself and ends the process."""
     import atheris
 
@@ -42,35 +39,13 @@ def by_atheris(name: str, seconds: float) -> None:
     atheris.Fuzz()
 
 
-def by_chance(name: str, seconds: float) -> int:
-    """Mutate the seeds at random until one fails; the number of inputs."""
-    rng, end, count = random.Random(0), time.monotonic() + seconds, 0
-    while time.monotonic() < end:
-        data = targets.mutated(rng.choice(targets.SEEDS[name]), rng)
-        try:
-            targets.TARGETS[name](data)
-        except Exception:
-            path = CASES / name / hashlib.sha256(data).hexdigest()[:12]
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
-            raise
-        count += 1
-    return count
-
-
 def main() -> None:
     """The command: another exit status than 0 after a finding."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("target", choices=tuple(targets.TARGETS))
     parser.add_argument("seconds", type=float)
     options = parser.parse_args()
-    try:
-        import atheris  # noqa: F401
-    except ImportError:
-        count = by_chance(options.target, options.seconds)
-        print(f"{count} inputs at random of {options.target}; Atheris is not installed")
-    else:
-        by_atheris(options.target, options.seconds)
+    fuzz(options.target, options.seconds)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import atexit
 import io
-import json
 import random
 import shutil
 import sys
@@ -239,7 +238,7 @@ def motions(data: bytes) -> None:
         tracks = _plugin("motion_table", "tables").read_motion(
             str(_file(f"motion{'.npz' if data[:1] == b'P' else '.csv'}", data)),
             angles="auto",
-            seconds=1.0,
+            times="auto",
             rate=60.0,
             names=(),
         )
@@ -279,54 +278,9 @@ def settings(data: bytes) -> None:
             assert error.problem
 
 
-def caches(data: bytes) -> None:
-    """A file of arrays: damaged, or whole with any content."""
-    from calmotion.reduction.cache import _value_of
-    from calmotion.support.caching.verified_files import DamagedFileError, read_arrays, sealed
-
-    for content in (data, sealed(data)):
-        try:
-            arrays = read_arrays(_file("cache.npz", content))
-        except DamagedFileError:
-            continue
-        try:
-            _value_of(arrays, "key")
-        except (ValueError, KeyError, TypeError, AttributeError):  # which the cache takes for another version
-            continue
-
-
-def checkpoints(data: bytes) -> None:
-    """A whole checkpoint whose state and arrays are anything."""
-    import numpy as np
-    from calmotion.retargeting.checkpoint import Checkpoint
-    from calmotion.support.caching.verified_files import write_arrays
-
-    rng, path = Bytes(data), FOLDER / "checkpoint.npz"
-    numbers = (0.0, 1.0, float("nan"), float("inf"), -1e300, "x", None, [], {}, True, 10**400)
-    names = ("x", "p", "Hp", "breaks", "history", "state")
-    arrays = {
-        name: np.asarray([rng.choice(numbers[:5]) for _ in range(rng.randrange(6))]).reshape(
-            rng.choice(((-1,), (1, -1), (-1, 1)))
-        )
-        for name in names
-        if rng.randrange(8)
-    }
-    state = {
-        name: rng.choice(numbers) for name in ("merit", "radius", "evaluations", "gradients", "products", "reason")
-    }
-    text = json.dumps(rng.choice((state | {"key": "key"}, state, [], 1, "x"))).encode()
-    arrays["state"] = np.frombuffer(data if not rng.randrange(4) else text, np.uint8)
-    write_arrays(path, arrays)
-    stored = Checkpoint(path, "key").load(None)
-    if stored is not None:
-        assert np.all(np.isfinite(stored.search.x)) and isinstance(stored.matches(1.0), bool)
-        assert stored.search.radius >= 0.0 and min(stored.search.evaluations, stored.search.products) >= 0
-
-
 TARGETS: dict[str, Callable[[bytes], None]] = {
-    one.__name__: one
-    for one in (shot, splines, meshes, bvh, recordings, motions, manifests, settings, caches, checkpoints)
-}  # fmt: skip
+    one.__name__: one for one in (shot, splines, meshes, bvh, recordings, motions, manifests, settings)
+}
 
 
 def _bag() -> bytes:
@@ -389,6 +343,4 @@ SEEDS: dict[str, tuple[bytes, ...]] = {
     ),
     "manifests": (_MANIFEST.encode(), _MANIFEST.encode("utf-16")),
     "settings": (b'[fe.mesh]\nelement_size = "5mm"\n', b"a.b=5mm", b"5mm"),
-    "caches": (b"PK\5\6" + bytes(18),),
-    "checkpoints": (bytes(range(100)), b"\1" * 60),
 }  # fmt: skip

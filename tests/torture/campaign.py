@@ -1,7 +1,7 @@
 """A campaign against faults: `make torture`, or `python tests/torture/campaign.py [--runs N] [--seed N] [--only KIND]`.
 
-Every run of the program on a tiny shot is disturbed: killed, short of disk, with damaged caches, among others
-or with a clock that jumps. It must end with the same result as an undisturbed run, with a clear refusal, or with exit
+Every run of the program on a tiny shot is disturbed: killed, short of disk, with damaged caches, or among
+others. It must end with the same result as an undisturbed run, with a clear refusal, or with exit
 status 130, and the next run must end with the result and leave no file that nothing uses.
 """
 
@@ -18,7 +18,7 @@ from collections import Counter
 from pathlib import Path
 
 import kills
-import machine
+import processes
 import runs
 import storage
 import verdicts
@@ -26,12 +26,12 @@ from workspace import Workspace
 
 # Kinds of fault, and their share of the runs.
 KINDS = {
-    "kills": 1.0, "full disks": 0.15, "folders": 0.1, "damaged files": 0.3, "together": 0.01, "clocks": 0.05,
+    "kills": 1.0, "full disks": 0.15, "folders": 0.1, "damaged files": 0.3, "together": 0.01,
 }  # fmt: skip
 PIECE = 20  # runs of one kind in a row, so that a campaign that is stopped has something of each
 _CAMPAIGNS = {
     "full disks": storage.full_disks, "folders": storage.folders, "damaged files": storage.damaged_files,
-    "together": machine.together, "clocks": machine.clocks,
+    "together": processes.together,
 }  # fmt: skip
 
 
