@@ -241,7 +241,7 @@ def motions(data: bytes) -> None:
             times="auto",
             rate=60.0,
             names=(),
-        )
+        ).tracks
     except ShotError as error:
         assert error.problem
         return
