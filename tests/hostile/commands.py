@@ -208,7 +208,7 @@ CASES: dict[str, Case] = {
     "an output on the standard output": simulated("--csv /dev/stdout", "/dev/stdout", statuses=USAGE),
     "an option before the command": words("--quiet simulate shot.usda", "behind the command", statuses=USAGE),
     "a negative value behind a blank": words(
-        "export shot.usda --to csv --start-delay -5ms", "out of range", statuses=USAGE
+        "export shot.usda --to csv --start-delay -5ms", "--start-delay", statuses=USAGE
     ),
     "an export to nothing": words("export shot.usda --json", "--to", statuses=USAGE),
     "an export to a format that is none": words("export shot.usda --to dance --json", "dance", statuses=USAGE),

@@ -53,9 +53,6 @@ CASES: dict[str, Case] = {
         TABLE.replace("1,0", "1000,0").replace("0.5", "500"), "comes later is not played", statuses=DONE
     ),
     "a table that ends before the shot": table("time_s,shoulder\n0,0\n0.5,0.2\n", "last pose is held", statuses=DONE),
-    "a table with a joint by name and by path": table(
-        "time_s,shoulder,/Arm/joints/shoulder\n0,0,1\n1,0.1,1\n", "two columns move the same joint"
-    ),
     "a table in degrees by its comment": table(
         "# Units: angle Deg\n" + TABLE.replace("0.2", "20"), statuses=DONE, judge=beyond_limits
     ),

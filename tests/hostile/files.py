@@ -224,9 +224,6 @@ CASES: dict[str, Case] = {
     # packages and layers
     "a shot in a package": words("simulate shot.usdz -o out.usda --json", make=packaged, statuses=DONE),
     "a package that is compressed": words("simulate shot.usdz --json", "shot.usdz", make=bomb),
-    "an empty package": words(
-        "simulate shot.usdz --json", "shot.usdz", make=lambda f: zipfile.ZipFile(f / "shot.usdz", "w").close()
-    ),
     "a shot that is referenced": simulate(DONE, make=referenced),
     "a shot that is referenced in centimetres": simulate(EITHER, make=in_centimetres),
     "a robot that is there twice": simulate(EITHER, make=twice),
@@ -238,7 +235,6 @@ CASES: dict[str, Case] = {
     "a payload of another type": simulate(
         EITHER, make=layer(payload, more='#usda 1.0\ndef Cube "More"\n{\n    double size = 3\n}\n')
     ),
-    "a payload that is missing at a prim": simulate(REFUSED, "payload|more.usda", make=layer(payload)),
     "a sublayer that is muted by its offset": simulate(
         DONE,
         make=layer(
@@ -253,14 +249,6 @@ CASES: dict[str, Case] = {
             more="#usda 1.0\n",
         ),
     ),
-    "a sublayer that is a folder": simulate(
-        REFUSED, "down", make=then(lambda f: (f / "down").mkdir(), lambda f: _sublayer(f, "./down"))
-    ),
-    "a sublayer that is no USD file": simulate(
-        REFUSED,
-        "more.txt",
-        make=then(lambda f: (f / "more.txt").write_text("no"), lambda f: _sublayer(f, "./more.txt")),
-    ),
     "a sublayer of the network": simulate(
         REFUSED, "example.com", make=then(lambda f: _sublayer(f, "https://example.com/a.usda"))
     ),
@@ -268,7 +256,6 @@ CASES: dict[str, Case] = {
     "a body that is inactive": simulate(EITHER, inactive(FORE), "elbow|fore", target=False),
     "a joint that is inactive": simulate(EITHER, inactive(ELBOW)),
     "a target that is inactive": simulate(EITHER, inactive(HAND)),
-    "everything is inactive": simulate(REFUSED, inactive("/Arm"), "shot.usda"),
     "everything is invisible": simulate(DONE, hidden),
     "a flexible mesh that is a guide": simulate(EITHER, flexible(guide)),
     "a root layer that says nothing of units": simulate(
@@ -295,11 +282,6 @@ CASES: dict[str, Case] = {
     "joints of which two have one name": simulate(
         EITHER, make=layer(lambda own: Sdf.CopySpec(own, SHOULDER, own, f"{UPPER}/shoulder"))
     ),
-    "a class in place of a robot": simulate(
-        REFUSED,
-        "shot.usda|/Arm",
-        make=layer(lambda own: setattr(own.GetPrimAtPath("/Arm"), "specifier", Sdf.SpecifierClass)),
-    ),
     "an over in place of a body": simulate(
         EITHER, make=layer(lambda own: setattr(own.GetPrimAtPath(BASE), "specifier", Sdf.SpecifierOver))
     ),
@@ -313,7 +295,6 @@ CASES: dict[str, Case] = {
     "a mesh that is open": simulate(
         EITHER, faces((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4)), seconds=60
     ),
-    "a mesh of one triangle": simulate(REFUSED, faces((0, 1, 2)), "skin|fore", seconds=60),
     "a mesh inside out": simulate(
         EITHER, faces((2, 3, 1, 0), (5, 7, 6, 4), (1, 5, 4, 0), (6, 7, 3, 2), (4, 6, 2, 0), (3, 7, 5, 1)), seconds=60
     ),
@@ -334,9 +315,6 @@ CASES: dict[str, Case] = {
     "a mesh that cuts itself": simulate(
         EITHER, points(box_points() * np.where(np.arange(8) == 7, -1.0, 1.0)[:, None]), seconds=120
     ),
-    "an infinite point": simulate(
-        REFUSED, points(np.where(np.arange(24).reshape(8, 3) == 4, np.inf, box_points())), SKIN, "points"
-    ),
     "faces of two corners": simulate(DONE, faces(*[(0, 1)] * 6), "a beam of", seconds=60),
     "tetrahedra that are inside out": simulate(EITHER, tet_mesh(TETS, [(0, 1, 3, 2)]), seconds=60),
     "tetrahedra that share no face": simulate(
@@ -346,12 +324,7 @@ CASES: dict[str, Case] = {
         seconds=60,
     ),
     "one tetrahedron": simulate(EITHER, tet_mesh(TETS, [(0, 1, 2, 3)]), seconds=60),
-    "a mesh file of words": simulate(REFUSED, "a.msh", make=mesh_beside("hello", "a.msh")),
     "a mesh file of a trillion nodes": simulate(REFUSED, "a.msh", make=mesh_beside(GMSH, "a.msh")),
-    "a mesh file that is empty": simulate(REFUSED, "a.msh", make=mesh_beside("", "a.msh")),
-    "a mesh file of another kind": simulate(REFUSED, "a.docx", make=mesh_beside("PK", "a.docx")),
-    "a mesh file that is the shot": simulate(REFUSED, mesh_file("./shot.usda"), "shot.usda"),
-    "an OBJ of nothing": simulate(REFUSED, "a.obj", make=mesh_beside("# nothing\n", "a.obj")),
     "an STL that says it is huge": simulate(
         REFUSED, "a.stl", make=mesh_beside(bytes(80) + b"\xff\xff\xff\x7f", "a.stl")
     ),

@@ -8,7 +8,7 @@ import numpy as np
 import posed_shots
 from hostile import DONE, EITHER, REFUSED, USAGE, Case, Edit, layer, optimize, simulate
 from pxr import Gf, Sdf, Ts, Usd, UsdGeom, Vt
-from shot_edits import applied, attribute, both, retarget, stage_metadata, times
+from shot_edits import attribute, both, retarget, stage_metadata, times
 from small_shots import ELBOW, FORE, FRAMES, HAND, SHOULDER, TARGET_POSITION
 
 
@@ -92,8 +92,6 @@ CASES: dict[str, Case] = {
     "a shot that begins at frame 86400": simulate(DONE, span(86400.0, 86424.0)),
     "a shot that begins at frame a hundred million": simulate(EITHER, span(1e8, 1e8 + 24.0)),
     "an infinite end": simulate(REFUSED, times(0.0, math.inf), "endTimeCode"),
-    "an end that is no number": simulate(REFUSED, times(0.0, math.nan), "endTimeCode"),
-    "a start that is no number": simulate(REFUSED, times(math.nan, 24.0), "startTimeCode"),
     "a range without samples": simulate(EITHER, times(1000.0, 1024.0)),
     "a range that the samples end in": simulate(DONE, times(12.0, 48.0)),
     "a year of frames": simulate(REFUSED, times(0.0, 24.0 * 3600 * 24 * 365), "memory|time|frames"),
@@ -101,8 +99,6 @@ CASES: dict[str, Case] = {
     "a hundred thousand frames": simulate(DONE, long_shot(100_000), args="--step 40ms", seconds=400),
     "a rate of one thousandth": simulate(EITHER, span(0.0, 0.001, 0.001)),
     "a rate of a million": simulate(EITHER, span(0.0, 24.0, 1e6)),
-    "a rate that is infinite": simulate(REFUSED, stage_metadata("timeCodesPerSecond", math.inf), "timeCodesPerSecond"),
-    "a negative rate": simulate(REFUSED, stage_metadata("timeCodesPerSecond", -24.0), "timeCodesPerSecond"),
     "frames at another rate than time codes": simulate(DONE, stage_metadata("framesPerSecond", 30.0)),
     "frames of which a shot has no whole number": simulate(DONE, stage_metadata("framesPerSecond", 23.976)),
     # samples
@@ -126,7 +122,6 @@ CASES: dict[str, Case] = {
     "angles of a million degrees": simulate(EITHER, track(CODES, 1e6 + SWING)),
     "an angle that floats cannot resolve": simulate(EITHER, track(CODES, 1e9 + SWING)),
     "angles of 1e-30 degrees": simulate(DONE, track(CODES, 1e-30 * SWING)),
-    "the largest float": simulate(REFUSED, track(CODES, 3.4e38 * np.sign(SWING)), POSITION),
     "beyond the limits of the joint": simulate(EITHER, track(CODES, 9.0 * SWING), "limit|range"),
     "wholly beyond the limits of the joint": optimize(EITHER, track(CODES, 200.0 + SWING), "limit|exceed|range"),
     # splines and other sources
@@ -138,14 +133,7 @@ CASES: dict[str, Case] = {
     "an animation in half precision": simulate(EITHER, attribute(SHOULDER, TARGET_POSITION, "Half", 10.0)),
     "an animation of doubles": simulate(DONE, attribute(SHOULDER, TARGET_POSITION, "Double", 10.0)),
     "an animation of integers": simulate(EITHER, attribute(SHOULDER, TARGET_POSITION, "Int", 10)),
-    "an animation of arrays": simulate(
-        REFUSED,
-        attribute(SHOULDER, TARGET_POSITION, "FloatArray", Vt.FloatArray([1.0, 2.0])),
-        SHOULDER,
-        TARGET_POSITION,
-    ),
     "bodies animated by matrices": simulate(DONE, posed_shots.posed),
-    "a matrix that is no number": simulate(REFUSED, posed(matrix(5.0, Gf.Matrix4d(math.nan))), FORE),
     "a matrix of zeros": simulate(REFUSED, posed(matrix(5.0, Gf.Matrix4d(0.0))), FORE),
     "a matrix that mirrors": simulate(EITHER, posed(matrix(5.0, Gf.Matrix4d().SetScale(Gf.Vec3d(-1, 1, 1)))), "elbow"),
     "a body that leaves its joint": simulate(
@@ -175,33 +163,8 @@ CASES: dict[str, Case] = {
         lambda s: s.GetPrimAtPath(ELBOW).GetAttribute("physics:upperLimit").Set(3.0, 12.0),
         "upperLimit: it is animated",
     ),
-    "weights that are zero at all times": optimize(
-        REFUSED,
-        lambda s: [
-            s.GetPrimAtPath(HAND).CreateAttribute("calm:target:positionWeight", Sdf.ValueTypeNames.Float).Set(0.0, k)
-            for k in (0, 12, 24)
-        ],
-        "positionWeight",
-    ),
-    "a weight that turns negative": optimize(
-        REFUSED,
-        lambda s: [
-            s.GetPrimAtPath(HAND).CreateAttribute("calm:target:positionWeight", Sdf.ValueTypeNames.Float).Set(w, k)
-            for k, w in ((0, 1.0), (12, -1.0))
-        ],
-        "positionWeight",
-    ),
-    "a loop of one frame": simulate(REFUSED, retarget("cyclic", "Bool", True), times(3, 3), "cyclic|endTimeCode"),
     "a loop whose speeds differ at the seam": simulate(
         EITHER, retarget("cyclic", "Bool", True), track(CODES, 0.1 * CODES * (24 - CODES))
-    ),
-    "motors of which none may change": optimize(
-        REFUSED,
-        *(
-            both(applied(path, "CalmMotorAPI"), attribute(path, "calm:motor:optimize", "Bool", False))
-            for path in (SHOULDER, ELBOW)
-        ),
-        "calm:motor:optimize",
     ),
     "a pre-roll of an hour": simulate(REFUSED, "--pre-roll|time|memory", args="--pre-roll 3600s"),
     "a negative pre-roll": simulate(USAGE, "--pre-roll", args="--pre-roll=-1s"),

@@ -130,18 +130,13 @@ CASES: dict[str, Case] = {
     "a modulus of 1e12": simulate(DONE, modulus(1e12)),
     "a modulus of 1e20": simulate(EITHER, modulus(1e20)),
     "a modulus of the largest float": simulate(EITHER, modulus(3.4e38)),
-    "a modulus in GPa by mistake": simulate(REFUSED, modulus(2.0), SOFT),
-    "an infinite modulus": simulate(REFUSED, modulus(math.inf), PLASTIC, "youngsModulus"),
     "a ratio of 0.4999": simulate(EITHER, material(poissonsRatio=0.4999)),
     "a ratio of -0.99": simulate(EITHER, material(poissonsRatio=-0.99)),
-    "a ratio of -1": simulate(REFUSED, material(poissonsRatio=-1.0), PLASTIC, "poissonsRatio"),
     "a density of 1e-6": simulate(EITHER, material(density=1e-6)),
     "a density of 1e9": simulate(DONE, material(density=1e9), "density is"),
     "a density in g/cm3 by mistake": simulate(DONE, material(density=1.1)),
-    "an infinite density": simulate(REFUSED, material(density=math.inf), PLASTIC, "density"),
     "no damping": simulate(DONE, damping(ratio=0.0)),
     "damping of nearly 1": simulate(DONE, damping(ratio=0.99)),
-    "negative damping": simulate(REFUSED, damping(ratio=-0.1), PLASTIC, "calm:damping:ratio"),
     "damping that is no number": simulate(REFUSED, damping(rayleighMass=math.nan), PLASTIC, "calm:damping"),
     "damping of 1e9 by mass": simulate(EITHER, damping(rayleighMass=1e9)),
     "damping of 1e9 by stiffness": simulate(EITHER, damping(rayleighStiffness=1e9)),
@@ -183,7 +178,6 @@ CASES: dict[str, Case] = {
     "an arm of kilometres": simulate(EITHER, stage_metadata("metersPerUnit", 1000.0)),
     "an arm of micrometres": simulate(EITHER, stage_metadata("metersPerUnit", 1e-6)),
     "units of 1e-30 m": simulate(EITHER, stage_metadata("metersPerUnit", 1e-30), "metersPerUnit"),
-    "an infinite unit of length": simulate(REFUSED, stage_metadata("metersPerUnit", math.inf), "metersPerUnit"),
     "kilograms of 1e20": simulate(EITHER, stage_metadata("kilogramsPerUnit", 1e20)),
     "grams": simulate(DONE, stage_metadata("kilogramsPerUnit", 1e-3)),
     # motors
@@ -191,25 +185,14 @@ CASES: dict[str, Case] = {
     "a drive of no stiffness and no damping": simulate(EITHER, motor(model="drive"), drive(stiffness=0.0, damping=0.0)),
     "a drive that is much too soft": simulate(EITHER, motor(model="drive"), drive(stiffness=1e-3, damping=1e-4)),
     "a drive that is much too stiff": simulate(EITHER, motor(model="drive"), drive(stiffness=1e12, damping=1e6)),
-    "a drive with negative stiffness": simulate(
-        REFUSED, motor(model="drive"), drive(stiffness=-5.0, damping=1.0), SHOULDER, "stiffness"
-    ),
-    "a drive with negative damping": simulate(
-        REFUSED, motor(model="drive"), drive(stiffness=500.0, damping=-1.0), SHOULDER, "damping"
-    ),
     "a drive of infinite stiffness": simulate(EITHER, motor(model="drive"), drive(stiffness=math.inf, damping=1.0)),
     "a drive without gains": simulate(EITHER, motor(model="drive"), SHOULDER),
-    "a motor of a model that is none": simulate(REFUSED, motor(model="rocket"), SHOULDER, "calm:motor:model"),
-    "a motor of a type that is none": simulate(REFUSED, motor(type="XM9999"), SHOULDER, "calm:motor:type"),
     "a servo without anything": simulate(EITHER, motor(model="servo"), SHOULDER),
     "a servo that is delayed by ten seconds": simulate(
         EITHER, motor(model="servo", positionGain=100.0, velocityGain=1.0, delay=10.0)
     ),
     "a servo that is unstable": simulate(
         EITHER, motor(model="servo", positionGain=1e4, velocityGain=0.0, delay=0.05), seconds=SLOW
-    ),
-    "a servo with a torque of zero": simulate(
-        REFUSED, motor(model="servo", positionGain=100.0, maxTorque=0.0), SHOULDER
     ),
     "backlash of a turn": simulate(EITHER, motor(backlash=360.0)),
     "negative backlash": simulate(REFUSED, motor(backlash=-1.0), SHOULDER, "backlash"),
@@ -229,8 +212,6 @@ CASES: dict[str, Case] = {
     "a limit of torque below the weight": optimize(
         EITHER, motor(maxTorque=0.1), "exceed|maxTorque|weight", seconds=SLOW
     ),
-    "a limit of speed that is no number": optimize(REFUSED, motor(maxVelocity=math.nan), SHOULDER, "maxVelocity"),
-    "a negative limit of acceleration": optimize(REFUSED, motor(maxAcceleration=-5.0), SHOULDER, "maxAcceleration"),
     "joint limits of no width": simulate(
         EITHER, both(number(SHOULDER, "physics:lowerLimit", 5.0), number(SHOULDER, "physics:upperLimit", 5.0)), "limit"
     ),
@@ -255,9 +236,6 @@ CASES: dict[str, Case] = {
     "a joint that holds a body to the world twice": simulate(
         EITHER, closing_joint("", BASE, (0, 0, 1), (0, 0, 0), UsdPhysics.FixedJoint)
     ),
-    "a body on the joint of another robot": simulate(
-        REFUSED, lambda s: UsdPhysics.Joint(s.GetPrimAtPath(ELBOW)).GetBody1Rel().SetTargets(["/Other/body"]), "elbow"
-    ),
     # targets and tolerances
     "no target": simulate(EITHER, target=False),
     "no target, optimised": optimize(EITHER, "CalmTargetAPI|target", target=False),
@@ -265,20 +243,14 @@ CASES: dict[str, Case] = {
     "a target at 1e12": simulate(EITHER, far_target(1e12)),
     "two hundred targets": simulate(DONE, many_targets(200)),
     "a weight of 1e30": simulate(EITHER, target(positionWeight=1e30), target=False),
-    "an infinite weight": simulate(REFUSED, target(positionWeight=math.inf), HAND, "positionWeight", target=False),
     "a tolerance of 1e-12": simulate(
         EITHER, flexible(retarget("tolerance", "Float", 1e-12)), "tolerance", seconds=SLOW
     ),
-    "a tolerance of zero": simulate(REFUSED, retarget("tolerance", "Float", 0.0), "/Arm", "calm:retarget:tolerance"),
     "a tolerance of a kilometre": simulate(REFUSED, flexible(retarget("tolerance", "Float", 1000.0)), "tolerance"),
-    "an infinite tolerance": simulate(REFUSED, retarget("tolerance", "Float", math.inf), "/Arm", "tolerance"),
     "a step of a nanosecond": simulate(REFUSED, retarget("timeStep", "Float", 1e-9), "timeStep"),
     "a step longer than the shot": simulate(EITHER, retarget("timeStep", "Float", 100.0)),
     "knots a nanosecond apart": optimize(EITHER, flexible(retarget("knotSpacing", "Float", 1e-9)), seconds=SLOW),
     "a smoothness of 1e30": optimize(EITHER, flexible(retarget("smoothness", "Float", 1e30)), seconds=SLOW),
-    "a smoothness that is no number": optimize(
-        REFUSED, retarget("smoothness", "Float", math.nan), "/Arm", "smoothness"
-    ),
     "a soft arm that swings fast": simulate(DONE, modulus(2e8), FAST, seconds=SLOW),
     "a modulus of 1e6": simulate(EITHER, modulus(1e6), seconds=2.0 * SLOW),
     "an uncertainty of 100": optimize(

@@ -30,11 +30,11 @@ def test_commands_faster_than_a_motor_settles_are_lines_that_come_a_period_later
 
 
 def test_after_the_last_command_the_motor_rests_and_a_loop_begins_again():
-    values = np.array([[0.0], [1.0], [2.0 * np.pi]])
+    values = np.array([[1.0], [2.0], [1.0 + 2.0 * np.pi]])
     once, loop = (played(Commands(LINEAR, np.array([0.0, 0.1, 0.2]), values), cyclic) for cyclic in (False, True))
-    assert once(np.array([0.5]), 0)[0, 0] == 2.0 * np.pi and once(np.array([0.5]), 1)[0, 0] == 0.0
-    assert loop(np.array([0.25]), 0)[0, 0] == pytest.approx(0.5 + 2.0 * np.pi), "whole turns add up"
-    assert loop(np.array([-0.15]), 0)[0, 0] == pytest.approx(0.5 - 2.0 * np.pi)
+    assert once(np.array([0.5]), 0)[0, 0] == 1.0 + 2.0 * np.pi and once(np.array([0.5]), 1)[0, 0] == 0.0
+    assert loop(np.array([0.25]), 0)[0, 0] == pytest.approx(1.5 + 2.0 * np.pi), "whole turns add up"
+    assert loop(np.array([-0.15]), 0)[0, 0] == pytest.approx(1.5 - 2.0 * np.pi)
 
 
 def test_other_bezier_curves_are_those_of_their_parameter():
