@@ -235,13 +235,17 @@ def motions(data: bytes) -> None:
     from calmotion.errors import ShotError
 
     try:
-        tracks = _plugin("motion_table", "tables").read_motion(
-            str(_file(f"motion{'.npz' if data[:1] == b'P' else '.csv'}", data)),
-            angles="auto",
-            times="auto",
-            rate=60.0,
-            names=(),
-        ).tracks
+        tracks = (
+            _plugin("motion_table", "tables")
+            .read_motion(
+                str(_file(f"motion{'.npz' if data[:1] == b'P' else '.csv'}", data)),
+                angles="auto",
+                times="auto",
+                rate=60.0,
+                names=(),
+            )
+            .tracks
+        )
     except ShotError as error:
         assert error.problem
         return
