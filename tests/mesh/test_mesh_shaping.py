@@ -44,7 +44,6 @@ def test_a_surface_whose_volume_is_not_that_of_the_elements_is_not_fitted(helper
     body = Body("/Arm/link", helpers.frame(0, 0, 0), None, flexible=FlexibleSettings(plastic))
     found = shaped(mesh, body, surface_of(helpers, 0.9 * float(np.prod(SIZE))), ())
     assert np.array_equal(found.points, mesh.points) and found.patches == ()
-    assert found.missing.volumes.sum() == pytest.approx(np.prod(SIZE) - mesh.quality.volume, rel=0.2)
 
 
 def test_a_mesh_that_has_the_volume_by_chance_is_fitted(helpers, mesh, plastic):

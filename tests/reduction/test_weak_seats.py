@@ -28,7 +28,7 @@ def block(helpers):
     points, tets = helpers.box((8, 6, 5), (0.12, 0.09, 0.07), origin=(-0.06, -0.045, -0.07))
     points = np.asarray(points)
     for _ in range(5):
-        points, tets = bisected(points, tets, np.argsort(np.linalg.norm(points[tets].mean(axis=1), axis=1))[:20])
+        points, tets, _ = bisected(points, tets, np.argsort(np.linalg.norm(points[tets].mean(axis=1), axis=1))[:20])
     return helpers.mesh(points, tets)
 
 

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 from calmotion.model import ModelChoice, ModelChoices
-from calmotion.model.budget import CHOICES, MESH, PATCHES, REDUCTION, SEARCH, STEP, SUBSPACE, verdict_on
+from calmotion.model.budget import CHOICES, MESH, REDUCTION, SEARCH, STEP, SUBSPACE, verdict_on
 from calmotion.model.model_choice import with_choices
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
@@ -29,20 +29,19 @@ def test_the_entries_add_up_to_the_estimates_largest_first(simulated, arm):
     chosen = with_choices(simulated, ModelChoices(arm, rows))
     result = with_budget(chosen, arm, TOLERANCE)
     entries = {entry.source: entry for entry in result.budget}
-    assert set(entries) == {MESH, PATCHES, STEP, REDUCTION, SUBSPACE, CHOICES} and result.tolerance_m == TOLERANCE
+    assert set(entries) == {MESH, STEP, REDUCTION, SUBSPACE, CHOICES} and result.tolerance_m == TOLERANCE
     estimates = [entry.estimated_m or 0.0 for entry in result.budget]
     assert estimates == sorted(estimates, reverse=True)
     assert entries[STEP].estimated_m == result.accuracy.step_m and entries[CHOICES].estimated_m == 1e-4
     without_mesh = sum(entry.estimated_m for entry in result.budget if entry.source != MESH)
-    assert entries[PATCHES].estimated_m == result.accuracy.patches_m
-    assert without_mesh == pytest.approx(result.accuracy.estimated_m + result.accuracy.patches_m)
+    assert without_mesh == pytest.approx(result.accuracy.estimated_m)
     assert entries[MESH].allowed_m == pytest.approx(max(TOLERANCE - without_mesh, 0.25 * TOLERANCE))
     assert "time step" in entries[STEP].choice and "gyroscopic" in entries[CHOICES].choice
 
 
 def test_a_larger_mesh_error_decides_the_verdict(simulated, arm):
     for mesh, kept in ((0.0, True), (2.0 * TOLERANCE, False)):
-        accuracy = dataclasses.replace(simulated.accuracy, mesh_m=mesh, patches_m=0.0)
+        accuracy = dataclasses.replace(simulated.accuracy, mesh_m=mesh)
         result = with_budget(dataclasses.replace(simulated, accuracy=accuracy), arm, TOLERANCE)
         verdict = verdict_on(result.budget, TOLERANCE)
         assert (verdict.kept, verdict.short) == (kept, "" if kept else MESH)
@@ -55,14 +54,14 @@ def test_a_given_step_is_estimated_and_falls_short_where_it_is_too_long(arm, ani
     assert step.estimated_m > 1e-4 and step.reason == "given by --step"
     # the meshes keep their share of it, which the step has used
     assert next(entry for entry in result.budget if entry.source == MESH).allowed_m == pytest.approx(0.25e-4)
-    verdict = verdict_on([entry for entry in result.budget if entry.source not in (MESH, PATCHES)], 1e-4)
+    verdict = verdict_on([entry for entry in result.budget if entry.source != MESH], 1e-4)
     assert not verdict.kept and verdict.short == STEP
 
 
 def test_a_search_is_said_to_be_ended_by_the_tolerance_or_before(arm, animation, bodies):
     shot = compile_shot(arm, animation, bodies)
-    for most, share in ((30, 0.1), (1, None)):
-        options = RunSettings(tolerance=TOLERANCE, max_iterations=most)
+    for tolerance, most, share in ((TOLERANCE, 30, 0.1), (0.1 * TOLERANCE, 1, None)):
+        options = RunSettings(tolerance=tolerance, max_iterations=most)
         result = with_budget(optimize_to_tolerance(shot, options, quiet), arm, TOLERANCE)
         search = next(entry for entry in result.budget if entry.source == SEARCH)
         assert search.allowed_m == pytest.approx(0.1 * TOLERANCE)

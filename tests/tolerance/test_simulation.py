@@ -62,9 +62,9 @@ def test_efforts_are_stated_with_their_error(arm, animation, bodies, options):
 
 
 def test_the_step_takes_what_all_else_leaves_of_the_tolerance(arm, animation, bodies):
-    options, exact = RunSettings(tolerance=1e-3), [replace(body, patch_error=0.0) for body in bodies]
+    options = RunSettings(tolerance=1e-3)
     none, some, much, more = (
-        simulate_to_tolerance(compile_shot(arm, animation, exact), options, quiet, left_out_m=left_out).accuracy
+        simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet, left_out_m=left_out).accuracy
         for left_out in (0.0, 4e-4, 8e-4, 2e-3)
     )
     assert 0.4e-3 < none.step_m <= 0.75e-3
@@ -73,13 +73,11 @@ def test_the_step_takes_what_all_else_leaves_of_the_tolerance(arm, animation, bo
     assert 0.2e-3 < more.step_m <= 0.35e-3  # smaller steps would be in vain
 
 
-def test_the_step_leaves_the_tolerance_to_meshes_and_patches(arm, animation, bodies):
+def test_the_step_leaves_the_tolerance_to_meshes(arm, animation, bodies):
     options, flexible = RunSettings(tolerance=1e-3), [len(body.stiffness) > 0 for body in bodies]
-    worse = [
-        replace(b, mesh_error=5e-4 if f else None, patch_error=2e-4) for b, f in zip(bodies, flexible, strict=True)
-    ]
+    worse = [replace(b, mesh_error=7e-4 if f else None) for b, f in zip(bodies, flexible, strict=True)]
     found = simulate_to_tolerance(compile_shot(arm, animation, worse), options, quiet).accuracy
-    others = found.mesh_m + found.patches_m
+    others = found.mesh_m
     assert 0.2e-3 < others < 0.8e-3 and 0.3 * (0.9e-3 - others) < found.step_m <= 0.95e-3 - others
 
 

@@ -17,7 +17,7 @@ from calmotion.host.plan import Plan
 from calmotion.host.polling import can_check, find_rivals, poll, will_run
 from calmotion.host.properties import PropertyValues
 from calmotion.support import interrupts
-from calmotion.support.memory import RESERVE, require_address_space
+from calmotion.support.memory import RESERVE, peak_memory, require_address_space
 from calmotion.support.naming import as_written
 
 if TYPE_CHECKING:
@@ -48,6 +48,8 @@ class OperatorResult:
         error: What it raised, or None.
         traceback: Where, or empty.
         duration: [s].
+        processor_s: Processor time of this process and of those that it started and that have ended [s].
+        peak_memory_gb: Of this process, up to the end of the operator [GB]; NaN where that is not known.
         records: What it reported.
         progress: How far it came, 0..1; 1 for one that is done.
     """
@@ -60,6 +62,8 @@ class OperatorResult:
     error: Exception | SystemExit | None = None
     traceback: str = ""
     duration: float = 0.0
+    processor_s: float = 0.0
+    peak_memory_gb: float = 0.0
     records: tuple[Record, ...] = ()
     progress: float = 0.0
 
@@ -170,7 +174,7 @@ class Run:
             names = ", ".join(kind.__name__ for kind in self._refused or self._lost)
             why = "more than one operator makes" if self._refused else "there is no"
             return self._result(cls, Outcome.BLOCKED, reason=f"{why} {names}")
-        start = time.perf_counter()
+        start = time.perf_counter(), _processor_time()
         context = RunContext(
             cls,
             dict(self.data),
@@ -194,11 +198,10 @@ class Run:
             self._progress(cls.label, 1.0, "")
         except (Exception, SystemExit) as error:  # a plugin does not end the host
             interrupts.check()  # which it may have made of an interrupt
-            return self._failure(cls, error, time.perf_counter() - start, context)
+            return self._failure(cls, error, start, context)
         self.data.update(values)
         self._made |= dict.fromkeys(values, cls)
-        duration = time.perf_counter() - start
-        return self._result(cls, Outcome.DONE, duration=duration, records=self._records(context), progress=1.0)
+        return self._result(cls, Outcome.DONE, **_cost(start), records=self._records(context), progress=1.0)
 
     def _result(self, cls: type[Operator], outcome: Outcome, **fields: Any) -> OperatorResult:
         return OperatorResult(cls.idname, cls.label, self._owners[cls.idname], outcome, **fields)
@@ -215,7 +218,7 @@ class Run:
         self,
         cls: type[Operator],
         error: Exception | SystemExit,
-        duration: float = 0.0,
+        start: tuple[float, float] | None = None,
         context: RunContext | None = None,
     ) -> OperatorResult:
         self._failed |= set(cls.provides)
@@ -225,7 +228,7 @@ class Run:
             reason=str(error) or type(error).__name__,
             error=error,
             traceback="".join(traceback.format_exception(error)),
-            duration=duration,
+            **({} if start is None else _cost(start)),
             records=self._records(context) if context else (),
             progress=context.fraction if context else 0.0,
         )
@@ -255,6 +258,17 @@ class Run:
     def failures(self) -> list[OperatorResult]:
         """The operators that raised."""
         return [result for result in self.results if result.outcome == Outcome.FAILED]
+
+
+def _processor_time() -> float:
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+def _cost(start: tuple[float, float]) -> dict[str, float]:
+    """Time, processor time and memory of an operator that began at a time and a processor time [s]."""
+    duration, processor = time.perf_counter() - start[0], _processor_time() - start[1]
+    return {"duration": duration, "processor_s": processor, "peak_memory_gb": peak_memory()}
 
 
 @contextmanager

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 from calmotion.arrays import Array, Indices, IntArray
 from calmotion.mesh.grids.boundary_fit import fitted
-from calmotion.mesh.grids.missing_volume import missing_volume
 from calmotion.mesh.patches.cut_patches import with_rims
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles
@@ -59,8 +58,7 @@ def shaped(mesh: FEMesh, body: Body, surface: Surface, attachments: Sequence[Att
     moved = fitted(points, tets, near)
     cut, fit = (_with(mesh, x, tets, rims, surface.volume) for x in (points, moved))
     # a surface that runs through itself is not what the elements fill
-    made = cut if fit.quality.volume_error > max(cut.quality.volume_error, _FILLED) else fit
-    return replace(made, missing=missing_volume(made.points, made.tets, near))
+    return cut if fit.quality.volume_error > max(cut.quality.volume_error, _FILLED) else fit
 
 
 def _with(mesh: FEMesh, points: Array, tets: IntArray, rims: Sequence[tuple[Array, IntArray]], volume: float) -> FEMesh:

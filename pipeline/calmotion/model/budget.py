@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-MESH, PATCHES, REDUCTION, SUBSPACE = "mesh", "interface patches", "reduction", "POD subspace"
+MESH, REDUCTION, SUBSPACE = "mesh", "reduction", "POD subspace"
 CHOICES, STEP, SEARCH = "model", "time step", "search"
 MEASURED = "measured error"  # stands for all others where a result was verified
 SEARCH_SHARE = 0.1  # of the tolerance: a search does not pursue a smaller gain

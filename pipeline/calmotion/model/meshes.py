@@ -18,13 +18,7 @@ class MeshQuality:
         repairs: What was repaired, as sentences.
         frequency_error: Estimated relative error of the first frequencies; None where it is not known.
         source: What the body's solid was made of, such as `visual surface`.
-        stiffness_factor: Of the stiffness of a finer mesh over that of this one, by which its elements are softer.
-        interface_factors: Static stiffness of its p moving interfaces that a finer mesh has: the inverse of its own,
-            without the factor above, times that of the finer one, shape [6p, 6p]; None where that is not known.
-        interface_softest: The same of the least stiffness that its estimated error allows.
-        element_error: Estimated relative error of the compliance of its elements, without the factors above.
-        shape_error: What of the first frequencies may be wrong, besides `frequency_error`, since the mesh leaves its
-            surface in places.
+        stiffness_factor: Of the stiffness of ever finer meshes over that of this one, by which its elements are softer.
     """
 
     min_dihedral_deg: float
@@ -34,15 +28,6 @@ class MeshQuality:
     frequency_error: float | None = None
     stiffness_factor: float = 1.0
     source: str = ""
-    interface_factors: Array | None = None
-    interface_softest: Array | None = None
-    element_error: float = 0.0
-    shape_error: float = 0.0
-
-    @property
-    def error(self) -> float | None:
-        """Relative error of the first frequencies, that by the shape included; None where it is not known."""
-        return None if self.frequency_error is None else self.frequency_error + self.shape_error
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,19 +44,6 @@ class CutPatch:
 
 
 @dataclass(frozen=True, eq=False)
-class MissingVolume:
-    """What a mesh leaves out of the solid that it was made for, near its boundary.
-
-    Attributes:
-        points: Places on its boundary [m], shape [q, 3], body frame.
-        volumes: What is missing there [m^3], shape [q]; negative: what is too much.
-    """
-
-    points: Array
-    volumes: Array
-
-
-@dataclass(frozen=True, eq=False)
 class FEMesh:
     """Tetrahedra of one flexible body.
 
@@ -82,7 +54,6 @@ class FEMesh:
         quality: Its quality measures.
         given: Whether the shot or the user chose its elements: nothing refines them then.
         patches: Interface patches along whose rims the elements are cut.
-        missing: What it leaves out of its solid; None: nothing, or it is not known.
     """
 
     body: int
@@ -91,7 +62,6 @@ class FEMesh:
     quality: MeshQuality
     given: bool = False
     patches: tuple[CutPatch, ...] = ()
-    missing: MissingVolume | None = None
 
 
 @dataclass(frozen=True, eq=False)

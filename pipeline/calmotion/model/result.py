@@ -166,7 +166,6 @@ class Accuracy:
         left_out_m: Estimated error of the model simplifications, those of `subspace_m` and `choices_m` included [m].
         mesh_m: Estimated error of the finite-element meshes [m]; None where it is not known.
         subspace_m: Estimated error of the POD subspaces [m].
-        patches_m: Estimated error of the interface patches by their rims [m], not a part of `mesh_m`.
         choices_m: Estimated error of what the analysis of the shot left out, before bodies were reduced [m].
         efforts: Estimated error of each motor's effort by the time step [N m] or [N], shape [M]; None: not known.
     """
@@ -175,7 +174,6 @@ class Accuracy:
     left_out_m: float
     mesh_m: float | None = None
     subspace_m: float = 0.0
-    patches_m: float = 0.0
     choices_m: float = 0.0
     efforts: Array | None = None
 

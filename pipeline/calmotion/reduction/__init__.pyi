@@ -9,8 +9,8 @@ from calmotion.reduction.elements.assembly import FEModel as FEModel
 from calmotion.reduction.elements.assembly import assemble as assemble
 from calmotion.reduction.inertia import inertia_integrals as inertia_integrals
 from calmotion.reduction.load_envelope import LoadEnvelope as LoadEnvelope
-from calmotion.reduction.mesh_refinement import Effort as Effort
-from calmotion.reduction.mesh_refinement import refined_for_frequencies as refined_for_frequencies
+from calmotion.reduction.mesh_refinement import MeshController as MeshController
+from calmotion.reduction.mesh_refinement import root_at as root_at
 from calmotion.reduction.reduce import LinearModes as LinearModes
 from calmotion.reduction.reduced_body import Invariants as Invariants
 from calmotion.reduction.reduced_body import ReducedBody as ReducedBody

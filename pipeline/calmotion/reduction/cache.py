@@ -17,9 +17,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from calmotion.model.meshes import CutPatch, FEMesh, MeshQuality, MissingVolume
+from calmotion.model.meshes import CutPatch, FEMesh, MeshQuality
 from calmotion.model.result import Simplification
-from calmotion.reduction.reduced_body import Elasticity, InterfaceStiffness, Invariants, Marker, ReducedBody
+from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
 from calmotion.support.caching.cache_folder import REDUCTIONS
 from calmotion.support.caching.caches import key_of, store_arrays, stored_arrays
 from calmotion.support.sources import source_digest
@@ -29,10 +29,7 @@ T = TypeVar("T")
 FORMAT = 1  # to increment when the meaning of the content of a file changes
 
 # A file names the types of its values. Only these are constructed, besides arrays, numbers, strings, None and tuples.
-_TYPES = (
-    CutPatch, Elasticity, FEMesh, InterfaceStiffness, Invariants, Marker, MeshQuality, MissingVolume, ReducedBody,
-    Simplification,
-)  # fmt: skip
+_TYPES = (CutPatch, Elasticity, FEMesh, Invariants, Marker, MeshQuality, ReducedBody, Simplification)
 TYPES: dict[str, type] = {kind.__name__: kind for kind in _TYPES}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -72,19 +71,7 @@ def energy_errors(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> A
 
 
 def element_errors(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> Array:
-    """The part of each element in `energy_errors`, shape [m, k]; arguments as there."""
-    return errors_and_form(mesh, material, u)[0]
-
-
-def errors_and_form(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> tuple[Array, Array]:
-    """The part of each element in `energy_errors`, and the energy of the error of combinations of the displacements.
-
-    Args:
-        mesh, material, u: As of `energy_errors`.
-
-    Returns:
-        Shape [m, k]; and a symmetric matrix Q, shape [k, k]: the displacements u x have an error of the energy x^T Q x,
-        where that of the first of them is one.
+    """The part of each element in `energy_errors`, shape [m, k]; arguments as there.
 
     Source: Zienkiewicz and Zhu 1992.
     """
@@ -101,18 +88,18 @@ def errors_and_form(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) ->
     # mu = 1: 2 e:e + lambda tr(e)^2, shear strains being doubled
     law = np.diag([2.0, 2.0, 2.0, 1.0, 1.0, 1.0])
     law[:3, :3] += 2.0 * material.poissons_ratio / (1.0 - 2.0 * material.poissons_ratio)
-    count = u.shape[2]
-    own, form, parts = np.zeros(count), np.zeros((count, count)), np.empty((len(mesh.tets), count))
+    own, parts = np.zeros(u.shape[2]), np.empty((len(mesh.tets), u.shape[2]))
     for first in range(0, len(mesh.tets), _AT_ONCE):
         some = slice(first, first + _AT_ONCE)
         weight, strain = weights[some, :, None, None], strains[some]
         off = np.einsum("aq,eack->eqck", shapes, recovered[mesh.tets[some]], optimize=True) - strain
-        forces = weight * np.einsum("ij,eqjk->eqik", law, off, optimize=True)
-        parts[some] = np.einsum("eqik,eqik->ek", forces, off)
-        rows = (math.prod(off.shape[:3]), count)  # of no displacements there is nothing from which -1 would follow
-        form += forces.reshape(rows).T @ off.reshape(rows)
-        own += np.einsum("eqik,eqik->k", weight * np.einsum("ij,eqjk->eqik", law, strain, optimize=True), strain)
-    return parts / own, 0.5 * (form + form.T) / own[:1]
+        for field, energy in ((off, parts[some]), (strain, None)):
+            density = np.einsum("eqik,eqik->ek", weight * np.einsum("ij,eqjk->eqik", law, field, optimize=True), field)
+            if energy is None:
+                own += density.sum(axis=0)
+            else:
+                energy[:] = density
+    return parts / own
 
 
 def _strains(rule: GradientRule, u: Array) -> Array:

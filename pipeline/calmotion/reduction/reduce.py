@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, InterfacePatch, interface_patches
-from calmotion.mesh.patches.rim_error import compliance_error, rim_error
 from calmotion.mesh.quadratic import QuadraticMesh
+from calmotion.mesh.tetrahedra import surface_area
 from calmotion.model.budget import REDUCTION
 from calmotion.model.character import DEFAULT_TOLERANCE, Body, ElasticMaterial, SurfaceMesh
 from calmotion.model.meshes import FEMesh
@@ -24,8 +24,7 @@ from calmotion.reduction.elements.assembly import FEModel, assemble
 from calmotion.reduction.elements.embedding import Embedding, embed
 from calmotion.reduction.inertia import inertia_integrals
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
-from calmotion.reduction.reduced_body import Elasticity, InterfaceStiffness, Marker, ReducedBody
-from calmotion.reduction.scaled_stiffness import with_interface_stiffness
+from calmotion.reduction.reduced_body import Elasticity, Marker, ReducedBody
 from calmotion.reduction.weak_seats import weak_patch
 
 __all__ = ["AttachmentFrame", "LinearModes", "linear_modes", "reduce_body"]
@@ -67,7 +66,6 @@ def reduce_body(
     material = _material(mesh, body.flexible.material)
     settings = replace(body.flexible, material=material)
     body = replace(body, flexible=settings)
-    patch_error = compliance_error(linear.rims, material, basis.omega_squared, basis.patch_motion)
     elasticity = None
     law, simplifications = _law(model, linear.support, basis, body, load_envelope, tolerance)
     left_out += simplifications
@@ -84,42 +82,27 @@ def reduce_body(
         stiffness=basis.omega_squared,
         damping=np.zeros((r, r)),
         markers=_markers(model.mesh, attachments, moving, basis),
-        skin=tuple(embed(model.mesh, surface.points).displacements(basis.modes) for surface in surfaces),
+        skin=tuple(linear.embedding(surface).displacements(basis.modes) for surface in surfaces),
         nodes=len(model.mesh.nodes),
         elements=len(model.mesh.tets),
         elasticity=elasticity,
         left_out=left_out,
         mesh_error_m=_mesh_error_at_targets(mesh_error, linear),
         mesh_error=mesh_error,
-        patch_error=patch_error,
-        element_error=mesh.quality.element_error,
+        element_error=max(1.0 / mesh.quality.stiffness_factor - 1.0, 0.0),
         damping_ratio=ratio_of_parts(model.mesh, material, linear.basis.modes),
         weak_seat=_weak_seat(linear, material, root),
     )
-    return damped(_with_finer_interfaces(reduced, mesh, linear), material)
+    return damped(reduced, material)
 
 
 def _weak_seat(linear: LinearModes, material: ElasticMaterial, root: int) -> int | None:
     """The attachment frame of the patch that gives way most, where that is much."""
-    radii, basis = [radius for _, radius in linear.rims], linear.basis
-    weak = weak_patch(linear.model, material, radii, basis.omega_squared, basis.patch_motion)
+    basis = linear.basis
+    weak = weak_patch(linear.model, material, linear.radii, basis.omega_squared, basis.patch_motion)
     if weak is None:
         return None
     return root if weak == 0 else linear.moving[weak - 1].attachments[0]
-
-
-def _with_finer_interfaces(body: ReducedBody, mesh: FEMesh, linear: LinearModes) -> ReducedBody:
-    """The body with the static stiffness of its interfaces on a finer mesh, where that is known."""
-    given = mesh.quality
-    factors, softest = given.interface_factors, given.interface_softest
-    if factors is None or len(factors) != 6 * len(linear.moving):
-        return body
-    own = linear.support.fixed(linear.model).patch_stiffness()
-    patches, finer = tuple(patch.attachments[0] for patch in linear.moving), own @ factors / given.stiffness_factor
-    body = with_interface_stiffness(body, patches, own, finer)
-    if softest is None:
-        return body
-    return replace(body, interfaces=InterfaceStiffness(patches, finer, own @ softest / given.stiffness_factor))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,13 +113,20 @@ class FullBody:
         model: Full model.
         support: Its root patch and moving patches.
         moving: The moving patches, in the order of the support.
-        rims: `rim_error` of the root patch, and of each moving patch.
+        radii: Of the root patch, and of each moving patch [m].
     """
 
     model: FEModel
     support: Support
     moving: Sequence[InterfacePatch]
-    rims: Sequence[tuple[float, float]]
+    radii: Sequence[float]
+    _embedded: dict[int, tuple[SurfaceMesh, Embedding]] = field(default_factory=dict, kw_only=True, repr=False)
+
+    def embedding(self, surface: SurfaceMesh) -> Embedding:
+        """The points of a surface in the elements; found once for all reductions of the body."""
+        if id(surface) not in self._embedded:
+            self._embedded[id(surface)] = surface, embed(self.model.mesh, surface.points)
+        return self._embedded[id(surface)][1]
 
     def scaled(self, factor: float) -> FullBody:
         """The same body with its stiffness times a factor, without a new factorisation."""
@@ -144,7 +134,11 @@ class FullBody:
         support = Support(own.root, own.patches, own.centers)
         model = replace(self.model, stiffness=factor * self.model.stiffness)
         return FullBody(
-            model, support.known(model, own.fixed(self.model).scaled(model, factor)), self.moving, self.rims
+            model,
+            support.known(model, own.fixed(self.model).scaled(model, factor)),
+            self.moving,
+            self.radii,
+            _embedded=self._embedded,
         )
 
     def take(self, other: FullBody, turn: Array) -> None:
@@ -181,12 +175,13 @@ def full_body(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], 
     moving = [patch for patch in patches if patch is not root_patch]
     centers = [attachments[patch.attachments[0]].frame.position for patch in moving]
     support = Support(root_patch.nodes, [patch.nodes for patch in moving], centers)
-    origins = [attachments[patch.attachments[0]].frame.position for patch in (root_patch, *moving)]
-    rims = [
-        rim_error(model.mesh, patch, origin, mesh.patches)
-        for patch, origin in zip((root_patch, *moving), origins, strict=True)
-    ]
-    return FullBody(model, support, moving, rims)
+    return FullBody(model, support, moving, [_radius_of(model.mesh, patch) for patch in (root_patch, *moving)])
+
+
+def _radius_of(mesh: QuadraticMesh, patch: InterfacePatch) -> float:
+    """Radius of a disc of the area of a patch [m]."""
+    held = np.isin(mesh.surface[:, :3], patch.nodes).all(axis=1)
+    return float(np.sqrt(surface_area(mesh.nodes, mesh.surface[held, :3]) / np.pi)) or patch.radius
 
 
 def _material(mesh: FEMesh, material: ElasticMaterial) -> ElasticMaterial:
@@ -225,7 +220,7 @@ def linear_modes(
         tolerance=settings.modes_share * tolerance if load_envelope is not None else None,
         targets=_points(model.mesh, attachments).displacements, fixed=support.fixed(model),
     )  # fmt: skip
-    return LinearModes(model, support, moving, full.rims, basis, load_envelope)
+    return LinearModes(model, support, moving, full.radii, basis, load_envelope, _embedded=full._embedded)
 
 
 def _law(

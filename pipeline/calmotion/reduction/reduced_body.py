@@ -84,21 +84,6 @@ class Elasticity:
 
 
 @dataclass(frozen=True, eq=False)
-class InterfaceStiffness:
-    """Static stiffness of p moving interfaces.
-
-    Attributes:
-        patches: A marker of each.
-        own: Of the body, root clamped, shape [6p, 6p].
-        softest: With the estimated error of the mesh in each direction, shape [6p, 6p].
-    """
-
-    patches: tuple[int, ...]
-    own: Array
-    softest: Array
-
-
-@dataclass(frozen=True, eq=False)
 class ReducedBody:
     """A component of the multibody system in its own frame, clamped to its parent-side interface.
 
@@ -113,10 +98,7 @@ class ReducedBody:
         left_out: Simplifications of the model of this body, with their estimated errors.
         mesh_error_m: Estimated error of its finite-element mesh in the shot [m]; None where it is not known.
         mesh_error: Estimated relative error of its stiffness by the mesh, which makes a body too stiff; likewise.
-        patch_error: Estimated relative error of its compliance by the rims of its interface patches.
-        element_error: The same of the elements by themselves, without what finer ones have told.
-        interfaces: Static stiffness of its moving interfaces, and how soft they may be on ever finer meshes; None where
-            `mesh_error` is for all directions.
+        element_error: Relative error of the compliance of its elements, without what finer ones have told.
         damping_ratio: Fraction of critical damping of a body of several materials; None: that of its material.
         weak_seat: A marker whose seat seems to decide how far it bends, see `weak_seats`; None without one.
     """
@@ -132,9 +114,7 @@ class ReducedBody:
     left_out: tuple[Simplification, ...] = ()
     mesh_error_m: float | None = None
     mesh_error: float | None = None
-    patch_error: float = 0.0
     element_error: float = 0.0
-    interfaces: InterfaceStiffness | None = None
     damping_ratio: float | None = None
     weak_seat: int | None = None
 

@@ -1,17 +1,14 @@
-"""A reduced body of another stiffness, such as the one that a finer mesh would give, or of another density."""
+"""A reduced body of another stiffness, or of another density."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.reduction.reduced_body import Elasticity, Invariants, ReducedBody
-from calmotion.reduction.subspace import projected_body, projected_law
-
-_SOFTEST = 0.1  # share of a stiffness: a mesh that is off by more is of no use
+from calmotion.reduction.subspace import projected_body
 
 
 def with_scaled_stiffness(body: ReducedBody, factor: float) -> ReducedBody:
@@ -64,51 +61,6 @@ def _with_strains(law: Elasticity, linear: Array, quadratic: float) -> Elasticit
     size = round(np.sqrt(len(law.data)))
     scale = np.concatenate([linear, np.full(size - len(linear), quadratic)])
     return replace(law, data=(law.data.reshape(size, size) * np.outer(scale, scale)).ravel())
-
-
-def with_interface_stiffness(body: ReducedBody, patches: Sequence[int], own: Array, finer: Array) -> ReducedBody:
-    """The body with the static stiffness of its interfaces that a finer mesh has.
-
-    Coarse elements are too stiff by another share in bending than in twist, so that no common factor is right. The
-    energy E(q) of the body becomes E(S q), where S stretches the static response q to wrenches on the interfaces, by
-    the root of the share of each. Terms that cancel in a bent body, such as those of its stretching, still do; a change
-    of the linear stiffness alone would leave a part of them.
-
-    Args:
-        body: With diagonal mass and stiffness.
-        patches: A marker of each of the p moving interfaces.
-        own: Static stiffness of the interfaces on its mesh, shape [6p, 6p].
-        finer: The same of the finer mesh.
-    """
-    from scipy.linalg import eigh
-
-    if not len(body.stiffness) or not len(patches):
-        return body
-    shares, wrenches = eigh(_symmetric(finer), _symmetric(own))
-    # response of the coordinates to the wrenches own @ wrenches, of energy one half each
-    response = (_motion(body, patches) / body.stiffness).T @ (own @ wrenches)
-    stretch = np.sqrt(np.maximum(shares, _SOFTEST)) - 1.0
-    S = np.eye(len(response)) + (response * stretch) @ (response.T * body.stiffness)
-    values, T = _modes(S.T @ (body.stiffness[:, None] * S), body.invariants.M)
-    law = None if body.elasticity is None else projected_law(body.elasticity, S @ T)
-    return replace(projected_body(replace(body, elasticity=None), T), stiffness=values, elasticity=law)
-
-
-def _motion(body: ReducedBody, patches: Sequence[int]) -> Array:
-    """Motions of interfaces by the coordinates, shape [6p, r]."""
-    return np.vstack([np.vstack([body.markers[i].Phi, body.markers[i].Psi]) for i in patches])
-
-
-def _modes(K: Array, M: Array) -> tuple[Array, Array]:
-    """Squares of the frequencies of a body, and its modes, of unit mass and a sign that rounding does not decide."""
-    from scipy.linalg import eigh
-
-    values, T = eigh(_symmetric(K), _symmetric(M))
-    return values, T * np.where(T[np.abs(T).argmax(axis=0), np.arange(len(T))] < 0.0, -1.0, 1.0)
-
-
-def _symmetric(A: Array) -> Array:
-    return np.asarray(0.5 * (A + A.T))
 
 
 def with_scaled_density(body: ReducedBody, factor: float) -> ReducedBody:

@@ -13,7 +13,6 @@ import numpy as np
 from calmotion.arrays import Array, IntArray
 from calmotion.mesh.patches.automatic_patch import radius_alike
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches, spans_a_plane
-from calmotion.mesh.patches.rim_error import shares_of_patches
 from calmotion.model.character import Body, ElasticMaterial
 from calmotion.model.meshes import FEMesh
 from calmotion.reduction.discretization_error import clamped_modes
@@ -47,6 +46,31 @@ def weak_patch(
         shares = np.array([alike**3 / (alike**3 + radii[0] ** 3)])
     worst = int(shares.argmax())
     return worst if shares[worst] > _SHARE else None
+
+
+def shares_of_patches(
+    radii: Sequence[float], material: ElasticMaterial, omega_squared: Array, patch_motion: Array
+) -> Array:
+    """What patches turn by on the ground under them, of what a body turns by, shape [1 + p]; may exceed one.
+
+    A patch turns on the ground under it as a rigid disc on a half space does; its radius matters by the share of that
+    in the compliance of the body.
+
+    Args:
+        radii: Of the root patch, and of each moving patch [m].
+        material: Of the body.
+        omega_squared: Of its linear modes [1/s^2], shape [r].
+        patch_motion: Motion of the moving patches in them, shape [p, 6, r].
+
+    Source: Johnson, Contact Mechanics, 1985, 3.6: a moment turns a disc of radius a by 3 (1 - nu) / (8 G a^3).
+    """
+    shear = material.youngs_modulus / (2.0 * (1.0 + material.poissons_ratio))
+    turned = patch_motion[:, 3:]
+    whole = np.linalg.eigvalsh((turned / omega_squared) @ turned.transpose(0, 2, 1))[:, -1]
+    # the end that the body turns farthest at also turns by what the root patch does
+    of_each = np.concatenate([[whole.max()], whole])
+    own = 3.0 * (1.0 - material.poissons_ratio) / (8.0 * shear * np.maximum(radii, np.finfo(float).tiny) ** 3)
+    return np.asarray(own / np.maximum(of_each, np.finfo(float).tiny))
 
 
 def weak_seat_note(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], weak: int) -> str:

@@ -6,12 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from calmotion.model import Animation, Character, FEMeshes
 from calmotion.model.character import with_settings
 from calmotion.model.run import RunSettings
-from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import body_anchors
 from calmotion.multibody.model.topology import span_tree
@@ -69,8 +66,7 @@ class BodyReduction:
 
     def with_finer_meshes(
         self, tolerance: float | None, wanted: Mapping[int, float], max_nodes: int,
-        progress: Callable[[float, str], None] = lambda fraction, message: None, *, by_factor: bool = True,
-        elements: Mapping[int, float] | None = None, poor_nodes: int = 0,
+        progress: Callable[[float, str], None] = lambda fraction, message: None, keeps: str = "",
     ) -> BodyReduction:  # fmt: skip
         """The reduction on finer meshes; loads stay those of the shot.
 
@@ -79,32 +75,26 @@ class BodyReduction:
             wanted: Relative error of the stiffness that the mesh of a body may have, by body.
             max_nodes: Of the quadratic tetrahedra of a body.
             progress: Called with a fraction and the body at hand.
-            by_factor: Keep the elements and take the stiffness of finer ones; otherwise take the finer elements, also
-                where elements are the user's choice.
-            elements: With `by_factor`, the relative error that the elements of a body may have by themselves.
-            poor_nodes: As of `refined_for_loads`.
+            keeps: As of `MeshController`; with `finer`, elements that the user chose are refined as well.
 
         Raises:
             ShotError: A body that cannot be reduced.
         """
-        from calmotion.reduction.mesh_refinement import refined_for_loads
+        from calmotion.reduction.mesh_refinement import MeshController
 
         assert self.meshes is not None and self.loads is not None
-        anchors, models = body_anchors(self.character, self._tree), self._models()
-        allowed, loads = tolerance_of(self.character, tolerance) / len(self.meshes.meshes), self.loads
+        anchors, models, loads = body_anchors(self.character, self._tree), self._models(), self.loads
         members = {mesh.body: full_model_of(self.character, mesh, anchors[mesh.body]) for mesh in self.meshes.meshes}
         finer = dict(members)
 
         def refine(index: int) -> None:
             own = members[index]
             known = None if models is None or own.mesh.quality.stiffness_factor != 1.0 else models.known(own)
-            mesh = refined_for_loads(
-                own.mesh, own.body, own.attachments, own.root, loads[index], allowed, wanted[index], max_nodes,
-                by_factor, known, (elements or {}).get(index, np.inf), poor_nodes,
-            )  # fmt: skip
+            controller = MeshController(wanted[index], max_nodes, keeps)
+            mesh = controller.refined(own.mesh, own.body, own.attachments, own.root, loads[index], known)
             finer[index] = replace(own, mesh=mesh)
 
-        refined = [b for b, own in members.items() if b in wanted and not (by_factor and own.mesh.given)]
+        refined = [b for b, own in members.items() if b in wanted and (keeps == "finer" or not own.mesh.given)]
         bodies_in_parallel(refine, refined, self.character, progress, ": a finer mesh")
         meshes = FEMeshes(tuple(own.mesh for own in finer.values()))
         result = BodyReduction(self.character, meshes, loads, self._repeats and models is not None)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from calmotion.model import Character, Result
-from calmotion.model.budget import CHOICES, MESH, PATCHES, REDUCTION, SEARCH, SEARCH_SHARE, STEP, SUBSPACE, BudgetEntry
+from calmotion.model import Character, Result, Simplification
+from calmotion.model.budget import CHOICES, MESH, REDUCTION, SEARCH, SEARCH_SHARE, STEP, SUBSPACE, BudgetEntry
 from calmotion.model.tolerance import tolerance_of
 from calmotion.tolerance import reduction as converged_reduction
 from calmotion.tolerance import simulation as simulate_to_tolerance
@@ -23,7 +23,19 @@ def with_budget(
         least_gain: As of `RunSettings`.
     """
     tolerance = tolerance_of(character, requested)
-    return replace(result, tolerance_m=tolerance, budget=_budget(result, tolerance, least_gain))
+    told = (*result.left_out, *_unknown(result, character, requested))
+    return replace(result, left_out=told, tolerance_m=tolerance, budget=_budget(result, tolerance, least_gain))
+
+
+def _unknown(result: Result, character: Character, requested: float | None) -> tuple[Simplification, ...]:
+    """That meshes and reductions are no finer than what is known of the stiffness, where something flexible is."""
+    unknown = [mesh_budget.unknown_stiffness(character, table.body, requested) for table in result.modes]
+    if not any(unknown):
+        return ()
+    share, least = 100.0 * max(unknown), 100.0 * mesh_budget.OF_UNCERTAINTY * max(unknown)
+    what = f"meshes and reductions that change the stiffness by less than {least:.2g}%"
+    why = f"the modulus is known to {share:.3g}%; calm:retarget:uncertainty:modulus tells it, --tolerance asks for more"
+    return (Simplification(what, why, result.accuracy.mesh_m if result.accuracy else None, MESH),)
 
 
 def _budget(result: Result, tolerance: float, least_gain: float) -> tuple[BudgetEntry, ...]:
@@ -48,11 +60,6 @@ def _budget(result: Result, tolerance: float, least_gain: float) -> tuple[Budget
         entry(CHOICES, simulate_to_tolerance.HELD, accuracy.choices_m),
     ]
     if result.modes:
-        how = (
-            "cut along the rims where the mesh is the program's; end faces and named surfaces have no rim of their own"
-        )
-        why = "rims are polygons" if accuracy.patches_m else "their rims are edges of the surface"
-        entries.append(BudgetEntry(PATCHES, simulate_to_tolerance.HELD * tolerance, accuracy.patches_m, how, why))
         rest = tolerance - sum(other.estimated_m or 0.0 for other in entries)
         left = max(rest, mesh_budget.SHARE * tolerance)  # other entries may be beyond their shares
         entries.append(_mesh_entry(result, accuracy.mesh_m, left))

@@ -19,7 +19,7 @@ from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.simulation.body_reduction import BodyReduction
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
-from calmotion.tolerance.meshes.mesh_budget import mesh_error, meshes_to_tolerance
+from calmotion.tolerance.meshes.mesh_budget import OF_UNCERTAINTY, mesh_error, meshes_to_tolerance, uncertainty_error
 from calmotion.tolerance.pod_subspace import ReferenceRun, reference_run
 from calmotion.tolerance.reduced_bodies import ConvergedReduction
 from calmotion.tolerance.simulation import OF_SHAKE, intended_positions
@@ -74,6 +74,8 @@ def converged_reduction(
         if retargeted and found is None:
             allowed = max(allowed, OF_SHAKE * distance(before.run.positions, intended_positions(shot, options)))
         shot, found = finer, then
+        if off > allowed:
+            allowed = max(allowed, OF_UNCERTAINTY * uncertainty_error(shot, options, found.run))
         if off <= allowed or (k and not retargeted and off <= OF_MESH * (mesh_error(shot, options, found.run) or 0.0)):
             break
     reduction.release()

@@ -25,7 +25,7 @@ from calmotion.simulation.inputs.time_grid import MAX_STEP
 from calmotion.simulation.preparation import prepare
 from calmotion.simulation.simulate import Progress, intended_motion, simulate_shot
 from calmotion.tolerance.integrator_choice import by_fast_scheme
-from calmotion.tolerance.meshes.mesh_budget import mesh_error, patch_error
+from calmotion.tolerance.meshes.mesh_budget import mesh_error
 from calmotion.tolerance.pod_subspace import ProjectedShot, ReferenceRun, project_to_subspace
 from calmotion.tolerance.reduced_bodies import SUBSPACES, TIME_STEP, RunMemory
 from calmotion.tolerance.simulate_again import with_last_choices
@@ -116,13 +116,11 @@ def with_accuracy(result: Result, shot: CompiledShot, options: RunSettings, left
         left_out: Error of what the bodies do without [m].
     """
     own = replace(frames_of_result(result, shot.animation.frame_times), integrator=options.scheme)
-    fine, mesh, patch = at_once(
-        partial(simulate_at, shot, options, 0.5 * result.step_s),
-        partial(mesh_error, shot, options, own),
-        partial(patch_error, shot, options, own),
+    fine, mesh = at_once(
+        partial(simulate_at, shot, options, 0.5 * result.step_s), partial(mesh_error, shot, options, own)
     )
     ratio = (own.step / fine.step) ** order_of(shot.character)
-    accuracy = _estimates(ratio * step_error(own, fine), left_out, shot, mesh, patch)
+    accuracy = Accuracy(ratio * step_error(own, fine), left_out, mesh, _subspace_error(shot.bodies))
     accuracy = replace(accuracy, efforts=effort_errors(own, fine))
     return with_step(result, shot.character, options, accuracy)
 
@@ -218,7 +216,7 @@ def _effort_errors(run: StepRun, trials: Sequence[StepRun]) -> Array | None:
 
 def besides_step(accuracy: Accuracy) -> float:
     """Estimated errors of all but the time step [m], as far as they are known."""
-    return accuracy.left_out_m + (accuracy.mesh_m or 0.0) + accuracy.patches_m
+    return accuracy.left_out_m + (accuracy.mesh_m or 0.0)
 
 
 def omitted_error(bodies: Sequence[ReducedBody]) -> float:
@@ -233,14 +231,8 @@ def _subspace_error(bodies: Sequence[ReducedBody]) -> float:
 
 
 def _accuracy(step: float, left_out: float, shot: CompiledShot, options: RunSettings, run: StepRun) -> Accuracy:
-    """The estimates for a run: of its step, of what its bodies do without, of their meshes and patches [m]."""
-    mesh, patch = at_once(partial(mesh_error, shot, options, run), partial(patch_error, shot, options, run))
-    return _estimates(step, left_out, shot, mesh, patch)
-
-
-def _estimates(step: float, left_out: float, shot: CompiledShot, mesh: float | None, patch: float) -> Accuracy:
-    """The same, those of meshes and patches known."""
-    return Accuracy(step, left_out, mesh, _subspace_error(shot.bodies), patch)
+    """The estimates for a run: of its step, of what its bodies do without, and of their meshes [m]."""
+    return Accuracy(step, left_out, mesh_error(shot, options, run), _subspace_error(shot.bodies))
 
 
 def intended_positions(shot: CompiledShot, options: RunSettings) -> Array:

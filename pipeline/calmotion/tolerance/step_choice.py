@@ -13,7 +13,7 @@ from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.open_chains import refused_gap
 from calmotion.simulation.inputs.time_grid import make_grid
-from calmotion.tolerance.meshes.mesh_budget import mesh_error, patch_error
+from calmotion.tolerance.meshes.mesh_budget import mesh_error
 from calmotion.tolerance.step_error import (
     StepRun,
     between,
@@ -64,9 +64,9 @@ def chosen_step(
         return run
 
     def allowed(run: StepRun) -> float:
-        """What the meshes and patches leave; they cost about the same by any step."""
+        """What the meshes leave; they cost about the same by any step."""
         if not known or run.step < _ANEW * known[0]:
-            known[:] = run.step, mesh_and_patches(shot, options, run)
+            known[:] = run.step, mesh_error(shot, options, run) or 0.0
         return allowed_step_error(shot.character, options, left_out + known[1])
 
     runs: dict[float, StepRun] = {}  # by their steps: one that is chosen, or half of it, was often tried before
@@ -121,8 +121,3 @@ def step_allowance(tolerance: float, others: float) -> float:
     """The same by the tolerance [m]."""
     left = WHOLE * tolerance - others
     return min(MOST * tolerance, left) if left >= LEAST * tolerance else MISSED * tolerance
-
-
-def mesh_and_patches(shot: CompiledShot, options: RunSettings, run: StepRun) -> float:
-    """Estimated error of the meshes and interface patches at the targets [m], as far as it is known."""
-    return (mesh_error(shot, options, run) or 0.0) + patch_error(shot, options, run)

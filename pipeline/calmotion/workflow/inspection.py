@@ -261,7 +261,7 @@ def _body(body: Body, table: ModeTable | None, mesh: FEMesh | None, flexible: bo
             "solid": quality.source,
             "volume_m3": quality.volume,
             "volume_error": quality.volume_error,
-            "frequency_error": quality.error,
+            "frequency_error": quality.frequency_error,
             "solid_notes": list(quality.repairs),
         }
     return report

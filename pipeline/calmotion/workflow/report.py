@@ -71,6 +71,8 @@ def operator_row(result: OperatorResult) -> dict[str, Any]:
         "outcome": str(result.outcome),
         "reason": result.reason,
         "duration_s": result.duration,
+        "processor_s": result.processor_s,
+        "peak_memory_gb": result.peak_memory_gb if math.isfinite(result.peak_memory_gb) else None,
         "reports": [{"level": record.level, "text": record.text} for record in result.records],
     }
 

@@ -19,9 +19,9 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from calmotion import ShotError
 from calmotion.arrays import Array
-from calmotion.mesh import quadratic_nodes
+from calmotion.mesh import AttachmentFrame, quadratic_nodes
 from calmotion.model import Animation, Character, FEMesh, FEMeshes, MeshQuality, RunSettings
-from calmotion.reduction import Effort, LoadEnvelope, refined_for_frequencies
+from calmotion.reduction import LoadEnvelope, MeshController
 from calmotion.simulation import BodyReduction, CompiledShot, compile_shot, reduction_for
 from calmotion.testing import beam_arm, beam_mesh, quintic, shot_of
 from calmotion.tolerance import (
@@ -132,7 +132,9 @@ def drawn(number: int) -> Drawn:
     for mesh in meshes.meshes:
         body = character.bodies[mesh.body]
         carrier = next(joint.frame1 for joint in character.joints if joint.body1 == mesh.body)
-        judged.append(refined_for_frequencies(mesh, body, carrier, Effort(2.0 * MESH_ACCURACY, MAX_NODES)))
+        ends = [joint.frame0 for joint in character.joints if joint.body0 == mesh.body]
+        held = [AttachmentFrame(body.path, frame, "interface") for frame in (carrier, *ends)]
+        judged.append(MeshController(2.0 * MESH_ACCURACY, MAX_NODES).refined(mesh, body, held, 0))
     return Drawn(character, animation, FEMeshes(tuple(judged)), 10.0 ** rng.uniform(-4.0, -2.3), size, cells)
 
 

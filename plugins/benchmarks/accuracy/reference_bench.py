@@ -27,10 +27,6 @@ BASE, FINEST = 1e-5, 1e-7  # reductions: of the runs that vary something else, a
 REPEATS = 3
 ENOUGH_TIME = 10.0  # of runs that are timed [s]: longer ones are run once
 TIMES = 8.0  # nodes of a reference over those of what is measured
-_LAST = 0.6  # refinement ends above this part of its limit of nodes
-# Most nodes of the meshes that the stiffness of those is taken from (results take theirs from up to a third of them),
-# and its relative error from which on these are fine enough
-STIFFNESS_NODES, _KNOWN = 300_000, 3e-5
 
 
 @dataclass(frozen=True)
@@ -169,18 +165,15 @@ class Bench:
         return point
 
 
-def with_more_nodes(
-    reduction: BodyReduction, times: float = TIMES, tolerance: float | None = None, stiffness: int = STIFFNESS_NODES
-) -> BodyReduction:  # fmt: skip
+def with_more_nodes(reduction: BodyReduction, times: float = TIMES, tolerance: float | None = None) -> BodyReduction:
     """The reduction on meshes with so many times the nodes, refined for the loads of the shot; the same for 1 or less.
 
-    Their stiffness is that of meshes finer still, or it would be known less well than that of a result.
+    Their stiffness is that of ever finer meshes, or it would be known less well than that of a result.
 
     Args:
         reduction: With meshes and loads.
         times: Nodes of the largest mesh over those that it has; smaller meshes get at least as many more.
         tolerance: As of `BodyReduction.bodies` [m].
-        stiffness: Largest number of nodes of the meshes that the stiffness is taken from.
 
     Raises:
         ShotError: A body that cannot be reduced.
@@ -190,8 +183,7 @@ def with_more_nodes(
     meshes = reduction.meshes.meshes
     most = max(len(quadratic_mesh(mesh.points, mesh.tets).nodes) for mesh in meshes)
     wanted = {mesh.body: 0.0 for mesh in meshes}
-    finer = reduction.with_finer_meshes(tolerance, wanted, int(times * most / _LAST), by_factor=False)
-    return finer.with_finer_meshes(tolerance, dict.fromkeys(wanted, _KNOWN), stiffness)
+    return reduction.with_finer_meshes(tolerance, wanted, int(times * most), keeps="finer")
 
 
 def front(points: Sequence[Point]) -> list[Point]:

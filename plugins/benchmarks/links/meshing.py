@@ -92,7 +92,7 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, refine: int = 0) 
             options = MeshOptions(element_size=asked, time_limit=time_limit, cache=False)
             mesh = mesh_body(0, link.body, options, frames_of(link), attachments_of(link))
             meshed = time.perf_counter() - start
-            row, told = _row(link, size, mesh, meshed), mesh.quality.error
+            row, told = _row(link, size, mesh, meshed), mesh.quality.frequency_error
             # of the automatic mesh what users are told
             rows.append(replace(row, estimate=100.0 * told) if np.isnan(size) and told is not None else row)
             if np.isnan(size) and refine:
@@ -104,11 +104,12 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, refine: int = 0) 
 
 def _refined(link: Link, mesh: Any, nodes: int) -> Row:
     """The row of an automatic mesh that is refined to a number of nodes, with the stiffness of ever finer ones."""
-    from calmotion.reduction import Effort, refined_for_frequencies
+    from calmotion.reduction import MeshController, root_at
 
     start = time.perf_counter()
-    effort = Effort(_FINEST, int(nodes / 0.6), 0.0)
-    finer = refined_for_frequencies(mesh, link.body, link.carrier, effort, attachments_of(link))
+    attachments = attachments_of(link)
+    controller = MeshController(_FINEST, nodes, "finer")
+    finer = controller.refined(mesh, link.body, attachments, root_at(attachments, link.carrier))
     row = _row(link, 0.0, finer, time.perf_counter() - start)
     return replace(row, estimate=100.0 * (finer.quality.frequency_error or 0.0))
 
@@ -214,7 +215,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("links", nargs="+", metavar="FILE[:PRIM]", help="links; all bodies without a prim")
     parser.add_argument("--sizes", nargs="+", help="multiples of the automatic element size, lengths (8mm), auto")
     parser.add_argument("--geometry-only", action="store_true", help="make solids, and no meshes")
-    parser.add_argument("--time-limit", type=float, default=180.0, help="processor time of the meshes of a link [s]")
+    parser.add_argument("--time-limit", type=float, default=60.0, help="processor time of the meshes of a link [s]")
     parser.add_argument(
         "--refine", type=int, default=0, metavar="NODES", help="also refine the automatic mesh to these"
     )

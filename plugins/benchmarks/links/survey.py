@@ -153,7 +153,7 @@ def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
     )
     clamped = patches[0].nodes if link.carrier is not None else None
     f1, f2, f3 = np.sqrt(mesh.quality.stiffness_factor) * clamped_modes(model, 3, clamped)[0]
-    error = mesh.quality.error
+    error = mesh.quality.frequency_error
     late = [
         note for note in mesh.quality.repairs if "too long" in note or "would exceed" in note or "on a grid" in note
     ]

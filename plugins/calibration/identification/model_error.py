@@ -82,4 +82,4 @@ def _softer(bodies: tuple[ReducedBody, ...], index: int, rank: int) -> tuple[Red
 
 def _size(body: ReducedBody) -> float:
     """Relative error of the stiffness of a link."""
-    return (body.mesh_error or 0.0) + body.patch_error
+    return body.mesh_error or 0.0

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import trimesh
 from calmotion.mesh.tetrahedralize import filling, tetwild
-from calmotion.model import FEMesh, Frame, MassProperties, TetGeometry
+from calmotion.model import FEMesh, MassProperties, TetGeometry
 from calmotion.model.materials.parts import Part
 from calmotion.model.materials.printed import core_of
 from calmotion.model.meshes import MeshQuality
@@ -22,7 +21,7 @@ def test_the_mesh_is_refined_to_the_accuracy_and_is_the_same_from_the_cache(host
     monkeypatch.setattr(tetwild, "_run", lambda *arguments: pytest.fail("meshed again"))
     (again,) = run(host, body)
     assert np.array_equal(first.tets, again.tets) and first.quality.repairs == again.quality.repairs
-    assert 0.0 < first.quality.frequency_error == again.quality.frequency_error <= accurate_mesh.ENOUGH
+    assert 0.0 < first.quality.frequency_error == again.quality.frequency_error <= accurate_mesh.GOAL
     assert not first.given
 
 
@@ -39,61 +38,8 @@ def test_given_elements_are_kept_and_their_error_is_known(host, monkeypatch):
     assert large.given and large.quality.frequency_error is None
 
 
-def test_a_mesh_is_refined_as_far_as_its_surface_left_time():
-    efforts = [accurate_mesh.effort_after(triangles) for triangles in (12, 2_000, 3_000, 4_500, 50_000)]
-    nodes = [effort.poor_nodes for effort in efforts]
-    assert nodes[0] == nodes[1] > nodes[2] > nodes[3] == nodes[4] > 30_000
-    # by 3.3 ms for each triangle and 0.2 ms for each node
-    assert 3.3e-3 * 3_000 + 2e-4 * nodes[2] == pytest.approx(20.0, rel=0.01)
-    assert all(effort.kept_nodes < effort.poor_nodes and effort.wanted < effort.poor for effort in efforts)
-
-
-def test_a_mesh_that_leaves_out_too_much_of_its_surface_is_made_again_closer_to_it(monkeypatch):
-    mesher, accuracy = body_mesh, accurate_mesh
-    body = link(surface(trimesh.creation.cylinder(0.01, 0.2, sections=24)))
-    options = mesher.MeshOptions(cache=False)
-
-    def made(limit, closer=1.0):
-        monkeypatch.setattr(accuracy, "_LEFT_OUT", limit)
-        chosen = replace(options, envelope_factor=closer)
-        return mesher.mesh_body(0, body, chosen, (Frame(np.array([0.0, 0.0, -0.1]), np.array([1.0, 0.0, 0.0, 0.0])),))
-
-    first, closer = made(np.inf), made(np.inf, 0.5)
-    assert 0.0 < first.quality.shape_error and len(first.points) != len(closer.points)
-    limit = 0.5 * first.quality.shape_error
-    again = made(limit)
-    assert (
-        np.array_equal(again.points, closer.points) and again.quality.frequency_error == closer.quality.frequency_error
-    )
-    assert np.array_equal(made(2.0 * first.quality.shape_error).points, first.points)
-
-    def late(*arguments):
-        if arguments[3].envelope_factor < 1.0:
-            raise mesher.ShotError("too late", path=body.path)
-        return filled(*arguments)
-
-    filled = accuracy.filled
-    monkeypatch.setattr(accuracy, "filled", late)
-    kept = made(limit)
-    assert np.array_equal(kept.points, first.points) and kept.quality.error == first.quality.error
-
-
-def test_the_triangles_that_were_meshed_decide_about_it(host, monkeypatch):
-    told, effort_after = [], accurate_mesh.effort_after
-    monkeypatch.setattr(
-        accurate_mesh,
-        "effort_after",
-        lambda count: told.append(count) or effort_after(count),
-    )
-    cube, ball = box((0.2, 0.02, 0.02)), trimesh.creation.icosphere(subdivisions=3, radius=0.03)
-    for _ in range(2):  # the second time from the cache
-        for shape in (cube, ball):
-            run(host, link(surface(shape)))
-    assert told[0] == len(cube.faces) < 100 < told[1] <= len(ball.faces) and told[2:] == told[:2]
-
-
 def test_an_error_that_remains_is_reported():
-    remark, enough = accurate_mesh.remark, accurate_mesh.ENOUGH
+    remark, enough = accurate_mesh.remark, accurate_mesh.GOAL
     quality = MeshQuality(20.0, 1.0, 0.0)
     assert remark(quality) == () == remark(replace(quality, frequency_error=enough))
     assert "3%, more than 1%" in remark(replace(quality, frequency_error=0.03))[0]

@@ -10,8 +10,8 @@ from calmotion.mesh.repair import closed_solid
 from calmotion.mesh.sources import twins as twins_module
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.model import Frame
-from calmotion.model.meshes import CutPatch, MissingVolume
-from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
+from calmotion.model.meshes import CutPatch
+from calmotion.reduction.mesh_refinement import response
 from calmotion.tolerance.meshes import accurate_mesh
 from mesher_links import bracket, divided, link, run, surface
 
@@ -29,9 +29,7 @@ def bracket_surface(mirrored=False):
 
 def test_the_mirror_image_of_a_link_is_meshed_once(host, monkeypatch):
     accuracy = accurate_mesh
-    # a twentieth of the nodes: the meshes are refined as usual, and less far
-    for name, nodes in (("_REFINED", 600), ("_POOR_REFINED", (2_000, 3_000)), ("_KEPT", 1_100)):
-        monkeypatch.setattr(accuracy, name, nodes)
+    monkeypatch.setattr(accuracy, "MAX_NODES", 3_000)  # the meshes are refined as usual, and less far
     fill, count = accuracy.filled, []
 
     def counted(*arguments):
@@ -48,8 +46,8 @@ def test_the_mirror_image_of_a_link_is_meshed_once(host, monkeypatch):
     assert "meshed as /Arm/link, mirrored" in second.quality.repairs and len(third.tets)
     assert not any("meshed as" in note for note in (*first.quality.repairs, *third.quality.repairs))
     # its own estimate of its own body agrees
-    one, other = (frequency_estimate(mesh, body, None) for mesh, body in ((first, left), (second, right)))
-    assert other.squares == pytest.approx(one.squares, rel=1e-6)
+    one, other = (response(mesh, body, (), None, None, 3) for mesh, body in ((first, left), (second, right)))
+    assert other.compliances == pytest.approx(one.compliances, rel=1e-6)
 
 
 def test_links_are_twins_only_with_their_joints_at_the_same_places():
@@ -103,16 +101,13 @@ def test_links_with_other_triangles_are_twins_and_say_how_near(host):
     )
 
 
-def test_patches_and_what_is_missing_are_moved_with_the_mesh(host):
+def test_patches_are_moved_with_the_mesh(host):
     (mesh,) = run(host, link(bracket_surface(), element_size=0.02))
     corners = mesh.points[mesh.tets[0, [0, 2, 1]]]
-    missing = MissingVolume(corners, np.array([1e-9, -2e-9, 3e-9]))
-    mesh = replace(mesh, patches=(CutPatch(ROOT.position, corners[None]),), missing=missing)
+    mesh = replace(mesh, patches=(CutPatch(ROOT.position, corners[None]),))
     isometry = twins_module.Isometry(MIRROR, np.array([0.0, 0.5, 0.0]))
     image = twins_module.moved(mesh, isometry, 3, "/Arm/link")
     assert image.body == 3 and image.patches[0].origin == pytest.approx([-0.05, 0.5, 0.0])
     area = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     found = np.cross(*(image.patches[0].triangles[0, k] - image.patches[0].triangles[0, 0] for k in (1, 2)))
     assert found == pytest.approx(MIRROR @ area, abs=1e-12), "outward as before"
-    assert image.missing.points == pytest.approx(isometry(corners))
-    assert np.array_equal(image.missing.volumes, missing.volumes)

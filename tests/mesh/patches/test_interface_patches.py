@@ -138,7 +138,7 @@ def test_a_casting_is_not_held_by_a_detail_that_the_frame_of_its_joint_touches(p
     points, tets = helpers.box((12, 9, 7), (0.12, 0.09, 0.07), origin=(-0.06, -0.045, -0.07))
     points = np.asarray(points)
     for _ in range(12):
-        points, tets = bisected(points, tets, np.argsort(np.linalg.norm(points[tets].mean(axis=1), axis=1))[:20])
+        points, tets, _ = bisected(points, tets, np.argsort(np.linalg.norm(points[tets].mean(axis=1), axis=1))[:20])
     block = trimesh.creation.box((120.0, 90.0, 70.0), trimesh.transformations.translation_matrix((0.0, 0.0, -35.0)))
     casting = trimesh.boolean.union([block, trimesh.creation.cylinder(pin, 2.0, sections=12)])
     skin = Surface(1e-3 * np.array(casting.vertices), np.array(casting.faces), 1e-9 * casting.volume, 1e-3)

@@ -8,7 +8,7 @@ from calmotion.model.run import RunSettings
 from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.meshes import mesh_budget
-from calmotion.tolerance.meshes.mesh_budget import locking_error, mesh_error, meshes_to_tolerance, patch_error
+from calmotion.tolerance.meshes.mesh_budget import mesh_error, meshes_to_tolerance, uncertainty_error
 from calmotion.tolerance.step_error import distance, simulate_at
 
 OPTIONS, STEP = RunSettings(tolerance=1e-3, integrator="bdf2"), 1 / 240
@@ -29,11 +29,10 @@ class Refining:
     """A reduction that notes which errors are wanted and gives the bodies as they are."""
 
     def __init__(self, bodies):
-        self.given, self.wanted, self.elements, self.released = bodies, None, None, False
-        self.nodes = (0, 0)
+        self.given, self.wanted, self.released = bodies, None, False
 
-    def with_finer_meshes(self, tolerance, wanted, max_nodes, progress, elements, poor_nodes):
-        self.wanted, self.elements, self.nodes = dict(wanted), dict(elements), (max_nodes, poor_nodes)
+    def with_finer_meshes(self, tolerance, wanted, max_nodes, progress):
+        self.wanted = dict(wanted)
         return self
 
     def bodies(self, tolerance, progress=None):
@@ -74,7 +73,6 @@ def test_only_the_mesh_that_costs_most_is_refined(arm, animation, bodies):
     allowed = mesh_budget.SHARE * OPTIONS.tolerance
     assert reduction.released and set(reduction.wanted) == {0}
     assert 0.5 * allowed < 0.1 * reduction.wanted[0] < allowed
-    assert reduction.nodes == (mesh_budget.NODES, mesh_budget.MOST_NODES)
 
 
 def test_errors_at_the_targets_count_in_place_of_deflections_where_they_are_known(arm, animation, bodies):
@@ -88,36 +86,30 @@ def test_errors_at_the_targets_count_in_place_of_deflections_where_they_are_know
     assert ratio == pytest.approx(2e-3 / total, rel=1e-6)  # deflections: two bodies of a millimetre each
 
 
-def test_finer_elements_are_wanted_where_quadratic_strain_needs_them(arm, animation, bodies, monkeypatch):
-    errors = [replace(body, element_error=0.02) for body in with_mesh_errors(bodies, 1e-4, 1e-4)]
-    shot = compile_shot(arm, animation, errors)
-    run = simulate_at(shot, OPTIONS, STEP)
-    assert locking_error(shot, OPTIONS, run) == 0.0, "these bodies are linear"
-    allowed = mesh_budget.SHARE * OPTIONS.tolerance
-    for locked, wanted in ((0.4 * allowed, None), (2.0 * allowed, 0.2 * 0.02)):
-        reduction = Refining(list(shot.bodies))
-        monkeypatch.setattr(mesh_budget, "locking_error", lambda *arguments, error=locked: error)
-        meshes_to_tolerance(shot, reduction, OPTIONS, run)
-        flexible = [b for b, body in enumerate(shot.bodies) if len(body.stiffness)]
-        assert reduction.elements == (None if wanted is None else pytest.approx({b: wanted for b in flexible}))
+@pytest.mark.parametrize("tolerance, wanted", [(1e-5, 1.25e-5), (None, 2e-2)])
+def test_meshes_are_no_finer_than_the_modulus_is_known_unless_a_tolerance_is_asked_for(
+    arm, animation, bodies, tolerance, wanted
+):
+    known = replace(arm, retarget=replace(arm.retarget, tolerance=None))
+    shot = compile_shot(known, animation, with_mesh_errors(bodies, 0.2, 1e-4))
+    reduction = Refining(list(shot.bodies))
+    meshes_to_tolerance(shot, reduction, RunSettings(tolerance=tolerance), None)
+    allowed = mesh_budget.SHARE * 1e-5 / 0.1
+    assert reduction.wanted[0] == pytest.approx(0.02) if tolerance is None else reduction.wanted[0] < allowed
+    assert (1 in reduction.wanted) == (tolerance is not None and 1e-4 > 0.5 * allowed)
 
 
-def test_patches_cost_what_softer_bodies_do_whether_the_mesh_is_known_or_not(arm, animation, bodies):
-    cut = [replace(body, patch_error=0.0) for body in with_mesh_errors(bodies, 0.02, 0.01)]
-    shot = compile_shot(arm, animation, cut)
+def test_what_an_uncertain_modulus_does_counts_only_where_no_tolerance_is_asked_for(arm, animation, bodies):
+    known = replace(arm, retarget=replace(arm.retarget, tolerance=None))
+    shot = compile_shot(known, animation, with_mesh_errors(bodies, 1.0 - 1.0 / 1.1, 1.0 - 1.0 / 1.1))
     run = simulate_at(shot, OPTIONS, STEP)
-    assert patch_error(shot, OPTIONS, run) == 0.0
-    with_rims = [replace(body, patch_error=0.5 * (body.mesh_error or 0.0)) for body in cut]
-    found = patch_error(shot.with_bodies(with_rims), OPTIONS, run)
-    meshes = mesh_error(shot.with_bodies(with_rims), OPTIONS, run)
-    assert meshes == mesh_error(shot, OPTIONS, run) and found == pytest.approx(0.5 * meshes, rel=0.1)
-    given = [replace(body, mesh_error=None, mesh_error_m=None) for body in with_rims]
-    assert mesh_error(shot.with_bodies(given), OPTIONS, run) is None
-    assert patch_error(shot.with_bodies(given), OPTIONS, run) == found
+    assert uncertainty_error(shot, OPTIONS, run) == 0.0
+    found = uncertainty_error(shot, RunSettings(integrator="bdf2"), run)
+    assert found == pytest.approx(mesh_error(shot, OPTIONS, run), rel=1e-6), "of bodies that are as much softer"
 
 
 def test_bodies_that_buckle_with_the_whole_error_tell_it_by_a_part(arm, animation, bodies, monkeypatch):
-    shot = compile_shot(arm, animation, [replace(b, patch_error=0.1) for b in with_mesh_errors(bodies, 0.02, 0.01)])
+    shot = compile_shot(arm, animation, with_mesh_errors(bodies, 0.1, 0.1))
     run, simulated = simulate_at(shot, OPTIONS, STEP), []
 
     def buckling(least):
@@ -133,9 +125,9 @@ def test_bodies_that_buckle_with_the_whole_error_tell_it_by_a_part(arm, animatio
         return simulate
 
     monkeypatch.setattr(mesh_budget, "simulate_at", buckling(0.0))
-    whole = patch_error(shot, OPTIONS, run)
+    whole = mesh_error(shot, OPTIONS, run)
     monkeypatch.setattr(mesh_budget, "simulate_at", buckling(0.95))
-    part = patch_error(shot, OPTIONS, run)
+    part = mesh_error(shot, OPTIONS, run)
     assert simulated == pytest.approx([0.9, 0.9, 0.975]) and part == pytest.approx(whole, rel=0.2)
     monkeypatch.setattr(mesh_budget, "simulate_at", buckling(2.0))
-    assert patch_error(shot, OPTIONS, run) == pytest.approx(2 * 0.1 * 0.1), "by its deflections of a tenth of a metre"
+    assert mesh_error(shot, OPTIONS, run) == pytest.approx(2 * 0.1 * 0.1), "by its deflections of a tenth of a metre"

@@ -6,7 +6,6 @@ import pytest
 from calmotion.model.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.tolerance.meshes.mesh_budget import MOST_NODES
 from calmotion.tolerance.simulation import simulate_to_tolerance
 from calmotion.tolerance.verification.verify import verify
 
@@ -29,18 +28,18 @@ def test_verifying_measures_the_distance_to_a_finer_run(arm, animation, meshes, 
     assert verify(shot, reduction, wrong, options, quiet).error_m == pytest.approx(0.02, abs=1.1 * found.error_m)
 
 
-def test_the_stiffness_of_the_finer_run_is_that_of_meshes_as_fine_as_a_result_may_have(arm, animation, meshes, bodies):
+def test_the_finer_run_has_finer_elements_also_where_the_user_chose_them(arm, animation, meshes, bodies):
     options, asked = RunSettings(tolerance=1e-2), []
     coarse = [dataclasses.replace(body, mesh_error=0.02 if len(body.stiffness) else None) for body in bodies]
     shot, reduction = compile_shot(arm, animation, coarse), reduction_for(arm, animation, meshes, options)
 
-    def with_finer_meshes(tolerance, wanted, max_nodes, progress, by_factor=True, poor_nodes=0):
-        asked.append((by_factor, max(max_nodes, poor_nodes)))
+    def with_finer_meshes(tolerance, wanted, max_nodes, progress, keeps=""):
+        asked.append((keeps, set(wanted.values())))
         return reduction
 
     reduction.with_finer_meshes = with_finer_meshes
     verify(shot, reduction, simulate_to_tolerance(shot, options, quiet), options, quiet)
-    assert [by_factor for by_factor, _ in asked] == [False, True] and asked[1][1] == MOST_NODES
+    assert asked == [("finer", {0.25 * 0.02})]
 
 
 def test_meshes_that_cannot_be_finer_are_still_counted(arm, animation, bodies):

@@ -25,6 +25,7 @@ from calmotion.cli.tables import SHORTENED, print_table, say, with_texts
 from calmotion.support.naming import distinct_names
 
 LONG_PATH = 60  # characters of a prim path from which on sentences and tables have its last names alone
+SHORT_STAGE = 0.1  # processor time of a stage that is not listed [s]
 COARSE_EFFORT = 0.05  # of the largest effort of a motor, from which on its error is told
 IDLE_EFFORT = 0.01  # of that of the strongest motor
 
@@ -277,6 +278,13 @@ def print_work(console: Console, report: dict[str, Any]) -> None:
         f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in total"
         + (f", peak memory {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else ""),
     )
+    stages = [
+        [row["operator"], f"{row['processor_s']:.1f} s", f"{row['peak_memory_gb'] or 0.0:.2f} GB"]
+        for row in report["operators"]
+        if row["processor_s"] >= SHORT_STAGE
+    ]
+    if stages:
+        print_table(console, "Stages", ["operator", "processor time", "memory at most so far"], stages)
     for row in report["reactions"]:
         force, moment = f"{row['max_force_n']:.4g} N", f"{row['max_moment_n_m']:.4g} N m"
         say(console, f"the world holds {row['body']} with up to {force} and {moment}")

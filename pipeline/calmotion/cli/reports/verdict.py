@@ -10,14 +10,13 @@ from rich.console import Console
 from calmotion.cli.quantities import about, counted, length
 from calmotion.cli.reports.limits import print_reason
 from calmotion.cli.tables import say
-from calmotion.model.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
+from calmotion.model.budget import CHOICES, MEASURED, MESH, REDUCTION, STEP, SUBSPACE
 from calmotion.support.naming import distinct_names
 
 # What helps where an entry of the error budget is too large.
 _SENSITIVE = "With large deflections, or near buckling, small errors grow: use a stiffer robot or a slower motion."
 REMEDIES = {
-    MESH: "Use smaller elements: calm:flexible:elementSize of the body, or --set fe.mesh.element_size=LENGTH.",
-    PATCHES: "Name the faces that joints hold: a GeomSubset of family calmInterface (docs/reading_usd.md).",
+    MESH: "Ask for finer meshes by --tolerance, or use smaller elements: calm:flexible:elementSize of the body.",
     STEP: f"Use a --step shorter than {{step}}. {_SENSITIVE}",
     REDUCTION: f"Remove calm:flexible:modeCount and calm:flexible:elasticity, or use a larger tolerance. {_SENSITIVE}",
     SUBSPACE: f"Use --keep directions. {_SENSITIVE}",

@@ -103,7 +103,7 @@ def _cut_to_area(
             break
         triangles = boundary_triangles(tets)
         share = _share_within(points, triangles, center, radius)
-        points, tets = bisected(points, tets, _behind(tets, triangles[(share > 0.0) & (share < 1.0)]))
+        points, tets, _ = bisected(points, tets, _behind(tets, triangles[(share > 0.0) & (share < 1.0)]))
     return cut_mesh
 
 
@@ -187,7 +187,7 @@ def _finer_at(
         long = (share > 0.0) & (share < 1.0) & (edge > longest)
         if not long.any():
             break
-        points, tets = bisected(points, tets, _behind(tets, triangles[long]))
+        points, tets, _ = bisected(points, tets, _behind(tets, triangles[long]))
     return points, tets
 
 

@@ -125,5 +125,4 @@ def moved(mesh: FEMesh, isometry: Isometry, index: int, path: str) -> FEMesh:
     if isometry.distance > 0.0:
         note += f" (within {1e3 * isometry.distance:.2g} mm)"
     quality = replace(mesh.quality, repairs=(note,))
-    missing = mesh.missing and replace(mesh.missing, points=isometry(mesh.missing.points))
-    return FEMesh(index, isometry(mesh.points), np.ascontiguousarray(tets), quality, mesh.given, patches, missing)
+    return FEMesh(index, isometry(mesh.points), np.ascontiguousarray(tets), quality, mesh.given, patches)

@@ -38,7 +38,7 @@ _ATTEMPTS = 3
 # Share of the time for the first mesh: what is left is for a coarser one, or that of a grid, which is made in seconds
 _FIRST, _FIRST_DENSE = 0.6, 0.4
 _LATE = 0.1  # share of the time after which an accepted mesh is not followed by a closer one
-_TRIANGLE = 9e-3  # most processor time for a triangle of a surface with many details, on a slow machine [s]
+_TRIANGLE = 3e-3  # processor time for a triangle of a surface with many details [s]; 2 to 3.3 ms were measured
 _COARSER = 1.6  # factor of size and envelope of a mesh that took too long
 # Largest error of the volume of a grid for a dense surface, which is reported: where it loses more, so many walls have
 # gaps that its frequencies tell nothing (a link of the G1 that lost 29% was five times too stiff)

@@ -29,9 +29,9 @@ _TRIES = 3  # attempts at a mesh without flat elements
 # where a volume is many times the cubed element size. What worse elements cost is part of a mesh's estimated error.
 _NORMAL, _QUICK, _QUICKEST, _MANY = (80, 10.0), (5, 30.0), (5, 50.0), 2_000
 _LARGE, _CUBES = (80, 20.0), 1_000.0
-# Default limit of the processor time of a body [s]: some nine times what links take on a fast machine, so that slow and
-# busy machines make the same meshes
-TIME_LIMIT = 180.0
+# Default limit of the processor time of a body [s]: three times the 20 s that a link may take on a fast machine, since
+# slow and busy machines shall make the same meshes
+TIME_LIMIT = 60.0
 DENSE = 2_500  # triangles to which surfaces are simplified where that takes away small details alone
 # A process that takes no processor time, such as one that is blocked, ends after this many times its limit.
 _PATIENCE = 100.0

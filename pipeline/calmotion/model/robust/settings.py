@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from calmotion.model.robust.known_factors import KnownFactors
@@ -27,6 +28,14 @@ class Uncertainty:
     payload: float = 0.1
     gains: float = 0.2
     calibrated: KnownFactors = KnownFactors()
+
+    def of_modulus(self, material: str) -> float:
+        """Relative standard deviation of the modulus of a material, by its path."""
+        name = f"modulus {material}"
+        if name not in self.calibrated.names:
+            return self.modulus
+        own = self.calibrated.names.index(name)
+        return float(math.expm1(math.sqrt(self.calibrated.covariance[own][own])))
 
 
 @dataclass(frozen=True)

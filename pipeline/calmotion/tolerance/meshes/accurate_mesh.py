@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.element_sizes import ACCURACY, envelope
+from calmotion.mesh.element_sizes import envelope
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.mesh.tetrahedralize.filling import INTERSECTS, MAX_VOLUME_ERROR, filled
 from calmotion.mesh.tetrahedralize.tetwild import ProcessorTime
@@ -21,29 +20,13 @@ from calmotion.model.meshes import MeshQuality
 if TYPE_CHECKING:
     from calmotion.mesh.parts.makeup import Makeup
     from calmotion.mesh.patches.interface_patches import AttachmentFrame
-    from calmotion.reduction.mesh_refinement import Effort
     from calmotion.tolerance.meshes.options import MeshOptions, Volume
 
-# The estimate is 1.2 to 3 times the true error of clamped beams and plates on meshes that are nearly fine enough, and
-# larger for links with many edges (see `calmotion bench meshing`). Twice the wanted error is therefore accepted.
-ENOUGH = 2.0 * ACCURACY
-# Nodes of a mesh at most, for some seconds; where the shot needs more, it is refined for its loads
-_REFINED = 12_000
-# Error that the extrapolation of the frequencies is estimated to leave, from which more nodes are spent: at least and
-# at most so many, and in between so many that meshing and refinement together take some 20 s (3.3 ms for each triangle
-# of the surface and 0.2 ms for each node)
-_POOR, _POOR_REFINED = 0.015, (40_000, 60_000)
-_IN_TIME, _OF_TRIANGLE = 100_000, 16.5
-# Error of the frequencies, that of the volume included, for which a mesh may take minutes, and its nodes at most: nine
-# of 160 links need it, most of all arms of many thin webs, whose frequencies are 8 to 30% too high with 30,000 nodes
-_BAD, _BAD_REFINED = 0.019, 250_000
-_KEPT = 22_000  # nodes of the mesh that takes the stiffness of these, where one factor is enough
+GOAL = 0.01  # error of the first frequencies: a fifth of what is known of a modulus to 10%
+# Nodes of the finer mesh at most: some six seconds
+MAX_NODES = 30_000
 _LONGER = 1.5  # factor of the element size where a surface has many details: they are refined where it matters
 _FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
-# Error of the frequencies by what a mesh leaves out of its surface, from which another one follows it within half the
-# distance; and factor of the detail that a dense surface keeps then. A leg of Barkour had 189.7 Hz in its third mode,
-# with 3.9% estimated, and has 196.0 Hz with 2.1%; with 8,000 triangles, 196.2 Hz and 1.5%
-_LEFT_OUT, _CLOSER, _DETAIL = 0.01, 0.5, 2.0
 _SAME_MASS, _HOLLOW = 0.05, 0.7  # difference that is reported; ratio below which a body may be hollow
 
 
@@ -59,28 +42,29 @@ def accurate(
         size: Of the elements before they are refined [m].
         carrier: Frame of the joint to the parent, body frame.
     """
-    from calmotion.reduction.mesh_refinement import refined_for_frequencies
-
     time = ProcessorTime(options.time_limit)
+    mesh = filled(index, body, volume.solid, volume.shape, size, time, options.cache, _LONGER)
+    mesh = judged(shaped_to(volume, size, mesh, body, attachments), body, carrier, attachments)
+    return replace(mesh, quality=replace(mesh.quality, repairs=(*mesh.quality.repairs, *remark(mesh.quality))))
 
-    def made(volume: Volume) -> FEMesh:
-        mesh = filled(index, body, volume.solid, volume.shape, size, time, options.cache, _LONGER)
-        return shaped_to(volume, size, mesh, body, attachments)
 
-    def refined(mesh: FEMesh, shape: float = np.inf) -> FEMesh:
-        effort = replace(effort_after(time.triangles), shape=shape)
-        return refined_for_frequencies(mesh, body, carrier, effort, attachments)
+def judged(
+    mesh: FEMesh, body: Body, carrier: Frame | None, attachments: Sequence[AttachmentFrame], keeps: str = ""
+) -> FEMesh:
+    """The mesh, refined once for the first frequencies, with its estimated error; where that is not possible, as it is.
 
-    first = made(volume)
-    mesh = refined(first, 2.0 * _LEFT_OUT)
-    if mesh.quality.shape_error > _LEFT_OUT:
-        shape = replace(volume.shape, envelope_factor=_CLOSER * volume.shape.envelope_factor, detail=_DETAIL)
-        with suppress(ShotError):  # it takes too long
-            closer = made(replace(volume, shape=shape))
-            first = closer if closer.quality.volume_error <= MAX_VOLUME_ERROR else first
-        mesh = refined(first)
-    repairs = (*mesh.quality.repairs, *remark(mesh.quality))
-    return replace(mesh, quality=replace(mesh.quality, repairs=repairs))
+    Args:
+        mesh: Of the body.
+        body, carrier, attachments: As of `accurate`.
+        keeps: As of `MeshController`.
+    """
+    from calmotion.reduction.mesh_refinement import MeshController, root_at
+
+    try:
+        root = root_at(attachments, carrier)
+        return MeshController(2.0 * GOAL, MAX_NODES, keeps).refined(mesh, body, attachments, root)
+    except ShotError:
+        return mesh  # the reduction reports it with the joint
 
 
 def shaped_to(
@@ -93,19 +77,6 @@ def shaped_to(
     diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     limit = _FIT * envelope(size, diagonal, shape, len(solid.triangles), 0)
     return shaped(mesh, body, Surface(solid.points, solid.triangles, solid.volume, limit), attachments)
-
-
-def effort_after(triangles: int) -> Effort:
-    """How far the mesh of a surface is refined for the first frequencies.
-
-    Args:
-        triangles: Of the surfaces that were meshed for it.
-    """
-    from calmotion.reduction.mesh_refinement import Effort
-
-    least, most = _POOR_REFINED
-    poor = int(min(max(_IN_TIME - _OF_TRIANGLE * triangles, least), most))
-    return Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, poor, _KEPT, bad=2.0 * _BAD, bad_nodes=_BAD_REFINED)
 
 
 def frames_of(character: Character, index: int) -> tuple[Frame, ...]:
@@ -174,9 +145,9 @@ def parts_note(parts: Sequence[Part], mesh: FEMesh, makeup: Makeup) -> str:
 
 def remark(quality: MeshQuality) -> tuple[str, ...]:
     """Message about a mesh that is less accurate than wanted."""
-    if quality.error is None or quality.error <= ENOUGH:
+    if quality.frequency_error is None or quality.frequency_error <= GOAL:
         return ()
     return (
-        f"estimated error of the first frequencies: {100.0 * quality.error:.2g}%, "
-        f"more than {100.0 * ENOUGH:.2g}%: author a smaller calm:flexible:elementSize to reduce it",
+        f"estimated error of the first frequencies: {100.0 * quality.frequency_error:.2g}%, "
+        f"more than {100.0 * GOAL:.2g}%: author a smaller calm:flexible:elementSize to reduce it",
     )

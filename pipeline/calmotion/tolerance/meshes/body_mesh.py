@@ -30,7 +30,7 @@ from calmotion.mesh.tetrahedra import (
 from calmotion.mesh.tetrahedralize.filling import filled, refuse_loose_parts, refuse_too_many
 from calmotion.mesh.tetrahedralize.tetwild import DENSE, OutOfTime, ProcessorTime
 from calmotion.model import Body, Character, FEMesh, Frame, TetGeometry
-from calmotion.tolerance.meshes.accurate_mesh import accurate, makeup_note, mass_note, shaped_to, volume_note
+from calmotion.tolerance.meshes.accurate_mesh import accurate, judged, makeup_note, mass_note, shaped_to, volume_note
 from calmotion.tolerance.meshes.options import MeshOptions, Volume
 
 if TYPE_CHECKING:
@@ -232,8 +232,6 @@ def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FE
 
 def _judged(mesh: FEMesh, body: Body, carrier: Frame | None, attachments: Sequence[AttachmentFrame]) -> FEMesh:
     """A mesh whose elements are given, with its estimated error; a mesh that is too large for the estimate without."""
-    from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
-
     if len(mesh.points) > MAX_NODES:
         return replace(mesh, given=True)
-    return replace(refined_for_frequencies(mesh, body, carrier, Effort(np.inf, 0), attachments), given=True)
+    return replace(judged(mesh, body, carrier, attachments, "given"), given=True)

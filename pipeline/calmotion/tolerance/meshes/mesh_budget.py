@@ -1,7 +1,7 @@
-"""Meshes fine enough for a shot: refined until the errors of all meshes keep their share of the tolerance.
+"""What the meshes of a shot cost at the targets, and meshes refined until that keeps their share of the tolerance.
 
-A coarse mesh makes a body too stiff. What that costs at the targets is the difference to a simulation with bodies that
-are softer by the estimated error of their stiffness. Where the shake will be removed, only the deflection is left.
+A coarse mesh makes a body too stiff. What that costs is the difference to a simulation with bodies that are softer by
+the estimated error of their stiffness. Where the shake will be removed, only the deflection is left.
 """
 
 from __future__ import annotations
@@ -10,20 +10,23 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from calmotion.errors import ShotError
+from calmotion.model.character import Character
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import tolerance_of
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.reduction.scaled_stiffness import with_interface_stiffness, with_scaled_stiffness, with_scaled_strain
+from calmotion.reduction.scaled_stiffness import with_scaled_stiffness, with_scaled_strain
 from calmotion.simulation.body_reduction import BodyReduction
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.tolerance.step_error import StepRun, distance, simulate_at
 
 SHARE = 0.25  # of the tolerance, that the meshes may take
-# Nodes of a mesh that only linear modes are computed on: some seconds; and of one without which the tolerance is not
-# kept, some two minutes on two slow cores
-NODES, MOST_NODES = 20_000, 100_000
+MOST_NODES = 100_000  # of a mesh without which the tolerance is not kept, some two minutes on two slow cores
+OF_UNCERTAINTY = 0.2  # of what is not known of a modulus: meshes and reductions are no finer where nobody asked for it
+_WORTH = 2.0  # of that: meshes with more are refined once more
 _MARGIN = 0.8  # of the wanted error: estimates of two meshes differ
-_LOCKED = 2.0  # error of what quadratic strain changes, over that of the compliance of the elements
+# Error of what quadratic strain changes, over that of the compliance of the elements: quadratic elements cannot follow
+# the stretching that bending far causes (membrane locking). 0.1 to 1.6 on slender arms, against three elements across
+_LOCKED = 2.0
 _PARTS = (1.0, 0.25, 0.05)  # of an error that are tried until a shot can be simulated with it
 _SOFTEST = 0.5  # factor of a stiffness or a strain; a mesh that is off by more is of no use
 
@@ -48,22 +51,20 @@ def meshes_to_tolerance(
     bound = sum(known.values())
     if not bound:
         return shot, reduction
-    total = bound if run is None else stiffness_error(shot, options, run) or bound
-    locked = 0.0 if run is None else locking_error(shot, options, run)
+    total = bound if run is None else mesh_error(shot, options, run) or bound
     allowed = SHARE * tolerance_of(shot.character, options.tolerance)
-    if total + locked <= allowed:
+    if total <= allowed:
         return shot, reduction
     costs = {b: total / bound * error for b, error in known.items()}
-    wanted, elements, left = {}, {}, max(allowed - locked, 0.5 * allowed)
-    for b, share in _shares(costs, _MARGIN * left).items():
-        if share < costs[b]:
-            wanted[b] = (shot.bodies[b].mesh_error or 0.0) * share / costs[b]
-    if locked > 0.5 * allowed:
-        elements = {b: 0.5 * _MARGIN * allowed / locked * shot.bodies[b].element_error for b in known}
-        wanted = {b: shot.bodies[b].mesh_error or 0.0 for b in known} | wanted
-    finer = reduction.with_finer_meshes(
-        options.tolerance, wanted, NODES, progress, elements=elements, poor_nodes=MOST_NODES
-    )
+    wanted = {}
+    for b, share in _shares(costs, _MARGIN * allowed).items():
+        own, least = shot.bodies[b].mesh_error or 0.0, unknown_stiffness(shot.character, b, options.tolerance)
+        goal = max(own * share / costs[b], OF_UNCERTAINTY * least)
+        if goal < own and own > _WORTH * OF_UNCERTAINTY * least:
+            wanted[b] = goal
+    if not wanted:
+        return shot, reduction
+    finer = reduction.with_finer_meshes(options.tolerance, wanted, MOST_NODES, progress)
     reduction.release()
     return shot.with_bodies(finer.bodies(options.tolerance, progress=progress)), finer
 
@@ -71,92 +72,58 @@ def meshes_to_tolerance(
 def mesh_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float | None:
     """Estimated error of the meshes at the targets [m]; None where nothing is flexible, or one mesh is not known.
 
+    Where a body buckles that is as soft as it may be, a smaller part of its error is tried, and counts the more often.
+
     Args:
         shot: With the curves of the run.
         run: A run of it.
     """
-    found = stiffness_error(shot, options, run)
-    return None if found is None else found + locking_error(shot, options, run)
-
-
-def stiffness_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float | None:
-    """The part of it of the stiffness: elements are too stiff, in each direction by its own share."""
     flexible = [body for body in shot.bodies if len(body.stiffness)]
     if not flexible or any(body.mesh_error is None for body in flexible):
         return None
-    off = _if_other(shot, options, run, _softest)
-    return sum(body.mesh_error_m or 0.0 for body in flexible) if off is None else off
-
-
-def locking_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float:
-    """The part of it of the quadratic strain, which finer meshes tell nothing about by their linear modes [m].
-
-    Quadratic elements cannot follow the stretching that bending far causes, and make up for it by more stiffness
-    (membrane locking). Measured on slender arms against regular meshes with three elements across, both with reductions
-    that are converged: what quadratic strain changes is off by 0.1 to 1.6 times the error of the compliance of the
-    elements, by the most on meshes that were bisected.
-    """
-
-    def unlocked(body: ReducedBody, share: float) -> ReducedBody:
-        return with_scaled_strain(body, _left(share * _LOCKED * body.element_error))
-
-    if all(unlocked(body, 1.0) is body for body in shot.bodies):
-        return 0.0
-    off = _if_other(shot, options, run, unlocked)
-    return sum(_LOCKED * body.element_error * _bent(body) for body in shot.bodies) if off is None else off
-
-
-def patch_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float:
-    """Estimated error of the interface patches at the targets by their rims [m]; arguments as of `mesh_error`.
-
-    The error of the meshes does not contain it: finer meshes have the same rims.
-    """
-    if not any(body.patch_error for body in shot.bodies if len(body.stiffness)):
-        return 0.0
-    off = _if_other(shot, options, run, lambda body, share: _softened(body, share * body.patch_error))
-    return sum(body.patch_error * _bent(body) for body in shot.bodies) if off is None else off
-
-
-def _bent(body: ReducedBody) -> float:
-    """How far a body bends under its loads [m], as far as that is known."""
-    return body.mesh_error_m / body.mesh_error if body.mesh_error_m and body.mesh_error else 0.0
-
-
-def _softest(body: ReducedBody, share: float) -> ReducedBody:
-    """A body as soft as it may be on ever finer meshes, or a share of the way there."""
-    known = body.interfaces
-    if known is None:
-        return _softened(body, share * (body.mesh_error or 0.0))
-    return with_interface_stiffness(body, known.patches, known.own, known.own + share * (known.softest - known.own))
-
-
-def _softened(body: ReducedBody, error: float) -> ReducedBody:
-    return with_scaled_stiffness(body, _left(error))
-
-
-def _left(error: float) -> float:
-    """What a relative error leaves of a stiffness or a strain."""
-    return max(1.0 - error, _SOFTEST)
-
-
-def _if_other(
-    shot: CompiledShot, options: RunSettings, run: StepRun, other: Callable[[ReducedBody, float], ReducedBody]
-) -> float | None:
-    """How far targets move with other bodies [m]; None where even slightly other ones buckle.
-
-    Where a body buckles that is off by its whole error, a smaller part of it is tried, and counts the more often.
-
-    Args:
-        other: A body off by a share of its error.
-    """
     options = replace(options, integrator=run.integrator or options.integrator)
     for share in _PARTS:
-        others = shot.with_bodies([other(body, share) for body in shot.bodies])
+        softer = shot.with_bodies([_softer(body, share) for body in shot.bodies])
         try:
-            return distance(run.positions, simulate_at(others, options, run.step).positions) / share
+            return distance(run.positions, simulate_at(softer, options, run.step).positions) / share
         except ShotError:
             continue
-    return None
+    return sum(body.mesh_error_m or 0.0 for body in flexible)
+
+
+def unknown_stiffness(character: Character, index: int, requested: float | None) -> float:
+    """What is not known of the stiffness of a body, relative; 0 where a tolerance was asked for: then all counts.
+
+    Args:
+        character: The character.
+        index: Of the body.
+        requested: The user's tolerance [m], or None.
+    """
+    flexible = character.bodies[index].flexible
+    if flexible is None or requested is not None or character.retarget.tolerance is not None:
+        return 0.0
+    return character.retarget.uncertainty.of_modulus(flexible.material.path)
+
+
+def uncertainty_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float:
+    """How far targets move with bodies that are softer by what is not known of their stiffness [m]."""
+    unknown = [unknown_stiffness(shot.character, b, options.tolerance) for b in range(len(shot.bodies))]
+    if not any(share for share, body in zip(unknown, shot.bodies, strict=True) if len(body.stiffness)):
+        return 0.0
+    softer = [
+        with_scaled_stiffness(body, 1.0 / (1.0 + share)) for body, share in zip(shot.bodies, unknown, strict=True)
+    ]
+    options = replace(options, integrator=run.integrator or options.integrator)
+    try:
+        return distance(run.positions, simulate_at(shot.with_bodies(softer), options, run.step).positions)
+    except ShotError:
+        return 0.0
+
+
+def _softer(body: ReducedBody, share: float) -> ReducedBody:
+    """A body as soft as it may be on ever finer meshes, or a share of the way there."""
+    softer = with_scaled_stiffness(body, max(1.0 - share * (body.mesh_error or 0.0), _SOFTEST))
+    return with_scaled_strain(softer, max(1.0 - share * _LOCKED * body.element_error, _SOFTEST))
 
 
 def _shares(costs: dict[int, float], allowed: float) -> dict[int, float]:

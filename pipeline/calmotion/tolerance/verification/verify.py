@@ -16,7 +16,7 @@ from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
 from calmotion.simulation.simulate import Progress
 from calmotion.tolerance.integrator_choice import by_fast_scheme
-from calmotion.tolerance.meshes.mesh_budget import MOST_NODES, mesh_error
+from calmotion.tolerance.meshes.mesh_budget import mesh_error
 from calmotion.tolerance.pod_subspace import project_to_subspace
 from calmotion.tolerance.simulation import found_tracks
 from calmotion.tolerance.step_error import StepRun, distance, frames_of_result, simulate_at
@@ -29,8 +29,7 @@ from calmotion.tolerance.verification.parts_in_time import (
 )
 
 STEP, TOLERANCE, MESH = 0.25, 0.1, 0.25  # of those of the result, and of the error of its meshes
-NODES = 5000  # of the finer meshes, on which nonlinear bodies are reduced
-LINEAR_NODES = 30_000  # of those whose linear modes their stiffness is taken from, where the result's are no finer
+NODES = 30_000  # of the finer meshes
 PROJECTION = 0.01  # share of the tolerance for the error of the POD subspaces of the finer run
 FINER, MOST = 0.1, 4  # a reduction that is no finer than the result's is tried again with this share of its tolerance
 
@@ -83,11 +82,7 @@ def _finer(shot: CompiledShot, reduction: BodyReduction, options: RunSettings, p
     errors = {b: body.mesh_error for b, body in enumerate(shot.bodies) if body.mesh_error}
     wanted = {b: MESH * error for b, error in errors.items() if error is not None}
     if wanted:
-        reduction = reduction.with_finer_meshes(options.tolerance, wanted, NODES, progress, by_factor=False)
-        # the stiffness is that of meshes finer still, or the run would know it less well than the result
-        reduction = reduction.with_finer_meshes(
-            options.tolerance, wanted, LINEAR_NODES, progress, poor_nodes=MOST_NODES
-        )
+        reduction = reduction.with_finer_meshes(options.tolerance, wanted, NODES, progress, keeps="finer")
     for _ in range(1 + MOST):
         bodies = reduction.bodies(allowed, progress=progress)
         if _coordinates(bodies) > _coordinates(shot.bodies):

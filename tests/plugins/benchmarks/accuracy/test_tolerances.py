@@ -3,7 +3,6 @@
 import csv
 import dataclasses
 import json
-from functools import partial
 
 import pytest
 from calmotion.testing import beam_arm, quintic, shot_of
@@ -16,12 +15,6 @@ from calmotion_plugins.benchmarks.common.shots import Unreduced
 def shot():
     character, meshes = beam_arm(payload=0.1, damping=0.02)
     return Unreduced("arm", character, shot_of(quintic(0.8, 0.35, 0.1), 0.75), meshes)
-
-
-@pytest.fixture
-def few_nodes(monkeypatch):
-    """References take their stiffness from meshes of few nodes."""
-    monkeypatch.setattr(reference_bench, "with_more_nodes", partial(reference_bench.with_more_nodes, stiffness=2_000))
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +71,7 @@ def test_the_command_reports_whether_tolerances_are_kept(shot, rows, monkeypatch
     assert tolerances.main(arguments) == 1
 
 
-def test_a_reference_with_finer_meshes_knows_how_far_its_reduction_may_be_off(shot, few_nodes):
+def test_a_reference_with_finer_meshes_knows_how_far_its_reduction_may_be_off(shot):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reference_bench, "REFERENCE_STEP", 1 / 960)
         bench = reference_bench.Bench(shot, nodes=2.0)
