@@ -20,6 +20,7 @@ WHAT = {
     "motor-commands": ("motors.commands", "optimised commands of servos, replayed in MuJoCo"),
     "live": ("motors.live", "streams that are calmed while they are played, and input shapers"),
     "speed": ("speed.stages", "where the time of a run goes"),
+    "robots": ("speed.robots", "processor time by stage and memory of robots with two flexible links"),
     "scaling": ("speed.scaling", "growth of the run time; Exudyn, MuJoCo"),
 }
 BENCHMARKS = {name: module for name, (module, _) in WHAT.items()}

@@ -1,0 +1,234 @@
+"""What robots that others made cost: `calmotion bench robots FILE ...` makes the two longest links of each flexible.
+
+Each FILE is a USD robot without a shot of ours, such as `calmotion import` writes. Its two longest links that a driven
+joint carries become flexible (polyamide), all driven joints move for two seconds, as far as their limits allow, and its
+last link is the target. The caches of meshes and reductions are empty, kernels are at hand after the first robot, and
+no tolerance is asked for. The table has processor seconds by stage, the memory, and the verdict.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from calmotion import ShotError
+
+from ..common.parsers import bench_parser, output_options
+from ..common.tables import finish, say, write_rows
+
+SECONDS, RATE = 2.0, 60.0  # length of the motion [s], and its frames [1/s]
+TURN = 40.0  # of a joint, where its limits allow it [deg]
+LINKS = 2
+POLYAMIDE = 1.8e9, 0.35, 1200.0  # Young's modulus [Pa], Poisson's ratio, density [kg/m^3], for stages in metres
+STAGES = {
+    "usd.read": "read", "accuracy.analyse": "analyse", "fe.mesh": "mesh", "fem.reduce": "reduce",
+    "accuracy.refine": "refine", "retarget.optimize": "search",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class RobotRow:
+    """What a robot cost.
+
+    Attributes:
+        robot: Name of its file.
+        links: Its flexible links.
+        read, analyse, mesh, reduce, refine, search: Processor time of each stage [s].
+        total: Of all [s].
+        memory: At most [GB].
+        before, after: Largest error as animated, and optimised [mm].
+        verdict: Whether the simulation keeps its tolerance, or what went wrong.
+    """
+
+    robot: str
+    links: str
+    read: float = np.nan
+    analyse: float = np.nan
+    mesh: float = np.nan
+    reduce: float = np.nan
+    refine: float = np.nan
+    search: float = np.nan
+    total: float = np.nan
+    memory: float = np.nan
+    before: float = np.nan
+    after: float = np.nan
+    verdict: str = ""
+
+
+def measure(file: str, links: int, patience: float) -> RobotRow:
+    """The row of a robot; what is wrong with it is its verdict.
+
+    Args:
+        file: USD file.
+        links: How many of its links become flexible.
+        patience: After which it is ended [s].
+    """
+    name = Path(file).stem
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            chosen = compose(file, Path(folder) / "shot.usda", links)
+        except ShotError as problem:
+            return RobotRow(name, "", verdict=str(problem))
+        told = ", ".join(path.rpartition("/")[2] for path in chosen)
+        command = [sys.executable, "-m", "calmotion", "optimize", f"{folder}/shot.usda", "-o", f"{folder}/calm.usda"]
+        environment = dict(os.environ, CALMOTION_CACHE=f"{folder}/cache", NUMBA_CACHE_DIR=_kernels())
+        try:
+            done = subprocess.run([*command, "--json"], capture_output=True, text=True, env=environment,
+                                  check=False, timeout=patience)  # fmt: skip
+            found = json.loads(done.stdout)
+            return _row(name, told, found)
+        except subprocess.TimeoutExpired:
+            return RobotRow(name, told, verdict=f"not ended after {patience:g} s")
+        except (json.JSONDecodeError, KeyError):
+            return RobotRow(name, told, verdict=done.stderr.strip().rpartition("\n")[2])
+
+
+def _row(name: str, links: str, found: dict[str, Any]) -> RobotRow:
+    used = {STAGES.get(row["operator"], ""): row["processor_s"] for row in found["operators"]}
+    total = sum(row["processor_s"] for row in found["operators"])
+    verdict = "kept" if found["tolerance_kept"] else f"not kept: {found['tolerance_missed_by']}"
+    return RobotRow(
+        name, links, **{stage: used.get(stage, 0.0) for stage in STAGES.values()}, total=total,
+        memory=found["peak_memory_gb"] or np.nan, before=1e3 * found["max_error_before_m"],
+        after=1e3 * found["max_error_after_m"], verdict=verdict,
+    )  # fmt: skip
+
+
+def _kernels() -> str:
+    """Folder of compiled kernels that all robots share."""
+    from calmotion.support import kernel_folder
+
+    return str(kernel_folder())
+
+
+def compose(file: str, out: Path, links: int) -> list[str]:
+    """Write a shot over a robot, and return the paths of its flexible links.
+
+    Args:
+        file: USD file of the robot.
+        out: Of the shot.
+        links: How many become flexible.
+
+    Raises:
+        ShotError: It cannot be read, or no driven joint carries a link with a surface.
+    """
+    from calmotion.usd import open_stage
+
+    robot = open_stage(file)  # which registers the schemas
+    from pxr import Sdf, Usd, UsdGeom, UsdPhysics
+
+    joints = list(_driven(robot))
+    sized = sorted({(round(_length(robot, body), 6), body) for _, body in joints if _length(robot, body)}, reverse=True)
+    chosen = [body for _, body in sized[:links]]
+    if not chosen:
+        raise ShotError("no driven joint carries a link with a surface", path=file, remedy="Name another robot")
+    layer = Sdf.Layer.CreateNew(str(out))
+    layer.subLayerPaths = [os.path.abspath(file)]
+    stage = Usd.Stage.Open(layer)
+    stage.SetDefaultPrim(stage.GetPrimAtPath(robot.GetDefaultPrim().GetPath()))
+    UsdGeom.SetStageMetersPerUnit(stage, UsdGeom.GetStageMetersPerUnit(robot))
+    UsdPhysics.SetStageKilogramsPerUnit(stage, UsdPhysics.GetStageKilogramsPerUnit(robot))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.GetStageUpAxis(robot))
+    stage.SetTimeCodesPerSecond(RATE)
+    stage.SetFramesPerSecond(RATE)
+    stage.SetStartTimeCode(0)
+    stage.SetEndTimeCode(SECONDS * RATE)
+    _make_flexible(stage, chosen)
+    for path, _ in joints:
+        _animate(stage.GetPrimAtPath(path))
+    stage.GetPrimAtPath(joints[-1][1]).ApplyAPI("CalmTargetAPI")
+    layer.Save()
+    return chosen
+
+
+def _make_flexible(stage: Any, bodies: Sequence[str]) -> None:
+    """Apply the schema to bodies, with polyamide."""
+    from pxr import Sdf, UsdShade
+
+    material = UsdShade.Material.Define(stage, stage.GetDefaultPrim().GetPath().AppendChild("BenchPolyamide"))
+    prim = material.GetPrim()
+    prim.AddAppliedSchema("PhysicsVolumeDeformableMaterialAPI")
+    for name, value in zip(("youngsModulus", "poissonsRatio", "density"), POLYAMIDE, strict=True):
+        prim.CreateAttribute(f"physics:{name}", Sdf.ValueTypeNames.Float).Set(value)
+    for body in bodies:
+        link = stage.GetPrimAtPath(body)
+        link.ApplyAPI("CalmFlexibleBodyAPI")
+        UsdShade.MaterialBindingAPI.Apply(link).Bind(material, materialPurpose="physics")
+
+
+def _driven(stage: Any) -> Iterator[tuple[str, str]]:
+    """Revolute and prismatic joints of a stage that are part of no closed chain, and the body that each carries."""
+    from pxr import UsdPhysics
+
+    for prim in stage.Traverse():
+        if prim.GetTypeName() not in ("PhysicsRevoluteJoint", "PhysicsPrismaticJoint"):
+            continue
+        joint = UsdPhysics.Joint(prim)
+        bodies = joint.GetBody1Rel().GetTargets()
+        if bodies and not joint.GetExcludeFromArticulationAttr().Get():
+            yield str(prim.GetPath()), str(bodies[0])
+
+
+def _length(stage: Any, body: str) -> float:
+    """Longest side of the surfaces of a body alone, without the bodies below it, in stage units."""
+    from pxr import Usd, UsdGeom, UsdPhysics
+
+    prim, cache = stage.GetPrimAtPath(body), UsdGeom.BBoxCache(0.0, ["default", "render"])
+    longest, walk = 0.0, iter(Usd.PrimRange(prim, Usd.TraverseInstanceProxies()))
+    for own in walk:
+        if own != prim and own.HasAPI(UsdPhysics.RigidBodyAPI):
+            walk.PruneChildren()
+        elif own.IsA(UsdGeom.Mesh):
+            size = cache.ComputeUntransformedBound(own).GetRange().GetSize()
+            longest = max(longest, *size)
+    return longest
+
+
+def _animate(prim: Any) -> None:
+    """There and back again by a quintic, as far as the limits of the joint allow."""
+    from pxr import UsdPhysics
+
+    turns = prim.GetTypeName() == "PhysicsRevoluteJoint"
+    api = UsdPhysics.RevoluteJoint(prim) if turns else UsdPhysics.PrismaticJoint(prim)
+    low, high = (value.Get() for value in (api.GetLowerLimitAttr(), api.GetUpperLimitAttr()))
+    low, high = (v if v is not None and np.isfinite(v) else s * 1e3 for v, s in ((low, -1.0), (high, 1.0)))
+    start = float(np.clip(0.0, low, high))
+    reach = high - start if high - start >= start - low else low - start
+    move = float(np.clip(0.5 * reach, -TURN, TURN)) if turns else 0.5 * reach
+    drive = UsdPhysics.DriveAPI.Apply(prim, "angular" if turns else "linear")
+    target = drive.CreateTargetPositionAttr()
+    for frame in range(round(SECONDS * RATE) + 1):
+        s = np.clip(2.0 * abs(frame / (SECONDS * RATE) - 0.5) / 0.8, 0.0, 1.0)
+        target.Set(start + move * (1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s * s)), frame)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the benchmark; returns the exit status."""
+    parser = bench_parser("robots", __doc__)
+    parser.add_argument("files", metavar="FILE", nargs="+", help="USD file of a robot")
+    parser.add_argument("--links", type=int, default=LINKS, help=f"links that become flexible (default: {LINKS})")
+    parser.add_argument("--patience", type=float, default=1800.0, help="after which a robot is ended [s]")
+    output_options(parser, csv="the rows", markdown=True)
+    options = parser.parse_args(arguments)
+    rows = []
+    for file in options.files:
+        rows.append(measure(file, options.links, options.patience))
+        say(f"{rows[-1].robot}: {rows[-1].total:.1f} s, {rows[-1].verdict}")
+        if options.csv:
+            write_rows(options.csv, RobotRow, rows)
+    heads = [field.name for field in fields(RobotRow)]
+    table = [[_cell(getattr(row, head)) for head in heads] for row in rows]
+    finish(options, "Robots, processor time in seconds", heads, table, [asdict(row) for row in rows], texts=2)
+    return 0
+
+
+def _cell(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
