@@ -11,6 +11,7 @@ WHAT = {
     "tolerances": ("accuracy.tolerances", "measured error of shots that are simulated or optimised to a tolerance"),
     "estimates": ("accuracy.estimates", "estimated against measured error, on random shots"),
     "calibration": ("accuracy.calibration", "known parameters of random arms, found from noisy recordings"),
+    "measured": ("accuracy.measured", "real machines: what fits of some recordings predict of the others"),
     "meshing": ("links.meshing", "links of robots: their solids, meshes, frequencies and errors"),
     "integrators": ("integrators.integrators", "orders of the integrators, and a stiff scene"),
     "stability": ("integrators.stability", "maps of each integrator over stiffness, speed, load and step"),

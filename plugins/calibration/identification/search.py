@@ -142,7 +142,7 @@ def _deviations(problem: Calibrated, solution: Solution) -> tuple[Array, Array]:
     weights = weights_of(solution.residuals) / counts
     of_model = covariance_of_model(problem, solution.z, solution.jacobian, weights)
     covariance = posterior(solution.jacobian, solution.residuals, counts) + of_model
-    return np.sqrt(np.diag(covariance)), of_model
+    return np.sqrt(np.diag(covariance)) * widened(problem, solution, covariance), of_model
 
 
 def correlated(problem: Calibrated, z: Array) -> Measurement:

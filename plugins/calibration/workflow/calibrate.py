@@ -202,6 +202,19 @@ def _refuse_twice(recordings: Sequence[SensorRecording], earlier: Sequence[Senso
             )  # fmt: skip
 
 
+def read_performed(shot: Shot | Path, recordings: Sequence[Path]) -> tuple[CompiledShot, tuple[SensorRecording, ...]]:
+    """A shot with a target at each sensor, ready to be simulated, and its recordings, as `calibrate_shots` takes them.
+
+    Raises:
+        ShotError: The shot cannot be processed, or a recording does not fit it.
+        SettingError: A recording cannot be read.
+    """
+    opened = with_sensors(shot)
+    read = read_recordings(opened.host, [os.fspath(file) for file in recordings], opened.settings)
+    outcome = compiled_with_sensors(opened, read, RunSettings(), None, (), {}, Hooks(None, None, None))
+    return compiled_in(outcome.run.get), read
+
+
 def compiled_with_sensors(
     opened: Shot, recordings: Sequence[SensorRecording], options: RunSettings, layer: str | None,
     operators: Sequence[str], settings: Settings, hooks: Hooks,
