@@ -33,7 +33,7 @@ from .recordings.clocks import clock_of
 from .recordings.plausible import refuse_far, refuse_long, refuse_still
 from .search import HALVINGS, Found, profiled, search, step_of
 from .signals import refuse_cyclic
-from .takes import all_simulable, hardly_shaking, takes_of
+from .takes import all_simulable, begun, hardly_shaking, takes_of
 
 AFTER = 1.0  # what a recording holds after the end of the shot is used up to here [s]
 STRONG = 0.9  # correlation that is worth a note
@@ -106,6 +106,7 @@ def calibrate_shots(
         clocks = [0.0 if known else clock_of(recording, shot.character, robots) for recording in recordings]
         first, last = (0.0 if nominal[k].times[0] < 0.0 else -np.inf), float(nominal[k].times[-1])
         own = sensors_of(shot.character, recordings, clocks, max(first, -1.0), last, settings.validate)
+        takes[k] = begun(take, own, clocks, nominal[k])
         before = sum(len(earlier) for _, earlier in performed[:k])
         sensors += [replace(sensor, take=k, recording=sensor.recording + before) for sensor in own]
         rows += measurement_parameters(recordings, clocks, settings.priors, k)
@@ -239,6 +240,12 @@ def _notes(
         notes.append("the search did not converge: the estimates may be far from the best ones")
     if settings.halvings and found.shift > 1.0:
         notes.append("the estimates still depend on the time step: give a smaller one with --step")
+    for take in found.problem.takes:
+        if take.start is not None:
+            notes.append(
+                f"the recording of {take.shot.character.path} begins elsewhere than the shot: the simulation begins "
+                f"at rest where the encoders are {take.begin:.3g} s after the first frame, and is let go there"
+            )
     notes += _missed(found, fits)
     split = [item.name for item in estimates if item.of_robot and item.disagrees]
     if split:

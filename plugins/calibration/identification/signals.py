@@ -8,14 +8,25 @@ from functools import cached_property
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import Animation, RunSettings, curve_of
-from calmotion.multibody import NOWHERE, Reason, SimulationFailure, Workspace, joint_values, reactions
+from calmotion.model import PRESCRIBED, Animation, RunSettings, curve_of
+from calmotion.multibody import (
+    NOWHERE,
+    Reason,
+    SimulationFailure,
+    Workspace,
+    equilibrium,
+    joint_values,
+    reactions,
+    rigid_state,
+)
 from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER
 from calmotion.simulation import AT_REST, CompiledShot, ForwardRun, Prepared, over_grid, prepare, run_forward
 from scipy.interpolate import CubicSpline, make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from .robots import Robot
+
+_TURNS, _NEAR = 20, 1e-5  # of the search for the command of a pose, and its end [rad or m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +102,7 @@ def signals_of(
         robot: The robot.
         options: With step and integrator.
         after: [s].
-        start: What is added to the commands up to a time [rad or m], shape [M]: the robot then stands elsewhere.
+        start: Where the joints of the motors stand up to a time [rad or m], shape [M], NaN where their commands say it.
         begin: That time [s].
 
     Raises:
@@ -101,9 +112,9 @@ def signals_of(
     prepared = prepare(_lengthened(robot, after), options)
     model, grid = prepared.model, prepared.grid
     angles, rates = _commands(robot, prepared)
-    if start is not None:
-        angles = angles + start * (grid.times <= begin)[:, None]
     workspace = Workspace.for_system(model.system)
+    if start is not None:
+        angles = _begun(robot, prepared, workspace, angles, start, begin)
     run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, integrator=options.scheme)
     return _measured(robot, prepared, run)
 
@@ -122,6 +133,31 @@ def _measured(robot: Robot, prepared: Prepared, run: ForwardRun) -> Signals:
         model.motor_values(values), model.motor_values(found.efforts), np.asarray(character.gravity, float),
         robot.offsets,
     )  # fmt: skip
+
+
+def _begun(robot: Robot, prepared: Prepared, workspace: Workspace, angles: Array, start: Array, begin: float) -> Array:
+    """Commands under which the robot stands at given angles until a time, where it is let go to its own commands.
+
+    A real joint that stands is held by friction, which the static start does not have.
+    """
+    model, motors = prepared.model, prepared.character.motors
+    free = np.isfinite(start) & np.array([motor.model != PRESCRIBED for motor in motors])
+    command, slope = angles[0].copy(), np.ones(len(start))
+    moved, before = np.zeros(len(start)), np.zeros(len(start))
+    for _ in range(_TURNS):
+        joints = model.joint_angles(command[None])
+        state, _ = equilibrium(model.system, rigid_state(model, joints[0]), joints[0], workspace)
+        found = joint_values(model.system, model.motor, motors, state.u[None], joints)
+        off = np.where(free, start - robot.offsets - model.motor_values(found)[0], 0.0)
+        if np.all(np.abs(off) <= _NEAR):
+            break
+        if np.any(moved):
+            changed = np.abs(moved) > _NEAR
+            slope[changed] = np.clip((before - off)[changed] / moved[changed], 0.1, 2.0)
+        moved, before = off / slope, off
+        command = command + moved
+    held = (prepared.grid.times <= begin)[:, None] & free
+    return np.asarray(np.where(held, command, angles))
 
 
 def ends_at_rest(animation: Animation) -> bool:

@@ -11,9 +11,11 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import RunSettings
 from calmotion.multibody import IMPLICIT, SimulationFailure
+from calmotion.recordings import ANGLE
 from calmotion.simulation import MAX_STEP, CompiledShot, failure_error, prepare
 
 from ..model.estimates import GEAR_STIFFNESS, MODULUS, POSITION_GAIN
+from .measurement import Sensor
 from .motor_groups import grouped
 from .parameters import Parameter, robot_parameters
 from .robots import robot_at, robot_with
@@ -22,6 +24,8 @@ from .signals import Signals, ends_at_rest, signals_of
 if TYPE_CHECKING:
     from .calibrate import CalibrationSettings
 
+FIRST = 5  # samples that tell where an encoder begins
+OFF, SURE = 0.03, 5.0  # from where the shot begins: share of the motion, and standard deviations of the noise
 STIFF = (MODULUS, POSITION_GAIN, GEAR_STIFFNESS)  # what decides about frequencies
 SCHEME = "generalized-alpha"  # a quarter of BDF2's error, and no damping to speak of
 STIFFER = 30.0  # times as stiff as the shot's: a robot that hardly shakes, by which clocks are found
@@ -35,7 +39,8 @@ class Take:
         shot: The compiled shot.
         parameters: Of the robot: the same for all shots, but for nominal values, such as gains of the firmware.
         after: How long the robot is simulated after the end of the shot [s].
-        start: What is added to the commands of the motors before the recording begins [rad or m], shape [M].
+        start: Where the motors stand until the recording begins [rad or m], shape [M], NaN where the shot says it;
+            None: the robot begins as the shot does.
         begin: When that is, on the robot's clock [s].
     """
 
@@ -117,3 +122,26 @@ def hardly_shaking(take: Take, options: RunSettings) -> list[Signals]:
         return [signals_of(robot_at(take.shot, take.parameters, x), options, take.after)]
     except (SimulationFailure, ShotError):
         return []
+
+
+def begun(take: Take, sensors: Sequence[Sensor], clocks: Sequence[float], nominal: Signals) -> Take:
+    """The shot, begun where the encoders begin, if that is not where the robot of the shot stands.
+
+    Args:
+        take: The shot.
+        sensors: Of its recordings.
+        clocks: What the clock of each of them reads at its first frame [s].
+        nominal: Signals of the robot of the shot.
+    """
+    start, begin = np.full(len(take.shot.character.motors), np.nan), 0.0
+    for sensor in sensors:
+        channel = sensor.channel
+        if channel.kind != ANGLE:
+            continue
+        known = sensor.used & np.isfinite(channel.values[:, 0])
+        times, values = channel.times[known], channel.values[known]
+        first = float(times[0]) - clocks[sensor.recording]
+        off = float(np.median(values[:FIRST, 0]) - nominal.at(ANGLE, sensor.index, np.array([first]))[0, 0])
+        if first > nominal.times[0] and abs(off) > max(OFF * float(np.ptp(values)), SURE * sensor.sigma):
+            start[sensor.index], begin = float(np.median(values[:FIRST, 0])), max(begin, first)
+    return take if np.all(np.isnan(start)) else replace(take, start=start, begin=begin)

@@ -76,3 +76,18 @@ def test_shots_of_other_robots_are_refused(shots, recorded_shot):
     performed = [(shot, [recorded(shots[0], f"{k}.csv", 1.0)]) for k, shot in enumerate((shots[0], recorded_shot))]
     with pytest.raises(ShotError, match="not of one robot"):
         calibrate_shots(performed, CalibrationSettings(), RunSettings(step=1 / 240))
+
+
+def test_a_robot_that_stands_elsewhere_than_the_shot_begins_is_begun_where_its_encoder_is(shots):
+    shot = shots[0]
+    offset, begin = 0.15, 0.1
+    nominal = signals_of(robot_with(shot, {}), RunSettings(step=1 / 240), 0.5)
+    start = np.array([nominal.angles[0, 0] + offset])
+    truth = {("position_gain", MOTOR, -1): 18.0, ("load_friction", MOTOR, -1): SHARE}
+    signals = signals_of(robot_with(shot, truth), RunSettings(step=1 / 480), 0.5, start, begin)
+    times = np.arange(begin, 1.7, 1 / 100)
+    assert signals.at(ANGLE, 0, np.array([begin]))[0, 0] == pytest.approx(start[0], abs=1e-3)
+    recording = SensorRecording("off.csv", "", (Channel(ANGLE, MOTOR, times, signals.at(ANGLE, 0, times), 1e-3),))
+    found = calibrate_shots([(shot, [recording])], SETTINGS, RunSettings(step=1 / 240))
+    assert found.estimate(f"position_gain {MOTOR}").value == pytest.approx(18.0, rel=0.03)
+    assert any("begins elsewhere" in note for note in found.notes)
