@@ -34,7 +34,7 @@ def make_problem(shot, prepared, spacing):
     count = len(shot.character.motors)
     motors = np.arange(count, dtype=np.int32)
     space = OffsetSpace.uncoupled(make_basis(grid, spacing, False), motors, count, SMOOTHNESS, CLOSENESS)
-    return RetargetProblem(model, grid, curves, objective, space, world)
+    return RetargetProblem.of_model(model, grid, curves, objective, space, world)
 
 
 def largest(simulation):
@@ -60,10 +60,10 @@ def test_the_way_through_damped_problems_is_shorter(shot):
     prepared = prepare(shot, OPTIONS)
     problem = make_problem(shot, prepared, 0.05)
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
-    problem.value(zero)
-    assert problem.error > FAR * problem.lever()
-    start = damping_homotopy(problem, zero, free, float(modes_of(prepared)[0][0]))
-    near = problem.value(start.x)
+    begin = problem.at(zero)
+    assert begin.error > FAR * problem.lever()
+    start = damping_homotopy(begin, free, float(modes_of(prepared)[0][0]))
+    near = start.at.merit
     # as much work as the approach took, spent on the problem itself; a product is a fifth of a simulation
     direct = minimize(problem, Search.start(zero), free, 1e-6, max_iterations=8)
     spent = start.evaluations + 0.2 * start.products
@@ -75,9 +75,9 @@ def test_a_problem_with_more_damping_differs_in_nothing_else(shot):
     prepared = prepare(shot, OPTIONS)
     problem = make_problem(shot, prepared, 0.2)
     x = np.zeros(problem.size)
-    value = problem.value(x)
+    value = problem.at(x).merit
     more = problem.damped(0.2, 10.0 / np.pi)
-    assert more.value(x) < 0.7 * value, "it shakes less"
+    assert more.at(x).merit < 0.7 * value, "it shakes less"
     # a rounding that ends Newton's method one correction earlier has changed this value by 7e-10
-    assert problem.damped(0.0, 3.0).value(x) == pytest.approx(value, rel=1e-8)
-    assert problem.value(x) == pytest.approx(value, rel=1e-12), "the problem itself stays as it was"
+    assert problem.damped(0.0, 3.0).at(x).merit == pytest.approx(value, rel=1e-8)
+    assert problem.at(x).merit == pytest.approx(value, rel=1e-12), "the problem itself stays as it was"

@@ -27,18 +27,18 @@ def problem(repository):
     basis = make_basis(prepared.grid, 0.2, False)
     motors = np.arange(len(character.motors), dtype=np.int32)
     space = OffsetSpace.uncoupled(basis, motors, len(motors), 1e-8, 1e-4)
-    return RetargetProblem(prepared.model, prepared.grid, curves, objective, space)
+    return RetargetProblem.of_model(prepared.model, prepared.grid, curves, objective, space)
 
 
 def test_gradient_matches_central_differences_of_the_whole_simulation(problem):
     rng = np.random.default_rng(0)
     x, d = 0.01 * rng.normal(size=problem.size), rng.normal(size=problem.size)
-    problem.value(x)
-    assert problem.run.trajectory.max_joint_gap < 1e-6
-    found = float(problem.linearize() @ d)
+    at = problem.at(x)
+    assert at.run.trajectory.max_joint_gap < 1e-6
+    found = float(at.linearized().gradient @ d)
 
     def difference(e):
-        return (problem.value(x + e * d) - problem.value(x - e * d)) / (2 * e)
+        return (problem.at(x + e * d).merit - problem.at(x - e * d).merit) / (2 * e)
 
     expected = (4.0 * difference(1e-4) - difference(2e-4)) / 3.0
     assert abs(found - expected) < 1e-7 * abs(expected)

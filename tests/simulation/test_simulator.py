@@ -25,15 +25,15 @@ def test_derivatives_by_motors_are_transposes(arm, animation, bodies, cyclic):
     grid, curves = prepared.grid, sample_curves(animation.tracks, prepared.grid)
     simulator = Simulator(prepared.model, grid.h, prepared.world, cyclic)
     run = simulator.run(curves.angles, curves.rates)
-    simulator.linearize(run)
+    linear = simulator.linearize(run)
     rng = np.random.default_rng(0)
     gradient = rng.normal(size=run.trajectory.states.V.shape)
     effort = rng.normal(size=curves.angles.shape)
     values, rates = rng.normal(size=(2, *curves.angles.shape))
     for part in (gradient, effort, values, rates):
         part[: 2 if cyclic else 0] = 0.0  # the two instants of the loop before
-    motion, efforts = simulator.tangent(values, rates, True)
-    by_value, by_rate = simulator.adjoint(gradient, effort)
+    motion, efforts = linear.tangent(values, rates, True)
+    by_value, by_rate = linear.adjoint(gradient, effort)
     forward = np.sum(motion * gradient) + np.sum(efforts * effort)
     backward = np.sum(by_value * values) + np.sum(by_rate * rates)
     assert abs(forward - backward) < 1e-10 * np.linalg.norm(efforts) * np.linalg.norm(effort)
@@ -51,8 +51,7 @@ def test_derivatives_of_servos_with_delayed_commands_match_differences():
     w = np.array([[9.0, 14.0]])
     values, rates = 0.3 * np.sin(w * times) ** 2, 0.3 * w * np.sin(2 * w * times)
     by = np.cos(w * times), -w * np.sin(w * times)
-    simulator.linearize(simulator.run(values, rates))
-    motion, _ = simulator.tangent(*by, False)
+    motion, _ = simulator.linearize(simulator.run(values, rates)).tangent(*by, False)
 
     def moved(e):
         return simulator.run(values + e * by[0], rates + e * by[1]).trajectory.states.u
@@ -98,24 +97,25 @@ def test_a_kept_beginning_does_not_change_the_result(arm, bodies, animation, kin
     )
     # the first simulation is known, and the one of another point near by
     first = int(np.searchsorted(problem.grid.times, 0.4 - 1e-9))
-    problem.hold(first)
-    problem.value(np.zeros(problem.size))
-    problem.value(0.5 * x)
-    assert problem.value(x) == other.value(x)
-    found, expected = problem.run.trajectory, other.run.trajectory
+    problem = dataclasses.replace(problem, first=first)
+    near = problem.at(0.5 * x, problem.at(np.zeros(problem.size)))
+    at, anew = problem.at(x, near), other.at(x)
+    assert at.merit == anew.merit
+    found, expected = at.run.trajectory, anew.run.trajectory
     for part in ("c", "q", "u", "turn", "V", "lam"):
         assert np.array_equal(getattr(found.states, part), getattr(expected.states, part)), part
     assert found.newton_iterations == expected.newton_iterations and found.max_joint_gap == expected.max_joint_gap
     assert np.array_equal(found.margins, expected.margins)
-    assert np.array_equal(problem.run.target_rotations, other.run.target_rotations)
-    assert np.array_equal(problem.limited["effort"], other.limited["effort"])
-    one, two = problem.linearize(), other.linearize()
+    assert np.array_equal(at.run.target_rotations, anew.run.target_rotations)
+    assert np.array_equal(at.limited["effort"], anew.limited["effort"])
+    linear, whole = at.linearized(), anew.linearized()
+    one, two = linear.gradient, whole.gradient
     assert np.abs(one - two)[~fixed].max() < 1e-12 * np.abs(two).max()
     if not problem.grid.pre_steps:
         motors = len(problem.space.motors)
         assert not np.any(one[:motors] == two[:motors]), "what is held is not worked out"
     d = np.where(fixed, 0.0, np.random.default_rng(1).normal(size=len(x)))
-    one, two = problem.product(d), other.product(d)
+    one, two = linear.product(d), whole.product(d)
     assert np.abs(one - two)[~fixed].max() < 1e-12 * np.abs(two).max()
 
 
@@ -125,22 +125,14 @@ def test_a_known_motion_is_simulated_again_only_on_request(arm, bodies, animatio
     simulator = Simulator(prepared.model, grid.h, prepared.world, False)
     given = curves.angles, curves.rates
     assert simulator.run(*given) is not simulator.run(*given), "measurements of time are those of simulations"
-    simulator.hold(10)
     run = simulator.run(*given)
-    assert simulator.run(*given) is run
-    # a curve that fails leaves what is known as it is
+    assert simulator.run(*given, run) is run
     jump = curves.angles.copy()
     jump[60:] = np.nan
     with pytest.raises(SimulationFailure):
-        simulator.run(jump, curves.rates)
-    assert simulator.run(*given) is run
-    # what is held less is linearised anew
-    simulator.linearize(run)
+        simulator.run(jump, curves.rates, run)
+    # where less stays as it is, it is linearised anew
     gradient = np.random.default_rng(0).normal(size=run.trajectory.states.V.shape)
-    late, _ = simulator.adjoint(gradient, None)
-    simulator.hold(0)
-    simulator.linearize(run)
-    whole, _ = simulator.adjoint(gradient, None)
+    late, _ = simulator.linearize(run, 10).adjoint(gradient, None)
+    whole, _ = simulator.linearize(run).adjoint(gradient, None)
     assert np.array_equal(late[10:], whole[10:]) and not np.any(late[:10]) and np.all(whole[:10])
-    simulator.forget()
-    assert simulator.run(*given) is not run

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -75,13 +76,34 @@ def simulate(model: Model, values: Array, rates: Array, step: float, integrator:
     Raises:
         SimulationFailure: No equilibrium, or a step that cannot be solved.
     """
-    joint_values, joint_rates = model.joint_angles(values), model.joint_angles(rates)
-    start = rigid_state(model, start_angles(model, joint_values[0]))
-    trajectory = integrate(
-        model.system, start, joint_values, joint_rates, step, Workspace.for_system(model.system), integrator=integrator
+    followed = model.joint_angles(values), model.joint_angles(rates)
+    trajectory = from_rest(model, *followed, step, Workspace.for_system(model.system), integrator)
+    return ModelRun(model, trajectory, *followed, *frames_in(model, trajectory))
+
+
+def from_rest(
+    model: Model, joint_values: Array, joint_rates: Array, step: float, workspace: Workspace, integrator: str = "bdf2",
+    world: Array | None = None, progress: Callable[[float], None] | None = None,
+) -> Trajectory:  # fmt: skip
+    """The states of a model from its static equilibrium.
+
+    Args:
+        joint_values, joint_rates: What the joints' motors follow, shape [T, J].
+        step: Time between two instants [s].
+        workspace: Memory of the kernels.
+        integrator: As of `simulate`.
+        world: Moving roots, shape [T, W, 18], or None.
+        progress: Called with the fraction that is done.
+    """
+    start = rigid_state(model, start_angles(model, joint_values[0]), None if world is None else world[0])
+    return integrate(
+        model.system, start, joint_values, joint_rates, step, workspace, progress, integrator=integrator, world=world
     )
-    frames = target_frames(model, trajectory.states.c, trajectory.states.q, trajectory.states.u)
-    return ModelRun(model, trajectory, joint_values, joint_rates, *frames)
+
+
+def frames_in(model: Model, trajectory: Trajectory) -> tuple[Array, Array]:
+    """Positions [m] and rotations of the targets, shapes [T, K, 3] and [T, K, 4]."""
+    return target_frames(model, trajectory.states.c, trajectory.states.q, trajectory.states.u)
 
 
 class LinearizedRun:

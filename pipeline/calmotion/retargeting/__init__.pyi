@@ -9,6 +9,7 @@ from calmotion.retargeting.problem.offset_basis import make_basis as make_basis
 from calmotion.retargeting.problem.offset_space import OffsetSpace as OffsetSpace
 from calmotion.retargeting.problem.posing import CLOSENESS as CLOSENESS
 from calmotion.retargeting.problem.posing import SMOOTHNESS as SMOOTHNESS
+from calmotion.retargeting.problem.problem import Evaluation as Evaluation
 from calmotion.retargeting.problem.problem import RetargetProblem as RetargetProblem
 from calmotion.retargeting.robust.measure import errors_on as errors_on
 from calmotion.retargeting.robust.scenarios import payload_bodies as payload_bodies

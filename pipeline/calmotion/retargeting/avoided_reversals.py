@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Character
 from calmotion.model.run import RunSettings
-from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.retargeting.problem.reversals import reversal_terms, transmitted_by
-from calmotion.retargeting.problem.rigid_approximation import rigid_response
+from calmotion.retargeting.problem.problem import Evaluation
+from calmotion.retargeting.problem.rigid_robot import RigidRobot
+from calmotion.retargeting.quantities.gear_play import gear_play, transmitted_by
 
 OPTION = "--avoid-reversals"
 
@@ -46,18 +48,20 @@ def play_of(character: Character) -> Array:
     return np.array([motor.backlash for motor in character.motors], float)
 
 
-def count_reversals(problem: RetargetProblem, play: Array, weight: float) -> None:
-    """Count the ways of the targets across the play of gears from now on, see `problem.reversals`.
+def with_reversals(at: Evaluation, play: Array, weight: float) -> Evaluation:
+    """The curves of the input in a problem that also counts the ways of the targets across the play of gears, see
+    `quantities.gear_play`.
 
     Args:
-        problem: Evaluated last at the curves of the input.
+        at: At the curves of the input.
         play: Of the gears of all motors [rad or m], shape [M].
         weight: Of a squared way, over that of a squared error.
     """
+    problem = at.problem
     moving = np.eye(len(play))[:, play > 0.0]
-    response = rigid_response(problem.model, problem.grid, problem.curves, problem.world, moving)
+    response = RigidRobot(problem.model, problem.grid, problem.curves, problem.world, moving).response
     levers = problem.objective.weights[..., None] * response.targets
-    efforts = transmitted_by(problem.model, problem.run)
-    terms = reversal_terms(play, efforts, problem.grid.h, problem.grid.judged, levers, weight)
-    for robot in problem.robots:
-        robot.count(terms)
+    efforts = transmitted_by(problem.model, at.run)
+    terms = gear_play(problem.model, play, efforts, problem.grid.h, problem.grid.judged, levers, weight)
+    robots = (replace(robot, residuals=(replace(terms, model=robot.model),)) for robot in problem.robots)
+    return at.with_robots(replace(problem, robots=tuple(robots)))

@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import json
 import logging
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from calmotion.arrays import BoolArray, IntArray
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.gauss_newton import Iterate, Search
+from calmotion.retargeting.solver.preconditioner import Sharpened
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.support.caching.verified_files import DamagedFileError, read_arrays, write_arrays
 from calmotion.support.sources import source_digest
@@ -79,10 +80,9 @@ class StoredSearch:
         """Whether the point has the recorded merit when it is simulated again."""
         return bool(np.isfinite(merit) and abs(merit - self.merit) <= SAME * max(abs(self.merit), abs(merit)))
 
-    def restore(self, limits: LimitTerms | None) -> None:
-        """Set the state of the limits to the stored one."""
-        for name, value in self.limits.items():
-            setattr(limits, name, value)
+    def restored(self, limits: LimitTerms | None) -> LimitTerms | None:
+        """Limits in the stored state."""
+        return None if limits is None else replace(limits, **self.limits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ class Checkpoint:
             return
         values: dict[str, Any] = {
             "x": search.x, "breaks": breaks, "p": search.recycled.p, "Hp": search.recycled.Hp,
-            "sharpened": search.sharpened,
+            "sharpened": np.zeros(0) if search.sharpened is None else search.sharpened.point,
             "history": np.array([astuple(iterate) for iterate in search.history], float),
         }  # fmt: skip
         state: dict[str, object] = {
@@ -197,8 +197,8 @@ def _stored(values: dict[str, np.ndarray], state: dict[str, Any], limits: LimitT
     rows = values["history"].tolist()
     history = tuple(Iterate(row[0], row[1], row[2], int(row[3]), int(row[4])) for row in rows)
     search = Search(
-        x, state["radius"], Recycled(p, Hp), values["sharpened"], history, state["evaluations"], state["gradients"],
-        state["products"], state["reason"],
+        x, state["radius"], Recycled(p, Hp), Sharpened(values["sharpened"]) if len(values["sharpened"]) else None,
+        history, state["evaluations"], state["gradients"], state["products"], state["reason"],
     )  # fmt: skip
     kept: dict[str, Any] = {}
     if limits is not None:

@@ -15,33 +15,34 @@ from scipy.sparse import csr_matrix, diags, eye, kron, vstack
 
 from calmotion.arrays import Array, BoolArray
 from calmotion.model.limits.base import CurveLimit
+from calmotion.model.limits.bounds import Bounds
 from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.retargeting.problem.adaptive_knots import converted, halved
 from calmotion.retargeting.problem.limits import FIRST_PENALTY, MARGIN
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on
-from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
 from calmotion.retargeting.solver.elastic_program import elastic_minimum
 from calmotion.simulation.inputs.curves import Curves
-from calmotion.simulation.motor_limits import Bounds
 
 INSIDE = 1.5 * MARGIN  # share of a limit by which the curves stay within it
 COST = 1e4  # of an excess of a limit by itself, over the objective of an offset of 1 rad for a second
 WIDENED = 1e-3  # smallest excess that counts as unavoidable
 
 
-def with_moving_end(problem: RetargetProblem, start: Array) -> tuple[RetargetProblem, Array]:
-    """The problem and its start with offsets whose slope and curvature may change at the end of the shot, where the
-    point evaluated last exceeds limits there; else as they are."""
+def with_moving_end(at: Evaluation, start: Array) -> tuple[RetargetProblem, Array]:
+    """The problem and its start with offsets whose slope and curvature may change at the end of the shot, where a point
+    exceeds limits there; else as they are."""
+    problem = at.problem
     limits, grid, basis = problem.limits, problem.grid, problem.space.basis
     if limits is None or basis.wraps or basis.kept_ends or grid.continues:
         return problem, start
     late = limits.judged & (grid.times >= basis.knots[-3 if len(basis.knots) > 2 else 0])
-    over = [np.max(_excess(limits.bounds[name], v[late]), initial=0.0) for name, v in problem.limited.items()]
+    over = [np.max(_excess(limits.bounds[name], v[late]), initial=0.0) for name, v in at.limited.items()]
     if max(over, default=0.0) <= MARGIN:
         return problem, start
     moving = basis_on(grid, basis.breaks, basis.kept_ends, moving_end=True)
     x = converted(basis, moving, start, len(problem.space.motors))
-    return problem.on_basis(moving, x), x
+    return problem.on_basis(moving), x
 
 
 def on_sufficient_knots(
@@ -59,19 +60,21 @@ def on_sufficient_knots(
         if finer.count == space.basis.count:
             break
         start = converted(space.basis, finer, start, len(space.motors))
-        problem = problem.on_basis(finer, start)
+        problem = problem.on_basis(finer)
     return problem, start
 
 
-def widen_unavoidable(problem: RetargetProblem, fixed: BoolArray) -> None:
-    """Widen the limits of a problem that no offsets can keep, to what is exceeded least.
+def with_possible_limits(problem: RetargetProblem, fixed: BoolArray) -> RetargetProblem:
+    """The problem with limits that no offsets can keep widened to what is exceeded least.
 
     Args:
         fixed: Coefficients that stay zero, shape [n], bool.
     """
-    limits = problem.limits
-    if limits is not None and (excess := _unavoidable(problem, fixed)):
-        limits.bounds = limits.bounds | {name: _widened(limits.bounds[name], by) for name, by in excess.items()}
+    limits, excess = problem.limits, _unavoidable(problem, fixed)
+    if limits is None or not excess:
+        return problem
+    wider = {name: _widened(limits.bounds[name], by) for name, by in excess.items()}
+    return replace(problem, limits=replace(limits, bounds=limits.bounds | wider))
 
 
 def _unavoidable(problem: RetargetProblem, fixed: BoolArray) -> dict[str, Array]:
@@ -85,23 +88,24 @@ def _unavoidable(problem: RetargetProblem, fixed: BoolArray) -> dict[str, Array]
     return {name: excess for name, excess in found.items() if np.any(excess > WIDENED)}
 
 
-def onto_limits(problem: RetargetProblem, x: Array, fixed: BoolArray) -> Array:
-    """The nearest point whose curves keep the limits; the same one where they do already. The multipliers of the limits
-    become those of the way there.
+def onto_limits(at: Evaluation, fixed: BoolArray) -> tuple[RetargetProblem, Array]:
+    """The nearest point whose curves keep the limits, and the problem with the multipliers of the way there; the same
+    ones where they do already.
 
     Args:
-        x: Shape [n], a minimum without limits.
+        at: A minimum without limits.
         fixed: Coefficients that keep their values, shape [n], bool.
     """
-    limits, space = problem.limits, problem.space
-    if limits is None or not np.any(_exceeding(problem, space.changed(problem.curves, x))):
-        return x
-    moved, required, multipliers = _nearest(problem, x, fixed)
+    problem, limits, x = at.problem, at.problem.limits, at.x
+    if limits is None or not np.any(_exceeding(problem, at.curves)):
+        return problem, x
+    moved, required, found = _nearest(problem, x, fixed)
     # the robot may have almost no error without limits, so that their penalty follows from the error that they require
-    limits.rho = max(limits.rho, FIRST_PENALTY * required / problem.grid.end)
-    for (name, motor, side), values in multipliers.items():
-        limits.multipliers[name][side, limits.judged, motor] = values / (limits.rho * limits.h)
-    return moved
+    rho = max(limits.rho, FIRST_PENALTY * required / problem.grid.end)
+    multipliers = {name: y.copy() for name, y in limits.multipliers.items()}
+    for (name, motor, side), values in found.items():
+        multipliers[name][side, limits.judged, motor] = values / (rho * limits.h)
+    return replace(problem, limits=replace(limits, rho=rho, multipliers=multipliers)), moved
 
 
 def _bounds(problem: RetargetProblem) -> dict[str, Bounds]:
@@ -181,7 +185,7 @@ def _constraint(problem: RetargetProblem, curves: Curves, name: str, motor: int,
 def _metric(problem: RetargetProblem) -> csr_matrix:
     """Second derivatives of the rigid robot's objective by the coefficients, shape [n, n]."""
     space = problem.space
-    gram = problem.rigid_metric()
+    gram = problem.rigid.metric(problem.objective.weights)
     spline, motors = space.basis.values, gram.shape[1]
     parts = [
         kron(spline.T @ diags(gram[:, a, b]) @ spline, csr_matrix(([1.0], ([a], [b])), shape=(motors, motors)))

@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
-from calmotion.retargeting.problem.ground import ground_bounds, ground_of
+from dataclasses import replace
+
+from calmotion.model.limits.bounds import Bounds
 from calmotion.retargeting.problem.limits import LimitTerms
-from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.problem.problem import Evaluation
+from calmotion.retargeting.problem.robot import GROUND, of_robot
+from calmotion.retargeting.quantities.ground import Ground, ground_bounds
 from calmotion.simulation.preparation import Prepared
 from calmotion.simulation.standing.ground_limits import ground_limits
 
 
-def keep_feet(prepared: Prepared, problem: RetargetProblem) -> None:
-    """Limit from now on what the feet of each robot of a problem ask of the ground, where the shot has contacts.
+def with_kept_feet(prepared: Prepared, at: Evaluation) -> Evaluation:
+    """The curves of the input in a problem that also limits what the feet of each robot ask of the ground, where the
+    shot has contacts.
 
     Args:
-        problem: Evaluated last at the curves of the input.
+        at: At the curves of the input.
     """
-    bounds, curves = {}, (problem.curves.angles, problem.curves.rates)
-    for k, robot in enumerate(problem.robots):
-        robot.ground = ground_limits(
-            prepared.character, robot.model, problem.grid, prepared.world, *curves, robot.run
-        )  # fmt: skip
-        if robot.ground is not None:
-            bounds[ground_of(k)] = ground_bounds(robot.ground)
-    if bounds:
-        others = {} if problem.limits is None else problem.limits.bounds
-        problem.limits = LimitTerms(others | bounds, problem.grid.judged, problem.grid.h, 1.0)
+    problem, bounds, robots = at.problem, dict[str, Bounds](), []
+    curves = problem.curves.angles, problem.curves.rates
+    for k, run in enumerate(at.runs):
+        robot = run.robot
+        found = ground_limits(prepared.character, robot.model, problem.grid, prepared.world, *curves, run.run)
+        if found is not None:
+            robot = replace(robot, limited={**robot.limited, GROUND: Ground(found, problem.grid.h)})
+            bounds[of_robot(GROUND, k)] = ground_bounds(found)
+        robots.append(robot)
+    if not bounds:
+        return at
+    others = {} if problem.limits is None else problem.limits.bounds
+    limits = LimitTerms.of(others | bounds, problem.grid.judged, problem.grid.h)
+    return at.with_robots(replace(problem, robots=tuple(robots), limits=limits))

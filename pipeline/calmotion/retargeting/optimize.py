@@ -11,19 +11,19 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Character, OptimizerStep, Result
+from calmotion.model.limits.bounds import Excess, excesses, motor_bounds
 from calmotion.model.robust.robots import Scenario
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.retargeting.avoided_reversals import count_reversals, play_of
+from calmotion.retargeting.avoided_reversals import play_of, with_reversals
 from calmotion.retargeting.checkpoint import Checkpoint, problem_key
 from calmotion.retargeting.found_curves import found_curves
-from calmotion.retargeting.kept_feet import keep_feet
+from calmotion.retargeting.kept_feet import with_kept_feet
 from calmotion.retargeting.problem.limit_costs import limit_costs
-from calmotion.retargeting.problem.limits import FIRST_PENALTY
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
-from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem, with_first_penalty
 from calmotion.retargeting.robust.robots import robots_of
 from calmotion.retargeting.search import RetargetSearch
 from calmotion.retargeting.search_memory import SearchMemory
@@ -35,7 +35,6 @@ from calmotion.simulation.forward import limited_values
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.inputs.open_chains import refuse_open_joints
 from calmotion.simulation.inputs.supported import refuse_half_turns
-from calmotion.simulation.motor_limits import Excess, excesses, motor_bounds
 from calmotion.simulation.preparation import Prepared, failure_error, lowest_frequency, prepare
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.simulate import Progress, intended_motion
@@ -103,23 +102,16 @@ def _optimized(
     character, animation, begin = prepared.character, prepared.shot.animation, time.perf_counter()
     problem, start, adaptive = posed
     tolerance = tolerance_of(character, options.tolerance)
-    problem.hold(0)
-    if not np.isfinite(problem.value(np.zeros(problem.size))):
-        assert problem.failure is not None
-        raise failure_error(prepared, problem.failure)
-    refuse_open_joints(character, prepared.model, prepared.grid, problem.run, options)
+    at = problem.at(np.zeros(problem.size))
+    refuse_open_joints(character, prepared.model, prepared.grid, at.run, options)
     if options.avoid_reversals:
-        count_reversals(problem, play_of(character), options.avoid_reversals)
-    keep_feet(prepared, problem)
-    before, before_value, used_before = problem.run, problem.objective_value(), _used(problem, character)
-    if problem.limits is not None:
-        problem.limits.rho = (
-            FIRST_PENALTY * max(before_value, problem.merit_of_gain(1e-3 * tolerance)) / problem.grid.end
-        )
+        at = with_reversals(at, play_of(character), options.avoid_reversals)
+    at = before = with_first_penalty(with_kept_feet(prepared, at), tolerance)
+    problem = at.problem
     locked = locked_coefficients(animation, problem.space.basis, problem.space.motors, problem.grid.end)
     kept = Checkpoint(checkpoint, problem_key(problem, locked, (options, tolerance)))
     searched = RetargetSearch(
-        problem, Search.start(start), (), character, animation, options, tolerance,
+        at, Search.start(start), (), character, animation, options, tolerance,
         lowest_frequency(prepared), adaptive, kept, progress,
     )  # fmt: skip
     searched.run(start, None if memory is None else memory.search)
@@ -129,23 +121,21 @@ def _optimized(
         memory.taken += [DIRECTIONS] if searched.took_over else []
     fixed = searched.hold()
     curves, x = found_curves(problem, len(character.motors), search.x)
-    problem.forget()
-    problem.value(x)
-    run, after_value, used = problem.run, problem.objective_value(), _used(problem, character)
-    costs = {} if searched.interrupted else limit_costs(problem, fixed)
+    after = problem.at(x)
+    costs = {} if searched.interrupted else limit_costs(after, fixed)
     wall = time.perf_counter() - begin
     rows = left_out_rows(prepared)
     rows += search_rows(problem, character, curves, searched.inactive, options, searched.idle_gain)
     return Result(
         reference=reference_motion(prepared.model, problem.grid, intended, problem.curves.angles),
-        before=simulation_of(prepared, before, intended),
-        after=simulation_of(prepared, run, intended),
+        before=simulation_of(prepared, before.run, intended),
+        after=simulation_of(prepared, after.run, intended),
         skins=skins(prepared.bodies),
         modes=mode_tables(prepared.bodies),
         curves=curves,
         steps=_progress_of(search),
-        objective_before=before_value,
-        objective_after=after_value,
+        objective_before=before.objective_value,
+        objective_after=after.objective_value,
         gradients=search.gradients,
         linearized_sweeps=2 * search.products + search.gradients,
         forward_simulations=search.evaluations + 2,
@@ -156,11 +146,11 @@ def _optimized(
         pre_roll_s=problem.grid.pre_roll,
         dof=prepared.model.dof,
         left_out=tuple(rows),
-        limits=limit_uses(used_before, used, problem.grid, costs),
+        limits=limit_uses(_used(before, character), _used(after, character), problem.grid, costs),
         stopped="interrupted" if searched.interrupted else search.reason,
         expected_gain_m=_expected(search),
         interrupted=searched.interrupted,
-        performed=performed_motion(prepared, problem.changed_curves),
+        performed=performed_motion(prepared, after.curves),
         idle_gain_m=searched.idle_gain,
         resumed_iterations=searched.resumed_iterations,
     )
@@ -172,8 +162,8 @@ def _expected(search: Search) -> float | None:
     return gain if np.isfinite(gain) else None
 
 
-def _used(problem: RetargetProblem, character: Character) -> list[Excess]:
-    """Use of all limits of the motors at the point evaluated last."""
+def _used(at: Evaluation, character: Character) -> list[Excess]:
+    """Use of all limits of the motors at a point."""
     bounds = motor_bounds(character)
-    values = limited_values(problem.model, bounds, problem.changed_curves, problem.run)
-    return excesses(bounds, values, problem.grid.judged)
+    values = limited_values(at.problem.model, bounds, at.curves, at.run)
+    return excesses(bounds, values, at.problem.grid.judged)

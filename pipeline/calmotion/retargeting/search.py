@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,11 +11,12 @@ from calmotion.model import Animation, Character
 from calmotion.model.model_choice import OFF
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.checkpoint import Checkpoint
-from calmotion.retargeting.feasible_start import on_sufficient_knots, onto_limits, widen_unavoidable, with_moving_end
+from calmotion.retargeting.feasible_start import on_sufficient_knots, onto_limits, with_moving_end, with_possible_limits
 from calmotion.retargeting.problem.adaptive_knots import converted, refined_breaks
+from calmotion.retargeting.problem.linear_problem import LinearProblem
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.posing import locked_coefficients
-from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
 from calmotion.retargeting.search_memory import SearchMemory
 from calmotion.retargeting.search_progress import SearchProgress
 from calmotion.retargeting.simplification.idle_motors import idle_gain, idle_motors
@@ -36,6 +36,8 @@ from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
 
 AS_THEY_ARE = "converged"  # reason of the end where nothing is searched: another search has found the curves
+NEAR = 2.0  # of the tolerance: where a largest error is beyond the tolerance, but no farther, smaller gains count
+BEYOND = 0.2  # share of the least gain, which is one of a mean over time, that counts there
 MISSED = 0.5  # share of the least gain that changes in the inactive intervals may gain together
 
 
@@ -44,7 +46,7 @@ class RetargetSearch:
     """A search and its state.
 
     Attributes:
-        problem: On the current knots.
+        input: The animator's curves; its problem is the one at the start.
         search: State of the minimisation.
         inactive: Intervals in which no motor changes.
         character, animation, options: Of the shot.
@@ -59,7 +61,7 @@ class RetargetSearch:
         took_over: Whether it began with the directions of the search before.
     """
 
-    problem: RetargetProblem
+    input: Evaluation
     search: Search
     inactive: tuple[InactiveInterval, ...]
     character: Character
@@ -78,6 +80,7 @@ class RetargetSearch:
     _unconfirmed: bool = False  # whether the state is that of a file
 
     def __post_init__(self) -> None:
+        self.problem: RetargetProblem = self.input.problem  # on the current knots, with the limits as they are now
         self._least = self.options.least_gain * self.tolerance  # a smaller predicted gain ends the search [m]
         self._done = SearchProgress(self._least)
 
@@ -90,13 +93,16 @@ class RetargetSearch:
             start: Shape [n].
             last: What the search of almost the same shot left.
         """
-        self.problem, start = with_moving_end(self.problem, start)
-        self.inactive = inactive_intervals(self.problem, start, self.frequency, self.tolerance, self.options.ranges)
+        self.problem, start = with_moving_end(self.input, start)
+        begin = self.input
+        if self.problem is not begin.problem:
+            begin = replace(begin, problem=self.problem, x=np.zeros(self.problem.size))
+        self.inactive = inactive_intervals(begin, start, self.frequency, self.tolerance, self.options.ranges)
         if self.adaptive:
             self.problem, start = on_sufficient_knots(self.problem, start, self._fixed_on)
         fixed = self._fixed_on(self.problem.space.basis)
-        widen_unavoidable(self.problem, fixed)
-        self.search = Search.start(np.where(fixed, 0.0, start))
+        self.problem = with_possible_limits(self.problem, fixed)
+        self.search = Search.start(np.where(fixed, 0.0, start), self.input)
         if not self.options.max_iterations:
             self.inactive, self.search = (), replace(self.search, reason=AS_THEY_ARE)
             return
@@ -107,9 +113,7 @@ class RetargetSearch:
         fixed = self.hold()
         try:
             if not resumed and (not np.any(start) or self.animation.current is self.animation.tracks):
-                if np.any(start):
-                    self.problem.value(start)
-                self.search = damping_homotopy(self.problem, start, fixed, self.frequency)
+                self.search = damping_homotopy(self.problem.at(start, self.input), fixed, self.frequency)
             self._descend(fixed)
             if len(idle_motors(self.character)):
                 self._estimate_idle_gain()
@@ -122,9 +126,16 @@ class RetargetSearch:
             self.progress(0.95, "interrupted: writing the best so far")
 
     def hold(self) -> BoolArray:
-        """The fixed coefficients, shape [n], bool; simulations reuse the motion before the first free one acts."""
-        self.problem.hold(first_change(self.problem.grid, self.problem.space.basis, self._fixed_on))
+        """The fixed coefficients, shape [n], bool; curves stay as they are before the first free one acts."""
+        self._held(first_change(self.problem.grid, self.problem.space.basis, self._fixed_on))
         return self._fixed_on(self.problem.space.basis)
+
+    def _held(self, first: int) -> None:
+        """Curves stay as they are before an instant."""
+        if first < self.problem.first:
+            # responses from a later instant on say nothing of the coefficients that are free from now on
+            self.search = replace(self.search, sharpened=None)
+        self.problem = replace(self.problem, first=first)
 
     def locked_on(self, basis: OffsetBasis) -> BoolArray:
         """Coefficients of a basis that the shot locks, shape [n], bool."""
@@ -138,7 +149,7 @@ class RetargetSearch:
         stored = self.checkpoint.load(self.problem.limits)
         if stored is None:
             return False
-        problem, limits, x = self.problem, copy(self.problem.limits), stored.search.x
+        problem, x = self.problem, stored.search.x
         breaks, motors = stored.breaks, len(problem.space.motors)
         first, last = problem.space.basis.breaks[[0, -1]]
         if breaks.dtype.kind != "i" or np.any(np.diff(breaks) <= 0) or breaks[0] != first or breaks[-1] != last:
@@ -148,14 +159,13 @@ class RetargetSearch:
         if len(x) != basis.count * motors:
             self.checkpoint.refuse("has a wrong number of coefficients")
             return False
-        resumed = problem.on_basis(basis, x)
-        stored.restore(resumed.limits)
-        merit = resumed.value(x)
-        if not stored.matches(merit):
-            problem.limits = limits
-            self.checkpoint.refuse(f"does not fit the shot (objective {stored.merit:.6g}, simulated {merit:.6g})")
+        resumed = replace(problem.on_basis(basis), limits=stored.restored(problem.limits))
+        there = resumed.tried(x)
+        if there is None or not stored.matches(there.merit):
+            merit = "nothing" if there is None else f"{there.merit:.6g}"
+            self.checkpoint.refuse(f"does not fit the shot (objective {stored.merit:.6g}, simulated {merit})")
             return False
-        self.problem, self.search, self._unconfirmed = resumed, stored.search, True
+        self.problem, self.search, self._unconfirmed = resumed, replace(stored.search, at=there), True
         self.resumed_iterations = len(self.search.history)
         self.progress(0.1, f"resuming after {self.resumed_iterations} iterations of an interrupted search")
         if np.any(x[inactive_coefficients(basis, self.inactive, motors)]):
@@ -174,6 +184,7 @@ class RetargetSearch:
                 return
             if not (self.adaptive and self._refine()):
                 if self.inactive:
+                    self._held(first_change(self.problem.grid, self.problem.space.basis, self.locked_on))
                     self.inactive, self.search = with_gains(self.problem, self.search, self.inactive, self.locked_on)
                 missed = sum(interval.gain for interval in self.inactive)
                 if self.options.ranges == OFF or missed <= MISSED * self._least:
@@ -183,15 +194,30 @@ class RetargetSearch:
             fixed = self.hold()
 
     def _minimized(self, search: Search, fixed: BoolArray) -> Search:
-        return minimize(
+        found = self._to_gain(search, fixed, self._least)
+        if found.reason == "converged" and 1.0 < self._largest_error(found.at) / self.tolerance < NEAR:
+            found = self._to_gain(replace(found, reason=""), fixed, BEYOND * self._least)
+        return found
+
+    def _to_gain(self, search: Search, fixed: BoolArray, gain: float) -> Search:
+        """Minimise until less is to be gained [m]."""
+        found = minimize(
             self.problem,
             search,
             fixed,
-            self._least,
+            gain,
             self.options.max_iterations,
             on_iterate=self._on_iterate,
-            onto_limits=lambda x: onto_limits(self.problem, x, fixed),
+            onto_limits=lambda at: onto_limits(at, fixed),
         )
+        self.problem = found.at.problem
+        return found
+
+    def _largest_error(self, at: Evaluation) -> float:
+        """At any target that counts [m]."""
+        weighs = np.any(at.problem.objective.weights[..., 0] > 0.0, axis=0)
+        off = at.run.target_positions - at.problem.objective.intended.target_positions
+        return float(np.linalg.norm(off, axis=2)[at.problem.grid.judged][:, weighs].max(initial=0.0))
 
     def _confirm(self, fixed: BoolArray) -> None:
         """Look for the minimum once more where the state was read from a file: its trust region, its directions and the
@@ -208,21 +234,20 @@ class RetargetSearch:
         self._keep()
 
     def _on_iterate(self, search: Search) -> None:
-        self.search = search
+        self.search, self.problem = search, search.at.problem
         self._keep()
         done = self._done.fraction([iterate.gain for iterate in search.history])
-        error = 1e3 * self.problem.error
+        error = 1e3 * search.at.error
         self.progress(done, f"optimising: weighted error {error:.3f} mm, {search.evaluations} simulations")
 
     def _keep(self) -> None:
-        problem = self.problem
-        self.checkpoint.save(self.search, problem.limits, problem.space.basis.breaks, problem.merit())
+        at = self.search.at
+        self.checkpoint.save(self.search, at.problem.limits, at.problem.space.basis.breaks, at.merit)
 
     def _refine(self) -> bool:
         """Continue on finer knots if these gain enough; whether they do."""
-        if not self.problem.linearized_at(self.search.x):
-            self._linearize()
-        breaks = refined_breaks(self.problem, self.search.x, self._fixed_on, FINER * self._least)
+        at, linear = self._linearized()
+        breaks = refined_breaks(at, linear, self._fixed_on, FINER * self._least)
         if breaks is None:
             return False
         space = self.problem.space
@@ -231,28 +256,27 @@ class RetargetSearch:
         x = np.where(
             self._fixed_on(basis), 0.0, converted(space.basis, basis, self.search.x, len(space.motors))
         )  # fmt: skip
-        self.problem, self.search = self.problem.on_basis(basis, x), _restarted(self.search, x)
+        self.problem, self.search = self.problem.on_basis(basis), _restarted(self.search, x)
         return True
 
     def _estimate_idle_gain(self) -> None:
         """Estimate the gain of idle motors at the end of the search; their offsets act at any time of the shot."""
-        self.problem.hold(0)
-        self._linearize()
-        self.idle_gain = idle_gain(self.problem, self.character)
+        self._held(0)
+        self.idle_gain = idle_gain(*self._linearized(), self.character)
 
-    def _linearize(self) -> None:
-        self.problem.value(self.search.x)
-        self.problem.linearize()
+    def _linearized(self) -> tuple[Evaluation, LinearProblem]:
+        """The point of the search, and the problem linearised there."""
         evaluations, gradients = self.search.evaluations + 1, self.search.gradients + 1
-        self.search = replace(self.search, evaluations=evaluations, gradients=gradients)
+        at = self.problem.at(self.search.x, self.search.at)
+        self.search = replace(self.search, evaluations=evaluations, gradients=gradients, at=at)
+        return at, at.linearized()
 
     def _prune(self, fixed: BoolArray) -> None:
         """Set negligible offsets to zero; keep all if that costs too much."""
         problem, search, motors = self.problem, self.search, len(self.problem.space.motors)
-        value = problem.value(search.x)
-        problem.linearize()
-        budget = problem.merit_of_gain(PRUNED * self._least)
-        energy = block_energies(search.x, motors, problem.product(search.x))
+        at = problem.at(search.x, search.at)
+        budget = at.merit_of_gain(PRUNED * self._least)
+        energy = block_energies(search.x, motors, at.linearized().product(search.x))
         dropped = negligible_coefficients(search.x, motors, energy, budget) & ~fixed
         if not np.any(search.x[dropped]):
             return
@@ -261,10 +285,9 @@ class RetargetSearch:
         pruned = minimize(
             problem, begin, fixed, self._least, max_iterations=self.options.max_iterations + 3
         )  # fmt: skip
-        after = problem.value(pruned.x)
-        limits = problem.limits
-        if after <= value + 2.0 * budget and (limits is None or limits.kept(problem.limited)):
-            self.search = replace(pruned, reason=search.reason)
+        limits = pruned.at.problem.limits
+        if pruned.at.merit <= at.merit + 2.0 * budget and (limits is None or limits.kept(pruned.at.limited)):
+            self.search, self.problem = replace(pruned, reason=search.reason), pruned.at.problem
         else:
             self.search = replace(
                 search, evaluations=pruned.evaluations, gradients=pruned.gradients, products=pruned.products

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calmotion.arrays import Array, IntArray
+from calmotion.arrays import IntArray
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.gauss_newton import Search
-from calmotion.retargeting.solver.preconditioner import Preconditioner
+from calmotion.retargeting.solver.preconditioner import Sharpened
 from calmotion.retargeting.solver.recycling import Recycled
 
 
@@ -26,22 +26,18 @@ class SearchMemory:
     breaks: IntArray
     motors: IntArray
     recycled: Recycled
-    sharpened: tuple[Preconditioner, Array] | None
+    sharpened: Sharpened | None
 
     @classmethod
     def of(cls, problem: RetargetProblem, search: Search) -> SearchMemory:
         """What the search of a problem leaves."""
-        space, own = problem.space, problem.preconditioner
-        sharpened = (own, problem.sharpened_at) if own is not None and len(problem.sharpened_at) else None
-        return cls(space.basis.breaks, space.motors, search.recycled, sharpened)
+        return cls(problem.space.basis.breaks, problem.space.motors, search.recycled, search.sharpened)
 
     def begun(self, problem: RetargetProblem, search: Search) -> Search:
-        """A search that has not begun, with what fits its problem; the problem takes the preconditioner."""
+        """A search that has not begun, with what fits its problem."""
         space = problem.space
         if not np.array_equal(self.motors, space.motors) or not np.array_equal(self.breaks, space.basis.breaks):
             return search
         if self.recycled.p.shape[1] != len(search.x):
             return search
-        if self.sharpened is not None:
-            problem.take(*self.sharpened)
-        return Search(search.x, search.radius, self.recycled, problem.sharpened_at)
+        return replace(search, recycled=self.recycled, sharpened=self.sharpened)

@@ -8,13 +8,13 @@ from functools import cached_property
 
 from calmotion.arrays import Array, IntArray
 from calmotion.model.limits.kinds import kinds_of_limits
-from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
+from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.reactions import Reactions, reactions
-from calmotion.multibody.integrators.integrate import integrate
 from calmotion.multibody.integrators.pieces import integrate_in_pieces
 from calmotion.multibody.integrators.trajectory import Trajectory
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, start_angles
+from calmotion.multibody.runs import frames_in, from_rest
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.delays import CommandDelay
@@ -63,14 +63,9 @@ def run_forward(
     if steady is not None:
         trajectory = steady.find(joint_angles, joint_rates)
     else:
-        start = rigid_state(model, start_angles(model, joint_angles[0]), None if world is None else world[0])
-        trajectory = integrate(
-            model.system, start, joint_angles, joint_rates, h, workspace, progress, integrator=integrator, world=world
-        )
-    states = trajectory.states
-    positions, rotations = target_frames(model, states.c, states.q, states.u)
-    floquet_multiplier = 0.0 if steady is None else steady.floquet_multiplier
-    return ForwardRun(trajectory, joint_angles, joint_rates, positions, rotations, angles, floquet_multiplier)
+        trajectory = from_rest(model, joint_angles, joint_rates, h, workspace, integrator, world, progress)
+    frames, multiplier = frames_in(model, trajectory), 0.0 if steady is None else steady.floquet_multiplier
+    return ForwardRun(trajectory, joint_angles, joint_rates, *frames, angles, multiplier)
 
 
 def run_in_pieces(
@@ -93,9 +88,8 @@ def run_in_pieces(
         model.system, start, joint_angles, joint_rates, h, workspace, integrator, world, size, divides
     )  # fmt: skip
     for rows, trajectory in pieces:
-        states = trajectory.states
-        positions, rotations = target_frames(model, states.c, states.q, states.u)
-        yield rows, ForwardRun(trajectory, joint_angles[rows], joint_rates[rows], positions, rotations, angles[rows])
+        frames = frames_in(model, trajectory)
+        yield rows, ForwardRun(trajectory, joint_angles[rows], joint_rates[rows], *frames, angles[rows])
 
 
 def followed(model: Model, angles: Array, rates: Array, h: float, cyclic: bool) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model import LimitUse, Motion, Simplification, Simulation
+from calmotion.model.limits.bounds import Excess
 from calmotion.multibody.analysis.dead_centres import dead_centres
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.analysis.unheld_joints import unheld_joints
@@ -18,7 +19,6 @@ from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.intended_motion import rigid_motion, rigid_targets
-from calmotion.simulation.motor_limits import Excess
 from calmotion.simulation.preparation import Prepared
 from calmotion.simulation.target_errors import IntendedMotion, rotation_errors
 from calmotion.support.naming import distinct_names

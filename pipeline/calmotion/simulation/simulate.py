@@ -11,6 +11,7 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Result, Track
 from calmotion.model.character import contact_joints
+from calmotion.model.limits.bounds import excesses, motor_bounds
 from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
@@ -23,7 +24,6 @@ from calmotion.simulation.inputs.open_chains import refuse_open_joints
 from calmotion.simulation.inputs.shapers import shaped
 from calmotion.simulation.inputs.supported import refuse_half_turns
 from calmotion.simulation.intended_motion import rigid_motion, static_motion
-from calmotion.simulation.motor_limits import excesses, motor_bounds
 from calmotion.simulation.preparation import Prepared, failure_error, modes_of, prepare
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.target_errors import IntendedMotion, Objective

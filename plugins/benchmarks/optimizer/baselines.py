@@ -60,10 +60,8 @@ def compare(name: str, shot: CompiledShot) -> list[Row]:
         run = simulator.run(curves.angles, curves.rates)
         rows.append(_row(name, kind.replace("2", ", two modes"), late, problem, curves, run.target_positions))
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
-    problem.value(zero)
-    found = minimize(problem, damping_homotopy(problem, zero, free, float(frequencies[0])), free, 5e-6)
-    problem.value(found.x)
-    rows.append(_row(name, "optimised", 0.0, problem, problem.changed_curves, problem.run.target_positions))
+    found = minimize(problem, damping_homotopy(problem.at(zero), free, float(frequencies[0])), free, 5e-6).at
+    rows.append(_row(name, "optimised", 0.0, problem, found.curves, found.run.target_positions))
     return rows
 
 

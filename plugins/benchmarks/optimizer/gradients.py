@@ -9,14 +9,16 @@ continuous objective).
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import RunSettings
-from calmotion.retargeting import RetargetProblem
+from calmotion.retargeting import Evaluation, RetargetProblem
 from calmotion.simulation import CompiledShot, prepare
 
 from ..common.parsers import bench_parser, output_options, shots_argument
@@ -73,8 +75,17 @@ def errors(name: str, shot: CompiledShot, steps: tuple[int, ...] = STEPS) -> lis
     for divided in steps:
         problem = problem_at(divided)
         same, floor = _differences(problem, directions)
-        forward = median_time(partial(problem.value, np.zeros(problem.size)), REPEATS)
-        for adjoint, gradient in (("discrete", problem.linearize), ("continuous", problem.continuous_gradient)):
+        zero = np.zeros(problem.size)
+        forward = median_time(partial(problem.at, zero), REPEATS)
+        for adjoint in ("discrete", "continuous"):
+            posed = replace(problem, continuous=adjoint == "continuous")
+
+            runs = cycle([posed.at(zero), posed.at(zero)])  # of one run it is worked out once
+
+            def gradient(runs: Iterator[Evaluation] = runs) -> Array:
+                at = next(runs)
+                return at.of(at.problem).linearized().gradient
+
             found, seconds = directions @ gradient(), median_time(gradient, REPEATS)
             off, fine = (float(np.max(np.abs(found - values))) / scale for values in (same, judge))
             rows.append(GradientError(name, adjoint, problem.grid.h, forward, seconds, off, fine, floor))
@@ -86,7 +97,7 @@ def _differences(problem: RetargetProblem, directions: Array) -> tuple[Array, fl
     zero = np.zeros(problem.size)
 
     def central(d: Array, e: float) -> float:
-        return (problem.value(zero + e * d) - problem.value(zero - e * d)) / (2.0 * e)
+        return float(problem.at(zero + e * d).merit - problem.at(zero - e * d).merit) / (2.0 * e)
 
     found, other = [], []
     for d in directions:

@@ -19,6 +19,7 @@ from calmotion.model import RunSettings
 from calmotion.retargeting import (
     CLOSENESS,
     SMOOTHNESS,
+    Evaluation,
     OffsetBasis,
     OffsetSpace,
     RetargetProblem,
@@ -86,7 +87,7 @@ def make_problem(shot: CompiledShot, prepared: Prepared, spacing: float) -> Reta
     basis: OffsetBasis = make_basis(grid, spacing, False)
     motors = np.array([k for k, motor in enumerate(shot.character.motors) if motor.optimize], dtype=np.int32)
     space = OffsetSpace.uncoupled(basis, motors, len(shot.character.motors), SMOOTHNESS, CLOSENESS)
-    return RetargetProblem(model, grid, curves, objective, space, world)
+    return RetargetProblem.of_model(model, grid, curves, objective, space, world)
 
 
 def compare(name: str, shot: CompiledShot, lbfgs: int) -> list[Convergence]:
@@ -100,19 +101,19 @@ def compare(name: str, shot: CompiledShot, lbfgs: int) -> list[Convergence]:
     prepared = prepare(shot, RunSettings())
     problem = make_problem(shot, prepared, SPACING)
     zero = np.zeros(problem.size)
-    forward = median_time(lambda: problem.value(zero))
-    problem.linearize()  # compiles
-    problem.product(np.ones(problem.size))
-    problem.value(zero)
-    before = _largest(problem)
+    forward = median_time(lambda: problem.at(zero))
+    start = problem.at(zero)
+    start.linearized().product(np.ones(problem.size))  # compiles
+    before = _largest(start)
     reference, _ = _gauss_newton(make_problem(shot, prepared, SPACING), prepared, GAIN, 60, 200)
-    converged = problem.value(reference.x)
+    converged = problem.at(reference.x).merit
 
     def row(method: str, trace: list[tuple[float, float]], x: Array, evaluations: int, products: int) -> Convergence:
         reached = next((seconds for seconds, value in trace if value <= CLOSE * converged), None)
-        objective = problem.value(x)
+        at = problem.at(x)
+        objective = at.merit
         return Convergence(
-            name, method, forward, objective, converged, before, _largest(problem), evaluations, products,
+            name, method, forward, objective, converged, before, _largest(at), evaluations, products,
             reached, None if reached is None else reached / forward,
         )  # fmt: skip
 
@@ -126,10 +127,10 @@ def compare(name: str, shot: CompiledShot, lbfgs: int) -> list[Convergence]:
     return rows
 
 
-def _largest(problem: RetargetProblem) -> float:
-    """Largest error at any target as last simulated [mm]."""
-    errors = problem.run.target_positions - problem.objective.intended.target_positions
-    return 1e3 * float(np.linalg.norm(errors, axis=2)[problem.grid.judged].max())
+def _largest(at: Evaluation) -> float:
+    """Largest error at any target [mm]."""
+    errors = at.run.target_positions - at.problem.objective.intended.target_positions
+    return 1e3 * float(np.linalg.norm(errors, axis=2)[at.problem.grid.judged].max())
 
 
 def _gauss_newton(
@@ -146,10 +147,9 @@ def _gauss_newton(
     begin = time.perf_counter()
 
     def on_iterate(search: Search) -> None:
-        trace.append((time.perf_counter() - begin, problem.merit()))
+        trace.append((time.perf_counter() - begin, search.at.merit))
 
-    problem.value(zero)
-    start = damping_homotopy(problem, zero, free, lowest_frequency(prepared))
+    start = damping_homotopy(problem.at(zero), free, lowest_frequency(prepared))
     return minimize(problem, start, free, gain, iterations, products, on_iterate), trace
 
 
@@ -166,13 +166,14 @@ def _lbfgs(problem: RetargetProblem, most: int, enough: float) -> tuple[Array, l
     """
     best = np.zeros(problem.size)
     trace: list[tuple[float, float]] = []
-    initial = problem.value(best)
+    initial = problem.at(best).merit
     begin = time.perf_counter()
 
     def both(y: Array) -> tuple[float, Array]:
         x = UNIT * y
-        value = problem.value(x)
-        gradient = problem.linearize() if np.isfinite(value) else np.zeros_like(x)
+        at = problem.tried(x)
+        value = np.inf if at is None else at.merit
+        gradient = np.zeros_like(x) if at is None else at.linearized().gradient
         if not trace or value < min(item[1] for item in trace):
             best[:] = x
         trace.append((time.perf_counter() - begin, value))

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 from calmotion.model import Animation, Track
+from calmotion.model.limits.bounds import motor_bounds
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import make_basis
@@ -12,7 +13,6 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion, static_motion
-from calmotion.simulation.motor_limits import motor_bounds
 from calmotion.simulation.preparation import prepare
 from calmotion.simulation.target_errors import Objective
 
@@ -35,7 +35,7 @@ def make_problem(character, bodies, animation, pre_roll=0.0, kept=False, limited
     limits = LimitTerms(motor_bounds(character), grid.judged, grid.h, 3.0, on=True) if limited else None
     motors = np.arange(len(character.motors), dtype=np.int32)
     space = OffsetSpace.uncoupled(basis, motors, len(motors), smoothness, 1e-4)
-    return RetargetProblem(model, grid, curves, objective, space, None, limits)
+    return RetargetProblem.of_model(model, grid, curves, objective, space, None, limits)
 
 
 def jerking(at=0.6):

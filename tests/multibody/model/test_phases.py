@@ -200,8 +200,8 @@ def test_derivatives_over_a_landing_agree_with_differences(tmp_path, edit):
         efforts = reactions(model.system, other.trajectory, other.joint_angles, other.joint_rates).efforts
         return other.target_positions, model.motor_values(efforts)
 
-    simulator.linearize(run)
-    motion, efforts = simulator.tangent(values, speeds, True)
+    linear = simulator.linearize(run)
+    motion, efforts = linear.tangent(values, speeds, True)
     states = run.trajectory.states
     jacobian = target_jacobians(model, states.c, states.q, states.u)
     places = np.einsum("tkia,tka->tki", jacobian[:, :, :3], motion[:, model.targets.component])
@@ -209,12 +209,12 @@ def test_derivatives_over_a_landing_agree_with_differences(tmp_path, edit):
         np.testing.assert_allclose(exact, (plus - minus) / 2e-5, rtol=0, atol=1e-7 * np.abs(exact).max())
     # the adjoint is the transpose, and a block of directions is each of them
     weights, by_effort = rng.normal(size=motion.shape), rng.normal(size=efforts.shape)
-    by_value, by_rate = simulator.adjoint(weights.copy(), by_effort)
+    by_value, by_rate = linear.adjoint(weights.copy(), by_effort)
     forwards = np.sum(weights * motion) + np.sum(by_effort * efforts)
     assert np.sum(by_value * values) + np.sum(by_rate * speeds) == pytest.approx(forwards, rel=1e-11)
     one, row = np.eye(angles.shape[1]), np.ascontiguousarray(jacobian[:, :, 2])
-    first, block = simulator.responses(values[:, :1], speeds[:, :1], 0, one, model.targets.component, row)
-    single, _ = simulator.tangent(values[:, :1] * one[2], speeds[:, :1] * one[2], False)
+    first, block = linear.responses(values[:, :1], speeds[:, :1], 0, one, model.targets.component, row)
+    single, _ = linear.tangent(values[:, :1] * one[2], speeds[:, :1] * one[2], False)
     expected = np.einsum("tka,tka->tk", row, single[:, model.targets.component])
     np.testing.assert_allclose(block[:, :, 2], expected[first:], atol=1e-10 * np.abs(expected).max())
 

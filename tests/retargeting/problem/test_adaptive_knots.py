@@ -92,14 +92,13 @@ def test_knots_are_wanted_where_something_is_to_be_gained(arm, bodies):
     def free(basis):
         return np.zeros(basis.count * 2, bool)
 
-    x = minimize(problem, Search.start(np.zeros(problem.size)), free(problem.space.basis), 1e-6).x
-    problem.value(x)
-    problem.linearize()
-    breaks = refined_breaks(problem, x, free, 1e-6)
+    at = minimize(problem, Search.start(np.zeros(problem.size)), free(problem.space.basis), 1e-6).at
+    linear = at.linearized()
+    breaks = refined_breaks(at, linear, free, 1e-6)
     new = np.setdiff1d(breaks, problem.space.basis.breaks) / 120.0
     assert len(new) >= 4 and len(breaks) < len(halved(problem.grid, problem.space.basis.breaks))
     assert new.max() < 0.75
-    assert refined_breaks(problem, x, free, 1.0) is None, "nothing gains a metre"
+    assert refined_breaks(at, linear, free, 1.0) is None, "nothing gains a metre"
 
 
 def test_knots_that_follow_the_motion_reach_what_uniform_ones_do_not(arm, bodies, monkeypatch):

@@ -3,18 +3,19 @@ differences."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.model.run import RunSettings
-from calmotion.retargeting.kept_feet import keep_feet
-from calmotion.retargeting.problem import ground
-from calmotion.retargeting.problem.ground import GROUND, SPEED, ground_bounds, with_ground_rows
-from calmotion.retargeting.problem.limits import LimitTerms
+from calmotion.retargeting.kept_feet import with_kept_feet
+from calmotion.retargeting.problem import linear_problem
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
+from calmotion.retargeting.problem.robot import GROUND
+from calmotion.retargeting.quantities.ground import SPEED, ground_bounds
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.motor_limits import Bounds
 from calmotion.simulation.preparation import prepare
 from calmotion.simulation.simulate import intended_motion
 from calmotion.simulation.standing.held_feet import held_feet
@@ -39,16 +40,14 @@ def posed(tmp_path_factory):
     intended = intended_motion(found, curves.angles, curves.rates)
     problem, _, _ = pose(found, curves, intended, options)
     start = np.zeros(problem.size)  # the animation
-    problem.value(start)
-    keep_feet(found, problem)
+    problem = with_kept_feet(found, problem.at(start)).problem
     locked = locked_coefficients(shot.animation, problem.space.basis, problem.space.motors, problem.grid.end)
     return path, problem, start, locked
 
 
 def test_values_are_those_of_the_report(posed):
     path, problem, start, _ = posed
-    problem.value(start)
-    limits, values = problem.robots[0].ground, problem.limited[GROUND]
+    limits, values = problem.robots[0].limited[GROUND].limits, problem.at(start).limited[GROUND]
     simulated = cm.simulate(path, step=STEP)
     left, right = held_feet(simulated.shot.character, simulated.result.before.motion)
     weight = 9.81 * sum(body.mass.mass for body in simulated.shot.character.bodies)
@@ -73,17 +72,14 @@ def test_derivatives_agree_with_differences_and_are_transposed(posed):
     rng = np.random.default_rng(3)
     x, direction = (np.where(locked, 0.0, rng.standard_normal(problem.size)) for _ in range(2))
     x = start + 0.01 * x
-    problem.limits.on = True
-    problem.value(x)
-    problem.linearize()
-    residuals, changes = problem.jvp(direction)
+    linear = problem.at(x).with_limits(replace(problem.limits, on=True)).linearized()
+    residuals, changes = linear.jvp(direction)
     pulls = rng.standard_normal(changes[GROUND].shape)
-    back = problem.vjp(np.zeros_like(residuals), {GROUND: pulls})
+    back = linear.vjp(np.zeros_like(residuals), {GROUND: pulls})
     assert back @ direction == pytest.approx(float(np.sum(pulls * changes[GROUND])), rel=1e-9)
     eps, sides = 1e-6, []
     for sign in (1.0, -1.0):
-        problem.value(x + sign * eps * direction)
-        sides.append(problem.limited[GROUND].copy())
+        sides.append(problem.at(x + sign * eps * direction).limited[GROUND])
     differences = (sides[0] - sides[1]) / (2.0 * eps)
     assert np.abs(differences - changes[GROUND]).max() < 1e-6 * np.abs(differences).max()
     moving = np.abs(differences).max(axis=0) > 0.0
@@ -92,45 +88,28 @@ def test_derivatives_agree_with_differences_and_are_transposed(posed):
 
 def test_bounds_let_landings_be_as_fast_as_animated(posed):
     _, problem, _, _ = posed
-    limits = problem.robots[0].ground
+    limits = problem.robots[0].limited[GROUND].limits
     bounds = ground_bounds(limits)
     assert np.all(bounds.upper[-3:] == limits.landings[0].speeds / SPEED) and np.all(np.isinf(bounds.upper[:-3]))
 
 
-def limits_of(columns):
-    """Limits of feet from zero up, and of a motor's position, at four instants of a tenth of a second."""
-    ground = Bounds(np.zeros(columns), np.full(columns, np.inf), np.ones(columns))
-    motor = Bounds(np.array([-1.0]), np.array([1.0]), np.ones(1))
-    return LimitTerms({"position": motor, "ground": ground}, np.ones(4, bool), 0.1, 50.0, on=True)
-
-
-def test_rows_that_act_are_part_of_the_inverse_and_worked_out_once():
-    rng, limits = np.random.default_rng(0), limits_of(2)
-    J, fixed, asked = rng.normal(size=(4, 2, 6)), np.arange(6) == 3, []
-    values = {"position": np.full((4, 1), 3.0), "ground": np.ones((4, 2))}
-    values["ground"][[1, 3], [0, 1]] = -0.2
-
-    def pull(pulls):
-        asked.append(pulls)
-        return np.einsum("nr,nrx->x", pulls["ground"], J)
-
-    known = {}
-    solve = with_ground_rows(lambda x: x, limits, values, fixed, known, pull)
-    rows = np.where(fixed, 0.0, J[[1, 3], [0, 1]])
-    whole = np.eye(6) + 50.0 * 0.1 * rows.T @ rows
-    assert np.allclose(solve(np.ones(6)), np.linalg.solve(whole, np.ones(6)))
-    with_ground_rows(lambda x: x, limits, values, fixed, known, pull)
-    assert len(asked) == 2 and set(known) == {("ground", 1, 0), ("ground", 3, 1)}
-
-
-def test_of_many_rows_those_that_pull_most_are_taken(monkeypatch):
-    monkeypatch.setattr(ground, "MOST", 1)
-    values = {"ground": -np.arange(1.0, 9.0).reshape(4, 2)}
-    known = {}
-    with_ground_rows(lambda x: x, limits_of(2), values, np.zeros(3, bool), known, lambda pulls: np.ones(3))
-    assert set(known) == {("ground", 3, 1)}
-
-
-def test_without_limits_that_act_the_inverse_stays():
-    values = {"ground": -np.ones((4, 2))}
-    assert with_ground_rows(np.negative, None, values, np.zeros(3, bool), {}, np.sum) is np.negative
+def test_of_stiff_rows_those_that_pull_most_are_part_of_the_inverse(posed, monkeypatch):
+    _, problem, start, locked = posed
+    at, limits = problem.at(start), replace(problem.limits, on=True, rho=1e-3)
+    linear = at.with_limits(limits).linearized()
+    kept = {name: np.where(np.isfinite(v), 1.0, v) if name == GROUND else v for name, v in at.limited.items()}
+    kept[GROUND][:, -3:] = 0.0
+    plain = linear.precondition(locked, None, limits, kept)
+    d = np.where(locked, 0.0, np.random.default_rng(0).normal(size=problem.size))
+    expected = plain(d)
+    assert not linear._stiff
+    monkeypatch.setattr(linear_problem, "STIFF_ROWS", 3)
+    acting = {**kept, GROUND: kept[GROUND].copy()}
+    judged = np.flatnonzero(problem.limits.judged)[5:9]
+    acting[GROUND][judged, 0] = -1.0, -2.0, -4.0, -3.0
+    solved = linear.precondition(locked, None, limits, acting)(d)
+    assert set(linear._stiff) == {(GROUND, n, 0) for n in judged[1:]}
+    rows = np.array([np.where(locked, 0.0, row) for row in linear._stiff.values()])
+    weight = limits.curvature(GROUND, acting[GROUND])[judged[0], 0]
+    plain = linear.precondition(locked, None, limits, kept)
+    assert solved == pytest.approx(expected - plain(weight * rows.T @ (rows @ solved)), rel=1e-6)

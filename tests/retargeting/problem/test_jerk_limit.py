@@ -47,9 +47,8 @@ def test_its_terms_are_differentiated_as_all_others(arm, bodies, animation):
     rng = np.random.default_rng(4)
     x, d = (1e-2 * rng.normal(size=problem.size) for _ in range(2))
     e = 1e-6
-    ends = [problem.value(x + sign * e * d) for sign in (1, -1)]
-    problem.value(x)
-    assert problem.linearize() @ d == pytest.approx((ends[0] - ends[1]) / (2 * e), rel=1e-5)
+    ends = [problem.at(x + sign * e * d).merit for sign in (1, -1)]
+    assert problem.at(x).linearized().gradient @ d == pytest.approx((ends[0] - ends[1]) / (2 * e), rel=1e-5)
 
 
 @pytest.mark.parametrize("share", [0.7, 0.4])

@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model.limits.bounds import motor_bounds
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem.limits import MARGIN, LimitTerms
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.simulation.motor_limits import motor_bounds
 from posed import ignore_progress
 
 OPTIONS = RunSettings(step=1 / 120, tolerance=2e-4)  # so small that searches end at the same optimum
@@ -125,22 +125,22 @@ def test_terms_have_the_derivatives_that_they_say(terms):
 def test_the_penalty_grows_no_further_than_rounding_allows(terms):
     limits, values = terms
     for _ in range(30):  # an excess that stays
-        assert limits.update(values)
+        limits = limits.updated(values)
     assert 1e7 < limits.rho / 7.0 < 1e9
 
 
 def test_multipliers_grow_where_limits_are_exceeded_and_off_terms_are_nothing(terms):
     limits, values = terms
-    before = {name: y.copy() for name, y in limits.multipliers.items()}
+    before = limits.multipliers
     over = (values["velocity"] - limits.bounds["velocity"].upper) > 0.0
     over[:2] = False
-    assert limits.update(values)
+    limits = limits.updated(values)
     assert np.all(limits.multipliers["velocity"][0][over] > before["velocity"][0][over])
     off = LimitTerms(limits.bounds, limits.judged, 0.1, 7.0)
     assert off.value(values) == 0.0 and not np.any(off.curvature("velocity", values["velocity"]))
     kept = {name: 0.0 * v for name, v in values.items()}
-    assert off.kept(kept) and not off.tighten(kept) and not off.on
-    assert off.tighten(values) and off.on
+    assert off.kept(kept) and off.tightened(kept) is None and not off.on
+    assert off.tightened(values).on
     edge = {
         name: np.broadcast_to((1 - 0.5 * MARGIN) * limits.bounds[name].upper, v.shape) for name, v in values.items()
     }

@@ -48,7 +48,7 @@ def linearized(request, arm, bodies, animation):
     if kind.startswith("linkage"):
         parts = linkage("neohookean" if "neo" in kind else "stvk")
         parts = (limited_motors(parts[0], 0.4), *parts[1:])
-        made = [make_problem(*parts, limited=True) for _ in range(2)]
+        problem = make_problem(*parts, limited=True)
     else:
         character = limited_motors(arm) if "limits" in kind else arm
         if kind.startswith("loop"):
@@ -56,46 +56,42 @@ def linearized(request, arm, bodies, animation):
         if kind == "rotation alone":
             targets = tuple(dataclasses.replace(t, position_weight=0.0, rotation_weight=1.0) for t in arm.targets)
             character = dataclasses.replace(arm, targets=targets)
-        made = [
-            make_problem(
-                character, bodies, animation, 0.25 if kind == "pre-roll" else 0.0, kind == "kept", "limits" in kind,
-                kind.startswith("static"),
-            )
-            for _ in range(2)
-        ]  # fmt: skip
-    problem, other = made
+        problem = make_problem(
+            character, bodies, animation, 0.25 if kind == "pre-roll" else 0.0, kind == "kept", "limits" in kind,
+            kind.startswith("static"),
+        )  # fmt: skip
     x = (0.005 if kind.startswith("linkage") else 0.02) * np.random.default_rng(0).normal(size=problem.size)
-    problem.value(x)
-    # products need what `linearize` leaves behind, so differences are taken on a second problem
-    return problem, x, problem.linearize(), other
+    at = problem.at(x)
+    return at, at.linearized()
 
 
 def test_gradient_matches_central_differences_of_the_whole_simulation(linearized):
-    problem, x, gradient, other = linearized
+    at, linear = linearized
+    problem, x = at.problem, at.x
     rng = np.random.default_rng(1)
     for _ in range(2):
         d = rng.normal(size=len(x))
 
         def difference(e, d=d):
-            return (other.value(x + e * d) - other.value(x - e * d)) / (2 * e)
+            return (problem.at(x + e * d).merit - problem.at(x - e * d).merit) / (2 * e)
 
         # terms of limits have corners in their second derivative, so a step that crosses none of them must be found
         steps = (1e-4,) if problem.limits is None else (3e-4, 1e-4, 3e-5, 1e-5)
         found = ((4.0 * difference(e) - difference(2 * e)) / 3.0 for e in steps)
         # efforts come out of Newton's method with fewer digits than motions, those of loops with fewer still
         accuracy = 1e-7 if problem.limits is None else 2e-6 if problem.grid.cyclic else 1e-6
-        assert any(abs(gradient @ d - value) / abs(value) < accuracy for value in found)
+        assert any(abs(linear.gradient @ d - value) / abs(value) < accuracy for value in found)
 
 
 def test_product_is_symmetric_and_follows_the_change_of_the_residuals(linearized):
-    problem, x, _, _ = linearized
+    at, problem = linearized
     rng = np.random.default_rng(2)
-    a, b = rng.normal(size=(2, len(x)))
+    a, b = rng.normal(size=(2, len(at.x)))
     Ha, Hb = problem.product(a), problem.product(b)
     # the terms of either sum cancel in part
     assert abs(a @ Hb - b @ Ha) < 5e-11 * (np.abs(a) @ np.abs(Hb))
     residuals, values = problem.jvp(a)
-    change = np.sum(residuals**2) + a @ problem.penalty_gradient(a)
+    change = np.sum(residuals**2) + a @ problem.space.penalty_gradient(a)
     if problem.limits is not None:
         weights = {name: problem.limits.curvature(name, v) for name, v in problem.limited.items()}
         assert all(np.any(w) for w in weights.values()), "every limit should act somewhere"
@@ -104,18 +100,18 @@ def test_product_is_symmetric_and_follows_the_change_of_the_residuals(linearized
 
 
 def test_model_is_the_merit_to_second_order(linearized):
-    problem, x, gradient, _ = linearized
+    at, problem = linearized
     if problem.limits is None:
         pytest.skip("there are no limits")
     from calmotion.retargeting.solver.limited_step import LimitedModel, ModelPoint
 
-    d = np.random.default_rng(3).normal(size=len(x))
+    d = np.random.default_rng(3).normal(size=len(at.x))
     residuals, values = problem.jvp(d)
     way = ModelPoint(d, residuals, values)
     model = LimitedModel(problem)
     start = model.start
-    assert model.merit(start) == pytest.approx(problem.merit(), rel=1e-12)
-    assert model.slope(start, way) == pytest.approx(gradient @ d, rel=1e-10)
+    assert model.merit(start) == pytest.approx(at.merit, rel=1e-12)
+    assert model.slope(start, way) == pytest.approx(problem.gradient @ d, rel=1e-10)
     there = start.moved(way, 1e-3)
     e = 1e-6
     slope = (model.merit(there.moved(way, e)) - model.merit(there.moved(way, -e))) / (2 * e)
@@ -126,11 +122,9 @@ def test_model_is_the_merit_to_second_order(linearized):
 def test_static_start_follows_the_curves(arm, bodies, animation):
     """A change of the first coefficient alone already moves the first instant."""
     problem = make_problem(arm, bodies, animation, 0.0)
-    problem.value(np.zeros(problem.size))
-    problem.linearize()
     d = np.zeros(problem.size)
     d[1] = 1.0  # elbow
-    change, _ = problem.jvp(d)
+    change, _ = problem.at(np.zeros(problem.size)).linearized().jvp(d)
     assert np.abs(change[0, 6:12]).max() > 1e-3  # of the second target
 
 

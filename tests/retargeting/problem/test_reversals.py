@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.model.motor import Rotor
-from calmotion.retargeting.avoided_reversals import count_reversals, play_of
-from calmotion.retargeting.problem.reversals import REVERSAL, reversal_terms, wanted_sides
+from calmotion.retargeting.avoided_reversals import play_of, with_reversals
+from calmotion.retargeting.quantities import gear_play as module
+from calmotion.retargeting.quantities.gear_play import REVERSAL, gear_play, wanted_sides
 from posed import make_problem
 
 H = 1 / 240
@@ -39,17 +40,18 @@ def test_sides_have_the_least_cost_of_all():
     assert cost(wanted_sides(share, h)) == pytest.approx(min(map(cost, every)), rel=1e-12)
 
 
-def test_nothing_counts_while_a_gear_changes_its_side_or_lies_clearly_on_the_wanted_one():
+def test_nothing_counts_while_a_gear_changes_its_side_or_lies_clearly_on_the_wanted_one(monkeypatch):
+    monkeypatch.setattr(module, "transmitted_by", lambda model, run: run)  # the efforts themselves
     efforts = np.concatenate([np.full(100, 5.0), np.linspace(5.0, -5.0, 41), np.full(100, -5.0)])[:, None]
     levers = np.ones((241, 1, 6, 1))
-    terms = reversal_terms(np.array([0.01]), efforts, H, np.ones(241, bool), levers, 4.0)
-    lost = terms.residuals(efforts)[:, 0]
+    terms = gear_play(None, np.array([0.01]), efforts, H, np.ones(241, bool), levers, 4.0)
+    lost = terms.values(efforts)[:, 0]
     full = 2.0 * np.sqrt(6.0) * 0.01  # twice the way, from one side to the other
     assert np.all(lost[118:123] == 0.0) and np.all(np.abs(lost) < 0.04 * full)
-    assert terms.residuals(-efforts)[0, 0] == pytest.approx(full, rel=1e-8)
+    assert terms.values(-efforts)[0, 0] == pytest.approx(full, rel=1e-8)
     e = 1e-6
-    moved = (terms.residuals(0.3 * efforts + e) - terms.residuals(0.3 * efforts - e)) / (2 * e)
-    assert terms.slopes(0.3 * efforts) == pytest.approx(moved, abs=1e-7 * np.abs(moved).max())
+    moved = (terms.values(0.3 * efforts + e) - terms.values(0.3 * efforts - e)) / (2 * e)
+    assert terms.slopes(0.3 * efforts).by_effort == pytest.approx(moved, abs=1e-7 * np.abs(moved).max())
 
 
 @pytest.fixture(scope="module", params=["prescribed", "servo"])
@@ -60,34 +62,33 @@ def counted(request, arm, animation, bodies):
         for m in arm.motors
     )
     character = replace(arm, motors=motors)
-    made = [make_problem(character, bodies, animation) for _ in range(2)]
-    x = 0.02 * np.random.default_rng(0).normal(size=made[0].size)
-    for problem in made:
-        problem.value(np.zeros(problem.size))
-        count_reversals(problem, play_of(character), 100.0)
-        problem.value(x)
-    return made[0], x, made[0].linearize(), made[1]
+    problem = make_problem(character, bodies, animation)
+    problem = with_reversals(problem.at(np.zeros(problem.size)), play_of(character), 100.0).problem
+    at = problem.at(0.02 * np.random.default_rng(0).normal(size=problem.size))
+    return at, at.linearized()
 
 
 def test_gradient_matches_central_differences(counted):
-    problem, x, gradient, other = counted
-    errors = float(np.sum(problem.robots[0].residuals ** 2))
-    assert float(np.sum(problem.residuals**2)) > 1.1 * errors, "play should count"
+    at, linear = counted
+    x, gradient = at.x, linear.gradient
+    errors = float(np.sum(at.runs[0].errors ** 2))
+    assert float(np.sum(at.residuals**2)) > 1.1 * errors, "play should count"
     d = np.random.default_rng(1).normal(size=len(x))
 
     def difference(e):
-        return (other.value(x + e * d) - other.value(x - e * d)) / (2 * e)
+        return (at.problem.at(x + e * d).merit - at.problem.at(x - e * d).merit) / (2 * e)
 
     found = [(4.0 * difference(e) - difference(2 * e)) / 3.0 for e in (1e-4, 3e-5)]
     assert min(abs(gradient @ d - value) for value in found) < 1e-6 * abs(gradient @ d)
 
 
 def test_products_are_those_of_the_residuals(counted):
-    problem, x, _, _ = counted
+    at, problem = counted
+    x = at.x
     rng = np.random.default_rng(2)
     a, b = rng.normal(size=(2, len(x)))
     (residuals, _), Ha = problem.jvp(a), problem.product(a)
-    change = np.sum(residuals**2) + a @ problem.penalty_product(a)
+    change = np.sum(residuals**2) + a @ problem.space.penalty_product(a)
     assert abs(a @ Ha - change) < 5e-11 * change
     assert abs(a @ problem.product(b) - b @ Ha) < 5e-11 * (np.abs(b) @ np.abs(Ha))
     inverse = problem.precondition(np.zeros(len(x), bool))

@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.robust.choice import (
-    NEAR,
     REACH,
+    Candidates,
     _directions,
     _shared,
     chosen_scenarios,
-    tried_robots,
-    worse_robots,
 )
 from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import scenario_at, uncertain_parameters
@@ -78,27 +76,26 @@ def test_robots_with_larger_errors_are_added(shot):
     tracks, parameters = shot.animation.tracks, uncertain_parameters(shot)
     axis = np.eye(len(parameters))[0]
     near = tuple(scenario_at(parameters, 0.1 * k * axis) for k in (0, 1, 2))
-    points = tried_robots(parameters)
+    candidates = Candidates.of(shot, OPTIONS, parameters)
 
     def largest(robots):
         return errors_on(shot, OPTIONS, {"": tracks}, robots)[""].max()
 
-    found, left = worse_robots(shot, OPTIONS, tracks, parameters, largest(near[1:]), points)
+    found, left = candidates.worst(tracks, largest(near[1:]))
     assert len(found) == 2
     errors = errors_on(shot, OPTIONS, {"": tracks}, (*near[1:], *found))[""].max(axis=1)
     assert errors[2:].min() > 1.05 * errors[:2].max()
     # what is tried once more are the other ones with large errors, which are the first to be taken in next
-    assert 0 < len(left) < len(points) - 2 and all(any(np.array_equal(x, y) for y in points) for x in left)
-    following, _ = worse_robots(shot, OPTIONS, tracks, parameters, largest(near[1:]), left)
+    assert 0 < len(left.points) < len(candidates.points) - 2
+    following, _ = left.worst(tracks, largest(near[1:]))
     again = errors_on(shot, OPTIONS, {"": tracks}, following)[""].max(axis=1)
-    assert len(following) == 2 and NEAR * errors[2:].max() < again.max() <= errors[2:].max()
+    assert len(following) == 2 and Candidates.NEAR * errors[2:].max() < again.max() <= errors[2:].max()
     far = [scenario_at(parameters, 6.0 * k * axis) for k in (-1, 1)]
-    assert worse_robots(shot, OPTIONS, tracks, parameters, largest(far), points)[0] == ()
+    assert candidates.worst(tracks, largest(far))[0] == ()
 
 
 def test_no_robot_is_worse_where_none_is_left_to_try(shot):
     tracks, parameters = shot.animation.tracks, uncertain_parameters(shot)
     assert errors_on(shot, OPTIONS, {"": tracks}, ())[""].shape == (0, len(shot.character.targets))
-    none = np.zeros((0, len(parameters)))
-    found, left = worse_robots(shot, OPTIONS, tracks, parameters, 1e-3, none)
-    assert found == () and left.shape == none.shape
+    found, left = Candidates(shot, OPTIONS, parameters, np.zeros((0, len(parameters)))).worst(tracks, 1e-3)
+    assert found == () and len(left.points) == 0

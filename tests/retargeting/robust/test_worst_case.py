@@ -8,10 +8,11 @@ from calmotion import ShotError
 from calmotion.model.robust.robots import Scenario
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
+from calmotion.retargeting.robust import retarget
 from calmotion.retargeting.robust.choice import chosen_scenarios
 from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import uncertain_parameters
-from calmotion.retargeting.robust.worst_case import least_maximum
+from calmotion.retargeting.robust.worst_case import LeastMaximum, least_maximum
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.preparation import prepare
@@ -66,14 +67,14 @@ def test_a_bound_that_the_curves_do_not_keep_where_it_begins_is_what_they_have(s
 
 
 def test_the_bound_holds_where_the_search_ends_far_from_it(started, monkeypatch):
-    monkeypatch.setattr("calmotion.retargeting.robust.worst_case.ROUNDS", 1)
+    monkeypatch.setattr(LeastMaximum, "ROUNDS", 1)
     found = searched(started, 1.001 * largest(started, started[1])[0])
     assert largest(started, found.tracks)[0] <= 1.001 * largest(started, started[1])[0]
     assert largest(started, found.tracks)[1] < largest(started, started[1])[1]
 
 
 def test_curves_that_no_others_are_better_than_are_returned(started, monkeypatch):
-    monkeypatch.setattr("calmotion.retargeting.robust.worst_case.ROUNDS", 0)
+    monkeypatch.setattr(LeastMaximum, "ROUNDS", 0)
     assert all(one is other for one, other in zip(searched(started, ALLOWED).tracks, started[1], strict=True))
 
 
@@ -81,7 +82,7 @@ def test_a_robot_that_cannot_be_simulated_is_named(started):
     shot, tracks, scenarios = started
     name = next(name for name in scenarios[1].factors if name.startswith("modulus"))
     with pytest.raises(ShotError, match="times 1e-09 cannot be simulated"):
-        least_maximum(shot, OPTIONS, tracks, (scenarios[0], Scenario({name: 1e-9})), ALLOWED, ignore_progress)
+        retarget._worst(shot, OPTIONS, tracks, (scenarios[0], Scenario({name: 1e-9})), ALLOWED, ignore_progress)
 
 
 def test_curves_are_simulated_as_they_are(started, worst):

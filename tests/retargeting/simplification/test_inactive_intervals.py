@@ -11,8 +11,7 @@ from calmotion.retargeting import search
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem import adaptive_knots
 from calmotion.retargeting.problem.offset_basis import basis_on
-from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.retargeting.search import MISSED
+from calmotion.retargeting.search import MISSED, RetargetSearch
 from calmotion.retargeting.simplification.inactive_intervals import (
     InactiveInterval,
     first_change,
@@ -69,8 +68,8 @@ def everywhere(arm, bodies):
 def test_an_inactive_interval_before_a_move_is_skipped_without_loss(arm, bodies, everywhere, monkeypatch):
     simulated, run = [], Simulator.run
 
-    def counted(self, angles, rates):
-        motion = run(self, angles, rates)
+    def counted(self, angles, rates, near=None):
+        motion = run(self, angles, rates, near)
         if self.model.system.size > 6:
             simulated.append(motion.trajectory)
         return motion
@@ -96,18 +95,18 @@ def test_an_inactive_interval_before_a_move_is_skipped_without_loss(arm, bodies,
 @pytest.mark.parametrize("locked", [False, True])
 def test_with_an_early_error_no_interval_is_inactive_and_the_result_is_the_same(arm, bodies, monkeypatch, locked):
     """The rigid robot does not sag, and the first pose is to be its; where it is locked it is simulated once."""
-    animation, firsts, hold = pausing(0.8, 0.2), [], RetargetProblem.hold
+    animation, firsts, held = pausing(0.8, 0.2), [], RetargetSearch._held
     if locked:
         locks = tuple(FreeTrack(k, np.array([0.0, 0.52]), np.array([False, True])) for k in range(2))
         animation = dataclasses.replace(animation, free=locks)
     with monkeypatch.context() as patch:
-        patch.setattr(RetargetProblem, "hold", lambda self, first: (firsts.append(first), hold(self, first)))
+        patch.setattr(RetargetSearch, "_held", lambda self, first: (firsts.append(first), held(self, first)))
         result = optimize_shot(compile_shot(arm, animation, bodies), OPTIONS, ignore_progress)
     assert not rows_of(result) and (max(firsts) > 0.5 * 240) == locked
     if not locked:
         assert result.after.position_errors[0, 1] < 0.5 * result.before.position_errors[0, 1]
     with monkeypatch.context() as patch:
-        patch.setattr(RetargetProblem, "hold", lambda self, first: None)
+        patch.setattr(RetargetSearch, "_held", lambda self, first: None)
         patch.setattr(search, "inactive_intervals", lambda *a: ())
         plain = optimize_shot(compile_shot(arm, animation, bodies), OPTIONS, ignore_progress)
     for one, other in zip(result.curves, plain.curves, strict=True):
@@ -151,9 +150,8 @@ def test_a_range_that_would_have_gained_something_is_searched_after_all(arm, bod
 def test_ranges_keep_away_from_errors_limits_and_changes(arm, bodies):
     def intervals_of(character, start=None, ranges="auto", animation=None):
         problem = make_problem(character, bodies, animation or pausing(after=3.0), static=True, limited=True)
-        problem.value(np.zeros(problem.size))
         start = np.zeros(problem.size) if start is None else start(problem)
-        return inactive_intervals(problem, start, 5.0, 1e-3, ranges)
+        return inactive_intervals(problem.at(np.zeros(problem.size)), start, 5.0, 1e-3, ranges)
 
     first, *others = intervals_of(arm)
     assert first.start == 0.0 and HELD - 0.6 < first.stop < HELD - 0.2 and 0.0 <= first.gain < 2e-6
@@ -176,11 +174,11 @@ def test_a_shot_without_active_intervals_and_one_without_vibration(arm, bodies):
     times = np.arange(49) / 24.0
     tracks = (Track(times, 0.2 + 0.0 * times), Track(times, 0.0 * times))
     problem = make_problem(arm, bodies, Animation(times, tracks, tracks), static=True)
-    problem.value(np.zeros(problem.size))
-    assert inactive_intervals(problem, np.zeros(problem.size), 5.0, 1e-3) == (), "a search of it ends at once"
+    zero = np.zeros(problem.size)
+    assert inactive_intervals(problem.at(zero), zero, 5.0, 1e-3) == (), "a search of it ends at once"
     problem = make_problem(arm, bodies, pausing(), static=True)
-    problem.value(np.zeros(problem.size))
-    assert inactive_intervals(problem, np.zeros(problem.size), 0.0, 1e-3) == ()
+    zero = np.zeros(problem.size)
+    assert inactive_intervals(problem.at(zero), zero, 0.0, 1e-3) == ()
 
 
 def test_finer_knots_before_the_first_change_have_no_effect(arm, bodies):

@@ -58,10 +58,9 @@ def test_the_gradient_is_that_of_the_motors_together(geared, bodies):
     problem = problem_of(character, animation, bodies)
     rng = np.random.default_rng(1)
     x, way = 1e-3 * rng.standard_normal(problem.size), rng.standard_normal(problem.size)
-    problem.value(x)
-    slope = problem.linearize() @ way
+    slope = problem.at(x).linearized().gradient @ way
     eps = 1e-5
-    ahead, behind = (problem.value(x + s * eps * way) for s in (1.0, -1.0))
+    ahead, behind = (problem.at(x + s * eps * way).merit for s in (1.0, -1.0))
     assert slope == pytest.approx((ahead - behind) / (2 * eps), rel=1e-6)
 
 
@@ -69,10 +68,9 @@ def test_a_product_is_symmetric(geared, bodies):
     character, animation = geared
     problem = problem_of(character, animation, bodies)
     rng = np.random.default_rng(2)
-    problem.value(np.zeros(problem.size))
-    problem.linearize()
+    linear = problem.at(np.zeros(problem.size)).linearized()
     a, b = rng.standard_normal((2, problem.size))
-    assert a @ problem.product(b) == pytest.approx(b @ problem.product(a), rel=1e-9)
+    assert a @ linear.product(b) == pytest.approx(b @ linear.product(a), rel=1e-9)
 
 
 def test_the_optimised_curves_stay_geared(geared, bodies):

@@ -14,8 +14,9 @@ import numpy as np
 from scipy.sparse.linalg import splu
 
 from calmotion.arrays import Array, BoolArray, IntArray
+from calmotion.retargeting.problem.linear_problem import LinearProblem
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on, knot_frames, uniform_breaks
-from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.problem.problem import Evaluation
 from calmotion.simulation.inputs.time_grid import TimeGrid
 
 FIRST, FINEST = 0.05, 1.0 / 60.0  # initial and smallest distance of knots [s]
@@ -41,30 +42,30 @@ def halved(grid: TimeGrid, breaks: IntArray, intervals: BoolArray | None = None)
 
 
 def refined_breaks(
-    problem: RetargetProblem, x: Array, fixed_on: Callable[[OffsetBasis], BoolArray], gain: float
+    at: Evaluation, linear: LinearProblem, fixed_on: Callable[[OffsetBasis], BoolArray], gain: float
 ) -> IntArray | None:
     """Frames of finer knots; None where these would gain too little.
 
     Args:
-        problem: Linearised last at x.
-        x: Shape [n].
+        at, linear: A point, and the problem linearised there.
         fixed_on: Maps a basis to its fixed coefficients, shape [n], bool.
         gain: Smallest decrease of the root-mean-square error by finer knots [m].
     """
-    grid, basis = problem.grid, problem.space.basis
+    grid, space = at.problem.grid, at.problem.space
+    basis = space.basis
     breaks = halved(grid, basis.breaks)
     if len(breaks) == len(basis.breaks):
         return None
     finer = basis.on(grid, breaks)
-    fine = problem.on_basis(finer, converted(basis, finer, x, len(problem.space.motors)))
-    fixed = fixed_on(fine.space.basis)
-    gradient = np.where(fixed, 0.0, fine.gradient())
+    fine = linear.over(space.on_basis(finer), converted(basis, finer, at.x, len(space.motors)))
+    fixed = fixed_on(finer)
+    gradient = np.where(fixed, 0.0, fine.gradient)
     decrease = 0.5 * gradient * fine.precondition(fixed)(gradient)
-    by_function = decrease.reshape(fine.space.basis.count, -1).sum(axis=1)
+    by_function = decrease.reshape(finer.count, -1).sum(axis=1)
     total = float(by_function.sum())
-    if not total > 0.0 or problem.gain(total, problem.objective_value()) < gain:
+    if not total > 0.0 or at.gain(total, at.objective_value) < gain:
         return None
-    refined = halved(grid, basis.breaks, _contributing(grid, basis, fine.space.basis, np.maximum(by_function, 0.0)))
+    refined = halved(grid, basis.breaks, _contributing(grid, basis, finer, np.maximum(by_function, 0.0)))
     return refined if len(refined) > len(basis.breaks) else None
 
 

@@ -10,12 +10,13 @@ are narrowed by a small share, so that the original limits hold exactly at the e
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray
-from calmotion.simulation.motor_limits import Bounds
+from calmotion.model.limits.bounds import Bounds
 
 FIRST_PENALTY = 1e3  # over the objective of the input for each second
 MARGIN = 1e-4  # share by which a limit is narrowed
@@ -24,9 +25,9 @@ MOST = 1e8  # of the first penalty, which it may reach: rounding of larger ones 
 STALLED, PATIENCE = 0.8, 3  # updates end after so many minima in a row that each leave more than this share of it
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class LimitTerms:
-    """The terms of the augmented Lagrangian, with their multipliers.
+    """The terms of the augmented Lagrangian, with their multipliers; a search goes from one to the next.
 
     Attributes:
         bounds: Bounds by quantity.
@@ -54,9 +55,13 @@ class LimitTerms:
     on: bool = False
 
     def __post_init__(self) -> None:
-        shape = len(self.judged)
-        for name, bound in self.bounds.items():
-            self.multipliers.setdefault(name, np.zeros((2, shape, len(bound.scale))))
+        zero = {name: np.zeros((2, len(self.judged), len(bound.scale))) for name, bound in self.bounds.items()}
+        object.__setattr__(self, "multipliers", zero | self.multipliers)
+
+    @classmethod
+    def of(cls, bounds: Mapping[str, Bounds], judged: BoolArray, h: float) -> LimitTerms | None:
+        """Terms that do not count yet; None without bounds."""
+        return cls(dict(bounds), judged, h, 1.0) if bounds else None
 
     def _sides(self, name: str, v: Array) -> Array:
         """c of the upper and of the lower side, shape [2, T, M]; very negative where there is no limit."""
@@ -95,34 +100,28 @@ class LimitTerms:
         """Largest excess over the narrowed limits; at most 0 if all are kept."""
         return max((float(np.max(self._sides(name, values[name]))) for name in self.bounds), default=-np.inf)
 
-    def tighten(self, values: dict[str, Array]) -> bool:
-        """Switch the terms on if limits are violated, or update the multipliers at a minimum with the terms.
-
-        Returns:
-            Whether the merit changed; False if all limits are kept or further updates do not help.
-        """
+    def tightened(self, values: dict[str, Array]) -> LimitTerms | None:
+        """The terms switched on if limits are violated, or with new multipliers at a minimum with the terms; None if
+        all limits are kept or further updates do not help."""
         if not self.on:
-            self.on = not self.kept(values)
-            return self.on
+            return None if self.kept(values) else replace(self, on=True)
         excess = self.excess(values)
-        self.stalled = self.stalled + 1 if excess > STALLED * self.reached else 0
-        self.reached = excess
-        return self.stalled < PATIENCE and self.update(values)
+        stalled = self.stalled + 1 if excess > STALLED * self.reached else 0
+        return replace(self, stalled=stalled, reached=excess).updated(values) if stalled < PATIENCE else None
 
-    def update(self, values: dict[str, Array]) -> bool:
-        """Update the multipliers after a minimum of the model; False, without an update, if all limits are kept."""
+    def updated(self, values: dict[str, Array]) -> LimitTerms | None:
+        """With new multipliers after a minimum of the model; None if all limits are kept."""
         excess = self.excess(values)
         if excess <= MARGIN:
-            return False
-        for name, y in self.multipliers.items():
-            self.multipliers[name] = np.maximum(0.0, self._sides(name, values[name]) + y)
-        self.first = self.first or self.rho
-        if excess > SLOW * self.left and self.rho < MOST * self.first:
-            self.rho *= GROWTH
-            for name in self.multipliers:
-                self.multipliers[name] /= GROWTH  # y rho stays the same
-        self.left = excess
-        return True
+            return None
+        multipliers = {
+            name: np.maximum(0.0, self._sides(name, values[name]) + y) for name, y in self.multipliers.items()
+        }
+        first, rho = self.first or self.rho, self.rho
+        if excess > SLOW * self.left and rho < MOST * first:
+            rho *= GROWTH
+            multipliers = {name: y / GROWTH for name, y in multipliers.items()}  # y rho stays the same
+        return replace(self, multipliers=multipliers, first=first, rho=rho, left=excess)
 
     def without(self, motor: int, quantity: str) -> LimitTerms:
         """The same terms without one limit of one motor."""
@@ -130,7 +129,7 @@ class LimitTerms:
         lower, upper = bound.lower.copy(), bound.upper.copy()
         lower[motor], upper[motor] = -np.inf, np.inf
         bounds = self.bounds | {quantity: Bounds(lower, upper, bound.scale)}
-        return LimitTerms(bounds, self.judged, self.h, self.rho, dict(self.multipliers), on=self.on)
+        return replace(self, bounds=bounds)
 
     def binds(self, motor: int, quantity: str, v: Array) -> bool:
         """Whether a limit of a motor acts at any instant, at values of shape [T, M]."""

@@ -64,11 +64,15 @@ class OffsetSpace:
         """Matrix of the regulariser for one motor, shape [P, P]."""
         return self.smoothness * self.basis.curvature_gram + self.closeness * self.basis.closeness
 
+    @property
+    def orders(self) -> dict[str, int]:
+        """Orders of the derivatives of the curves that may have limits, by the name of the kind of limit."""
+        return {name: kind.order for name, kind in kinds_of_limits().items() if isinstance(kind, CurveLimit)}
+
     @cached_property
     def splines(self) -> dict[str, csr_matrix]:
-        """Spline matrices [T, P] by the name of the kind of limit whose quantity they give."""
-        kinds = kinds_of_limits().items()
-        return {name: self.basis.derivatives[kind.order] for name, kind in kinds if isinstance(kind, CurveLimit)}
+        """Spline matrices [T, P] of these derivatives."""
+        return {name: self.basis.derivatives[order] for name, order in self.orders.items()}
 
     def on_basis(self, basis: OffsetBasis) -> OffsetSpace:
         """The same motors over other splines."""
@@ -109,6 +113,10 @@ class OffsetSpace:
         sums = [float(np.sum(part**2)) for part in (self.base.values, self.base.accelerations)]
         return 0.5 * self.base.h * (self.closeness * sums[0] + self.smoothness * sums[1])
 
+    def closeness_product(self, x: Array) -> Array:
+        """Gram matrix of the offsets over time, times x: x^T of it is int |offset|^2 [rad^2 s]."""
+        return np.asarray(self.basis.closeness @ x.reshape(self.basis.count, len(self.motors))).ravel()
+
     def penalty_product(self, x: Array) -> Array:
         """Matrix of the regulariser times x."""
         return np.asarray(self.penalty @ x.reshape(self.basis.count, len(self.motors))).ravel()
@@ -120,3 +128,33 @@ class OffsetSpace:
     def penalty_value(self, x: Array) -> float:
         """Smoothness and closeness."""
         return self.base_penalty + float(x @ (0.5 * self.penalty_product(x) + self.pull))
+
+
+@dataclass(frozen=True, eq=False)
+class DampedRegulariser:
+    """The regulariser of a space, and a pull towards a point.
+
+    Attributes:
+        space: The unknowns.
+        damping: Weight of half the squared change of the offsets over time.
+        center: From which they change, shape [n].
+    """
+
+    space: OffsetSpace
+    damping: float
+    center: Array
+
+    def penalty_product(self, x: Array) -> Array:
+        """Its matrix times x."""
+        product = self.space.penalty_product(x)
+        return product + self.damping * self.space.closeness_product(x) if self.damping else product
+
+    def penalty_gradient(self, x: Array) -> Array:
+        """Its gradient."""
+        pull = self.damping * self.space.closeness_product(x - self.center) if self.damping else 0.0
+        return self.space.penalty_gradient(x) + pull
+
+    def penalty_value(self, x: Array) -> float:
+        """Its value."""
+        d = x - self.center
+        return self.space.penalty_value(x) + 0.5 * self.damping * float(d @ self.space.closeness_product(d))

@@ -10,6 +10,7 @@ from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.errors import ShotError
 from calmotion.model import Animation, Character
 from calmotion.model.character import motors_give
+from calmotion.model.limits.bounds import Bounds, motor_bounds
 from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import SimulationFailure
@@ -23,7 +24,6 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
 from calmotion.simulation.inputs.time_grid import TimeGrid
-from calmotion.simulation.motor_limits import Bounds, motor_bounds
 from calmotion.simulation.preparation import Prepared
 from calmotion.simulation.simulator import Simulator
 from calmotion.simulation.target_errors import IntendedMotion, Objective
@@ -39,7 +39,6 @@ def pose(
     curves: Curves,
     intended: IntendedMotion,
     options: RunSettings,
-    kind: type[RetargetProblem] = RetargetProblem,
 ) -> tuple[RetargetProblem, Array, bool]:
     """The retargeting problem of a shot, the start of its search, shape [n], and whether its knots are adaptive.
 
@@ -48,7 +47,6 @@ def pose(
         curves: The animator's curves on the grid.
         intended: The intended motion of the targets.
         options: Of the run.
-        kind: Class of the problem.
 
     Raises:
         ShotError: No motor may change, or options contradict each other.
@@ -59,18 +57,23 @@ def pose(
         ahead = _rigid_offsets(prepared, curves)
     known = unknowns(character, animation, grid, options, ahead)
     smoothness = next(v for v in (options.smoothness, character.retarget.smoothness, SMOOTHNESS) if v is not None)
-    problem = kind(
+    problem = RetargetProblem.of_model(
         prepared.model, grid, curves, Objective.over(prepared.model, intended, grid, animation.weights),
         OffsetSpace(known.basis, known.motors, known.coupling, smoothness, closeness_of(character)), prepared.world,
-        LimitTerms(known.bounds, grid.judged, grid.h, 1.0) if known.bounds else None, known.continuous,
+        LimitTerms.of(known.bounds, grid.judged, grid.h), known.continuous,
     )  # fmt: skip
     offsets = known.offsets
     start = fitted(known.basis, offsets).ravel() if np.any(offsets) else np.zeros(problem.size)
     start = np.where(known.fixed, 0.0, start)
-    if ahead is not None and not problem.value(start) < problem.value(np.zeros(problem.size)):
+    if ahead is not None and not _merit(problem, start) < _merit(problem, np.zeros(problem.size)):
         start = np.zeros(problem.size)
-    problem.forget()
     return problem, start, not knot_spacing(character, options)
+
+
+def _merit(problem: RetargetProblem, x: Array) -> float:
+    """The merit at a point; infinite where it cannot be simulated."""
+    at = problem.tried(x)
+    return np.inf if at is None else at.merit
 
 
 def _rigid_offsets(prepared: Prepared, curves: Curves) -> Array | None:

@@ -1,123 +1,137 @@
-"""The retargeting problem of a shot: motor curves in, error at the targets out, with exact derivatives."""
+"""The retargeting problem of a shot: motor curves in, errors at the targets out, with exact derivatives.
+
+A problem does not change. `problem.at(x)` is what was computed at a point, `problem.at(x).linearized()` the derivatives
+there; derivatives about another point take over the memory of a robot's last ones.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from copy import copy
-from dataclasses import replace
-from functools import partial
-from typing import Self
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from calmotion.arrays import Array, BoolArray, IntArray
-from calmotion.model.limits.kinds import kinds_of_limits
-from calmotion.multibody.analysis.rigid_response import RigidResponse
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.parallel import in_parallel
-from calmotion.retargeting.problem import several_robots
-from calmotion.retargeting.problem.ground import GROUND, Place, with_ground_rows
-from calmotion.retargeting.problem.limits import LimitTerms
+from calmotion.retargeting.problem.limits import FIRST_PENALTY, LimitTerms
+from calmotion.retargeting.problem.linear_problem import LinearProblem
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
-from calmotion.retargeting.problem.response_gram import products_worth, response_preconditioner
-from calmotion.retargeting.problem.rigid_approximation import (
-    EFFORT,
-    effort_of,
-    limit_metrics,
-    rigid_gradient,
-    rigid_response,
-)
-from calmotion.retargeting.problem.robot import Robot
+from calmotion.retargeting.problem.responses import Responses
+from calmotion.retargeting.problem.rigid_robot import RigidRobot
+from calmotion.retargeting.problem.robot import EFFORT, Robot, RobotRun, of_robot
+from calmotion.retargeting.problem.sweeps import Sweeps
 from calmotion.retargeting.solver.norm import Norm, SumOfSquares
-from calmotion.retargeting.solver.preconditioner import Preconditioner, RigidPreconditioner
-from calmotion.simulation.forward import ForwardRun, limited_values
+from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.simulator import Simulator
 from calmotion.simulation.target_errors import Objective
 
 
+@dataclass(frozen=True, eq=False)
 class RetargetProblem:
     """`gauss_newton.LeastSquares` over the spline coefficients of the offsets, ordered by basis function, then motor.
 
-    Args:
-        model: The flexible character.
-        grid: Its time grid.
+    Attributes:
+        grid: Time grid of the shot.
         curves: The animator's curves.
-        objective: Errors at the targets.
         space: The unknowns: splines, motors that may change, regularisation.
-        world: Moving roots.
-        limits: Limits of the motors; None where there are none.
+        robots: Which perform the same curves, the nominal one first.
+        rigid: The nominal one without flexibility.
+        limits: Limits of the motors, with their multipliers; None where there are none.
+        norm: What is minimised of the residuals.
         continuous: Whether gradients are those of the continuous adjoint, which are not exact.
+        first: Instant before which motor curves do not change.
+        damping: Of the steps of a search under limits, see `offset_space.DampedRegulariser`.
+        by_responses: Whether it is linearised by the responses to all unknowns, where that is possible.
     """
 
-    def __init__(
-        self, model: Model, grid: TimeGrid, curves: Curves, objective: Objective, space: OffsetSpace,
+    grid: TimeGrid
+    curves: Curves
+    space: OffsetSpace
+    robots: tuple[Robot, ...]
+    rigid: RigidRobot
+    limits: LimitTerms | None = None
+    norm: Norm = SumOfSquares()
+    continuous: bool = False
+    first: int = 0
+    damping: float = 0.0
+    by_responses: bool = False
+
+    @classmethod
+    def of_model(
+        cls, model: Model, grid: TimeGrid, curves: Curves, objective: Objective, space: OffsetSpace,
         world: Array | None = None, limits: LimitTerms | None = None, continuous: bool = False,
-    ):  # fmt: skip
-        self.grid, self.objective, self.space = grid, objective, space
-        self.curves, self.world, self.limits = curves, world, limits
-        self.robots: tuple[Robot, ...] = (Robot(Simulator(model, grid.h, world, grid.cyclic), objective),)
-        self.failure: SimulationFailure | None = None  # of the last point that could not be simulated
-        self.norm: Norm = SumOfSquares()
-        self._continuous = continuous
-        self._limited: dict[str, Array] | None = None
-        self.x = self._linearized_x = np.zeros(0)  # points evaluated and linearised last
-        self.preconditioner: Preconditioner | None = None
-        self._sharpened_x = np.zeros(0)  # point of the preconditioner's responses; empty for that of the rigid robot
-        self._held = 0  # instant before which curves are fixed
-        self._response: RigidResponse | None = None
-        self._ground_rows: dict[Place, Array] = {}  # where it was linearised last
-        # twice the objective of an error of one metre at every instant
-        self._unit = max(float(np.sum(objective.weights**2)) / max(1, 3 * len(model.targets.component)), 1e-300)
-
-    def for_robots(self, robots: Sequence[Robot]) -> Self:
-        """The same problem for several robots that perform the same curves, the nominal one first: the sum of their
-        weighted objectives, and limits of effort that each of them keeps."""
-        other = copy(self)
-        other.robots, other._limited = tuple(robots), None
-        other.x = other._linearized_x = np.zeros(0)
-        if self.limits is not None:
-            limits, bounds = self.limits, self.limits.bounds
-            if EFFORT in bounds:
-                bounds = bounds | {effort_of(k): bounds[EFFORT] for k in range(len(robots))}
-            other.limits = LimitTerms(bounds, limits.judged, limits.h, limits.rho)
-        return other
-
-    def _copy(self) -> RetargetProblem:
-        """A copy whose points are evaluated without changing what is known of this one's."""
-        other = copy(self)
-        other.robots = tuple(copy(robot) for robot in self.robots)
-        return other
-
-    def on_basis(self, basis: OffsetBasis, x: Array) -> RetargetProblem:
-        """The same problem, evaluated and linearised where this one was, over other splines.
+    ) -> RetargetProblem:  # fmt: skip
+        """The problem of one robot.
 
         Args:
-            x: The same point in coefficients of the new basis.
+            model: The flexible character.
+            objective: Errors at its targets.
+            world: Moving roots.
+            grid, curves, space, limits, continuous: As of the class.
         """
-        other = self._copy()
-        other.space, other.preconditioner, other._sharpened_x = self.space.on_basis(basis), None, np.zeros(0)
-        other.x, other._linearized_x, other._ground_rows = x, np.zeros(0), {}
-        return other
+        robot = Robot(Simulator(model, grid.h, world, grid.cyclic), objective)
+        rigid = RigidRobot(model, grid, curves, world, space.coupling)
+        return cls(grid, curves, space, (robot,), rigid, limits, continuous=continuous)
+
+    def at(self, x: Array, near: Evaluation | None = None) -> Evaluation:
+        """What the robots do at a point of shape [n].
+
+        Args:
+            near: From which simulations go on where the curves begin to differ, of the same robots.
+
+        Raises:
+            SimulationFailure: The curves cannot be simulated.
+        """
+        values, rates = self.space.offsets(x)
+        angles, rates = self.curves.angles + values, self.curves.rates + rates
+        known = dict(enumerate(near.runs)) if near is not None else {}
+        runs = in_parallel(lambda k: self.robots[k].perform(angles, rates, known.get(k)), range(len(self.robots)))
+        return Evaluation(self, x.copy(), tuple(runs))
+
+    def tried(self, x: Array, near: Evaluation | None = None) -> Evaluation | None:
+        """As `at`; None where the curves cannot be simulated."""
+        try:
+            return self.at(x, near)
+        except SimulationFailure:
+            return None
+
+    def for_robots(self, robots: Sequence[Robot]) -> RetargetProblem:
+        """The same problem for several robots that perform the same curves, the nominal one first: the sum of their
+        weighted objectives, and limits of effort that each of them keeps."""
+        limits = self.limits
+        if limits is not None:
+            bounds = dict(limits.bounds)
+            if EFFORT in bounds:
+                bounds |= {of_robot(EFFORT, k): bounds[EFFORT] for k in range(len(robots))}
+            limits = LimitTerms(bounds, limits.judged, limits.h, limits.rho)
+        return replace(self, robots=tuple(robots), limits=limits)
+
+    def on_basis(self, basis: OffsetBasis) -> RetargetProblem:
+        """The same problem over other splines."""
+        return replace(self, space=self.space.on_basis(basis))
 
     def over_motors(self, motors: IntArray, coupling: Array) -> RetargetProblem:
-        """The same problem without limits, linearised where this one was, over offsets of other motors, now zero.
+        """The same problem without limits over offsets of other motors.
 
         Args:
             motors, coupling: As of `OffsetSpace`.
         """
-        other = self._copy()
-        other.space = replace(self.space, motors=motors, coupling=coupling)
-        other.limits, other._response, other.preconditioner = None, None, None
-        other._sharpened_x, other.x = np.zeros(0), np.zeros(other.space.size)
-        return other
+        rigid = RigidRobot(self.model, self.grid, self.curves, self.world, coupling)
+        return replace(self, space=replace(self.space, motors=motors, coupling=coupling), limits=None, rigid=rigid)
+
+    def damped(self, ratio: float, frequency: float) -> RetargetProblem:
+        """The same problem without limits on robots with more damping, see `model.with_damping`."""
+        return replace(self, robots=tuple(robot.damped(ratio, frequency) for robot in self.robots), limits=None)
 
     @property
     def size(self) -> int:
-        """Number of unknowns."""
+        """Number of unknowns n."""
         return self.space.size
 
     @property
@@ -126,223 +140,157 @@ class RetargetProblem:
         return self.robots[0].model
 
     @property
-    def run(self) -> ForwardRun:
-        """The simulation of the point evaluated last, of the nominal robot."""
-        return self.robots[0].run
+    def objective(self) -> Objective:
+        """That of the nominal robot."""
+        return self.robots[0].objective
 
     @property
-    def error(self) -> float:
-        """Root-mean-square error of the point evaluated last, weighted [m]."""
-        return float(np.sqrt(several_robots.squared_errors(self.robots) / self._unit))
+    def world(self) -> Array | None:
+        """Moving roots, or None."""
+        return self.rigid.world
 
-    @property
-    def residuals(self) -> Array:
-        """Weighted residuals of the point evaluated last, robot after robot, shape [S T, R]."""
-        return several_robots.joined_residuals(self.robots)
-
-    @property
-    def _acting(self) -> LimitTerms | None:
-        """The limits where they are part of the merit now."""
-        return self.limits if self.limits is not None and self.limits.on else None
-
-    @property
-    def limits_act(self) -> bool:
-        """Whether limits are part of the merit now."""
-        return self._acting is not None
-
-    @property
-    def limited(self) -> dict[str, Array]:
-        """Values of the limited quantities at the point evaluated last, shape [T, M] each."""
-        if self._limited is None:
-            bounds = {} if self.limits is None else self.limits.bounds
-            self._limited = limited_values(
-                self.model, bounds.keys() & kinds_of_limits().keys(), self.changed_curves, self.run
-            )
-            if EFFORT in bounds:
-                self._limited |= several_robots.further_efforts(self.robots, self.changed_curves)
-            self._limited |= several_robots.on_ground(self.robots)
-        return self._limited
-
-    def hold(self, first: int) -> None:
-        """Keep the motor curves before an instant fixed from now on: see `Simulator.hold`."""
-        for robot in self.robots:
-            robot.simulator.hold(first)
-        if first < self._held and len(self._sharpened_x):
-            # responses from a later instant on say nothing of the coefficients that are free from now on
-            self.preconditioner, self._sharpened_x = None, np.zeros(0)
-        self._held = first
-
-    def forget(self) -> None:
-        """The next point is simulated from the start of the shot."""
-        for robot in self.robots:
-            robot.simulator.forget()
-
-    def value(self, x: Array) -> float:
-        """The merit: the objective and the terms of the limits; infinite if the simulation fails."""
-        values, rates = self.space.offsets(x)
-        angles, rates = self.curves.angles + values, self.curves.rates + rates
-        try:
-            in_parallel(lambda robot: robot.perform(angles, rates), self.robots)
-        except SimulationFailure as failure:
-            self.failure = failure
-            return np.inf
-        self.x = x.copy()
-        self._limited = None
-        return self.merit()
-
-    def merit(self) -> float:
-        """The merit at the point evaluated last, with the current multipliers."""
-        value, limits = self.objective_value(), self._acting
-        return value if limits is None else value + limits.value(self.limited)
-
-    @property
-    def changed_curves(self) -> Curves:
-        """The motors' curves at the point evaluated last."""
-        return self.space.changed(self.curves, self.x)
-
-    def objective_value(self) -> float:
-        """The objective at the point evaluated last, without the terms of the limits."""
-        return self.norm.value(self.residuals) + self.penalty_value(self.x)
-
-    def linearize(self) -> Array:
-        """Linearise at the point evaluated last, and the gradient there."""
-        in_parallel(Robot.linearize, self.robots)
-        self._linearized_x, self._ground_rows = self.x, {}
-        return self.gradient()
-
-    def linearized_at(self, x: Array) -> bool:
-        """Whether this is the point evaluated last, and linearised."""
-        return np.array_equal(x, self.x) and np.array_equal(x, self._linearized_x)
-
-    def gradient(self) -> Array:
-        """Gradient of the merit where it was linearised; the limits may have changed since."""
-        if self._continuous:
-            return self.continuous_gradient()
-        pulled = self.vjp(self.norm.gradient(self.residuals), self._limit_pulls())
-        return pulled + self.penalty_gradient(self.x)
-
-    def continuous_gradient(self) -> Array:
-        """The same by the continuous adjoint, which has its own linearisation and does not support limits of effort."""
-        pulls = several_robots.continuous_adjoints(self.robots)
-        return self._to_unknowns(*pulls, self._limit_pulls()) + self.penalty_gradient(self.x)
-
-    def _limit_pulls(self) -> dict[str, Array]:
-        limits = self._acting
-        return {} if limits is None else {name: limits.gradient(name, v) for name, v in self.limited.items()}
-
-    def vjp(self, residuals: Array, limited: dict[str, Array]) -> Array:
-        """The transpose of `jvp`: weighted residuals and limited quantities to the unknowns."""
-        return self._to_unknowns(*several_robots.adjoints(self.robots, residuals, limited), limited)
-
-    def _to_unknowns(self, by_value: Array, by_rate: Array, limited: dict[str, Array]) -> Array:
-        """Derivatives by the motors' values and rates, and by limited curves, shape [T, M], gathered by unknown."""
-        space = self.space
-        pulled = space.gather(space.basis.values, by_value) + space.gather(space.basis.rates, by_rate)
-        for name, spline in space.splines.items():
-            if name in limited:
-                pulled += space.gather(spline, limited[name])
-        return pulled
-
-    def jvp(self, direction: Array) -> tuple[Array, dict[str, Array]]:
-        """Change of the weighted residuals along a direction, shape [S T, R], and of the limited quantities."""
-        bounds, space = {} if self._acting is None else self._acting.bounds, self.space
-        residuals, efforts = several_robots.tangents(
-            self.robots, *space.offsets(direction), EFFORT in bounds, GROUND in bounds
-        )
-        changes = {name: space.spread(spline, direction) for name, spline in space.splines.items() if name in bounds}
-        return residuals, changes | efforts
-
-    def penalty_gradient(self, x: Array) -> Array:
-        """Gradient of the regulariser."""
-        return self.space.penalty_gradient(x)
-
-    def penalty_product(self, x: Array) -> Array:
-        """Matrix of the regulariser times x."""
-        return self.space.penalty_product(x)
-
-    def penalty_value(self, x: Array) -> float:
-        """The regulariser."""
-        return self.space.penalty_value(x)
-
-    def product(self, direction: Array) -> Array:
-        """Gauss-Newton matrix times a direction: one tangent and one adjoint sweep."""
-        residuals, changes = self.jvp(direction)
-        if self.limits is not None:
-            changes = {name: self.limits.curvature(name, self.limited[name]) * v for name, v in changes.items()}
-        return self.vjp(self.norm.product(self.residuals, residuals), changes) + self.penalty_product(direction)
-
-    def precondition(self, fixed: BoolArray, values: dict[str, Array] | None = None) -> Callable[[Array], Array]:
-        """The rigid robot's Gauss-Newton matrix, or that of `sharpen`, inverted over the entries that are not fixed.
-
-        Args:
-            values: Limited quantities, which say which limits act; None: at the point evaluated last.
-        """
-        response, acting = self._rigid(), self._acting
-        if self.preconditioner is None:
-            weights = several_robots.curved_weights(self.robots, self.norm, self.objective.weights)
-            self.preconditioner = RigidPreconditioner(response, weights, self.space.basis, self.space.penalty)
-        curvatures = {} if acting is None else acting.curvatures(values or self.limited)
-        curvatures |= several_robots.reversal_curvatures(self.robots)
-        self.preconditioner.factor(fixed, limit_metrics(response.inertia, self.space, curvatures))
-        of_feet = self._ground_rows, partial(self.vjp, np.zeros_like(self.residuals))
-        return with_ground_rows(self.preconditioner.solve, acting, values or self.limited, fixed, *of_feet)
-
-    @property
-    def patience(self) -> int | None:
-        """Number of products of one system from which `sharpen` pays; None where it is of no use here."""
-        if np.array_equal(self._sharpened_x, self.x):
-            return None
-        return products_worth(self.robots, self.space, first=not len(self._sharpened_x))
-
-    @property
-    def sharpened_at(self) -> Array:
-        """The point at which `sharpen` was called last; empty if it was not."""
-        return self._sharpened_x
-
-    def take(self, preconditioner: Preconditioner, point: Array) -> None:
-        """Precondition with a matrix of `sharpen` of almost the same problem, at a point."""
-        self.preconditioner, self._sharpened_x = preconditioner, point
-
-    def sharpen(self) -> None:
-        """Precondition with the Gauss-Newton matrix of the flexible robots where they are linearised, from now on."""
-        self.take(response_preconditioner(self.robots, self.space), self.x)
-
-    def damped(self, ratio: float, frequency: float) -> RetargetProblem:
-        """The same problem without limits on a robot with more damping, see `model.with_damping`."""
-        other = copy(self)
-        other.robots = tuple(robot.damped(ratio, frequency) for robot in self.robots)
-        other._limited, other.limits = None, None
-        return other
-
-    def lever(self) -> float:
-        """Largest lever arm of a motor: weighted root-mean-square motion of the targets per angle [m/rad]."""
-        weighted = self._rigid().targets * self.objective.weights[..., None]
-        return float(np.sqrt(np.max(np.sum(weighted**2, axis=(0, 1, 2))) / self._unit))
-
-    def rigid_gradient(self) -> Array:
-        """Gradient of the errors at the point evaluated last if the robot were rigid: each is answered as it occurs."""
-        residuals = sum(np.sqrt(robot.weight) * robot.residuals for robot in self.robots)
-        return rigid_gradient(self._rigid(), self.space, self.objective.weights, np.asarray(residuals))
-
-    def rigid_metric(self) -> Array:
-        """Second derivatives of the rigid robot's objective by the angles of the unknowns' motors, shape [T, m, m]."""
-        weighted = self._rigid().targets * self.objective.weights[..., None]
-        return np.asarray(np.einsum("nkia,nkib->nab", weighted, weighted))
-
-    def _rigid(self) -> RigidResponse:
-        if self._response is None:
-            self._response = rigid_response(self.model, self.grid, self.curves, self.world, self.space.coupling)
-        return self._response
+    @cached_property
+    def unit(self) -> float:
+        """Twice the objective of an error of one metre at every instant."""
+        targets = max(1, 3 * len(self.model.targets.component))
+        return max(float(np.sum(self.objective.weights**2)) / targets, 1e-300)
 
     def gain(self, decrease: float, value: float) -> float:
         """Decrease of the root-mean-square error that corresponds to a decrease of the merit [m]."""
-        now = np.sqrt(2.0 * max(value, 0.0) / self._unit)
-        return float(now - np.sqrt(2.0 * max(value - decrease, 0.0) / self._unit))
+        now = np.sqrt(2.0 * max(value, 0.0) / self.unit)
+        return float(now - np.sqrt(2.0 * max(value - decrease, 0.0) / self.unit))
+
+    def lever(self) -> float:
+        """Largest lever arm of a motor: weighted root-mean-square motion of the targets per angle [m/rad]."""
+        weighted = self.rigid.response.targets * self.objective.weights[..., None]
+        return float(np.sqrt(np.max(np.sum(weighted**2, axis=(0, 1, 2))) / self.unit))
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """What was computed at a point of a problem.
+
+    Attributes:
+        problem: The problem.
+        x: The point, shape [n].
+        runs: What each robot does there.
+    """
+
+    problem: RetargetProblem
+    x: Array
+    runs: tuple[RobotRun, ...]
+
+    @property
+    def run(self) -> ForwardRun:
+        """Of the nominal robot."""
+        return self.runs[0].run
+
+    @cached_property
+    def curves(self) -> Curves:
+        """Of the motors."""
+        return self.problem.space.changed(self.problem.curves, self.x)
+
+    @cached_property
+    def residuals(self) -> Array:
+        """Weighted residuals, robot after robot, shape [S T, R]."""
+        own = [run.residuals for run in self.runs]
+        return own[0] if len(own) == 1 else np.concatenate(own)
+
+    @cached_property
+    def limited(self) -> dict[str, Array]:
+        """Values of the limited quantities, shape [T, R] each."""
+        bounds = {} if self.problem.limits is None else self.problem.limits.bounds
+        orders = self.problem.space.orders
+        found = {name: self.curves.derivatives[order] for name, order in orders.items() if name in bounds}
+        for k, run in enumerate(self.runs):
+            named = {name: of_robot(name, k) for name in run.robot.limited}
+            found |= {key: run.robot.limited[name].values(run.run) for name, key in named.items() if key in bounds}
+        return found
+
+    @cached_property
+    def error(self) -> float:
+        """Root-mean-square error, weighted [m]."""
+        squared = sum(float(np.sum(run.errors**2)) for run in self.runs)
+        return float(np.sqrt(squared / self.problem.unit))
+
+    @cached_property
+    def objective_value(self) -> float:
+        """The objective, without the terms of the limits."""
+        return self.problem.norm.value(self.residuals) + self.problem.space.penalty_value(self.x)
+
+    @property
+    def acting(self) -> LimitTerms | None:
+        """The limits where they are part of the merit."""
+        return self.problem.limits if self.problem.limits is not None and self.problem.limits.on else None
+
+    @property
+    def limits_act(self) -> bool:
+        """Whether limits are part of the merit."""
+        return self.acting is not None
+
+    @cached_property
+    def merit(self) -> float:
+        """The objective and the terms of the limits that act."""
+        return self.objective_value + (0.0 if self.acting is None else self.acting.value(self.limited))
+
+    def of(self, problem: RetargetProblem) -> Evaluation:
+        """The same runs as a point of another problem of the same robots and unknowns: with other limits or norm."""
+        return Evaluation(problem, self.x, self.runs)
+
+    def with_robots(self, problem: RetargetProblem) -> Evaluation:
+        """The same motions of the robots of another problem, of which other quantities count."""
+        runs = (RobotRun(robot, run.run) for robot, run in zip(problem.robots, self.runs, strict=True))
+        return Evaluation(problem, self.x, tuple(runs))
+
+    def with_limits(self, limits: LimitTerms | None) -> Evaluation:
+        """The same runs under other limits."""
+        return self.of(replace(self.problem, limits=limits))
+
+    def tightened(self) -> Evaluation | None:
+        """With limits switched on if they are violated, or their multipliers updated; None if that changes nothing."""
+        limits = None if self.problem.limits is None else self.problem.limits.tightened(self.limited)
+        return None if limits is None else self.with_limits(limits)
+
+    def gain(self, decrease: float, value: float) -> float:
+        """Decrease of the root-mean-square error that corresponds to a decrease of the merit [m]."""
+        return self.problem.gain(decrease, value)
 
     def merit_of_gain(self, gain: float) -> float:
-        """Decrease of the merit that reduces the root-mean-square error by `gain` [m], from the current point."""
-        return float(self._unit * gain * max(self.error, gain))
+        """Decrease of the merit that reduces the root-mean-square error by `gain` [m], from here."""
+        return float(self.problem.unit * gain * max(self.error, gain))
 
-    def tighten(self) -> bool:
-        """Switch the limits on if they are violated, or update their multipliers; whether the merit changed."""
-        return self.limits is not None and self.limits.tighten(self.limited)
+    def rigid_gradient(self) -> Array:
+        """Gradient of the errors if the robot were rigid: each is answered as it occurs."""
+        problem, weights = self.problem, self.problem.objective.weights
+        residuals = sum(np.sqrt(run.robot.weight) * run.errors for run in self.runs)
+        return problem.rigid.gradient(problem.space, weights, np.asarray(residuals).reshape(weights.shape))
+
+    def linearized(self) -> LinearProblem:
+        """The derivatives here.
+
+        Raises:
+            SimulationFailure: A singular step.
+        """
+        problem = self.problem
+        robots = in_parallel(lambda run: run.linearized(problem.first), self.runs)
+        sweeps = Sweeps(robots, problem.space)
+        if problem.by_responses and Responses.can_be(robots, problem.space):
+            sweeps = Responses(robots, problem.space, problem.rigid.response.inertia)
+        return LinearProblem(
+            problem.space, problem.norm, problem.rigid, sweeps, self.x, self.residuals, self.acting,
+            self.limited if self.limits_act else {}, problem.continuous, problem.damping,
+        )  # fmt: skip
+
+
+def with_first_penalty(at: Evaluation, tolerance: float) -> Evaluation:
+    """The input in a problem whose limits have the penalty with which a search begins.
+
+    Args:
+        at: At the curves of the input.
+        tolerance: Acceptable error [m].
+    """
+    limits = at.problem.limits
+    if limits is None:
+        return at
+    value = max(at.objective_value, at.merit_of_gain(1e-3 * tolerance))
+    return at.with_limits(replace(limits, rho=FIRST_PENALTY * value / at.problem.grid.end))

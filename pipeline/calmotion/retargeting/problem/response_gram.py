@@ -20,7 +20,7 @@ from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.multibody.parallel import in_parallel
 from calmotion.multibody.sensitivity.linearization import spare_memory
 from calmotion.retargeting.problem.offset_space import OffsetSpace
-from calmotion.retargeting.problem.robot import Robot
+from calmotion.retargeting.problem.robot import LinearRobot
 from calmotion.retargeting.solver.dense_preconditioner import DensePreconditioner
 from calmotion.retargeting.solver.preconditioner import Preconditioner, banded_preconditioner
 
@@ -36,19 +36,19 @@ _OPERATIONS = 7e10  # of the factor of a matrix with bands: as many as with the 
 _SHARE = 0.5  # of the memory for a linearisation
 
 
-def products_worth(robots: Sequence[Robot], space: OffsetSpace, first: bool = False) -> int | None:
+def products_worth(robots: Sequence[LinearRobot], space: OffsetSpace, first: bool = False) -> int | None:
     """Number of products of one system from which the matrix pays; None where it cannot be made, or not be stored.
 
     Args:
         first: Whether there is none yet. Many unknowns then need it before the first product, unless it costs more than
             the products that would be tried.
     """
-    if not all(robot.simulator.can_be_blocked() for robot in robots):
+    if not all(robot.linear.can_be_blocked() for robot in robots):
         return None
     if is_whole(robots, space):
         cost = COST * space.size
         return 0 if first and space.size >= LARGE and cost <= LEAST else max(LEAST, round(cost))
-    instants, lasting = len(robots[0].residuals), _lasting(robots[0])
+    instants, lasting = len(robots[0].at.errors), _lasting(robots[0])
     bands = _bandwidth(space, lasting)
     slow = space.size * bands**2 > _OPERATIONS
     if 2 * lasting > instants or slow or 24.0 * space.size * bands > _SHARE * spare_memory():
@@ -57,7 +57,7 @@ def products_worth(robots: Sequence[Robot], space: OffsetSpace, first: bool = Fa
     return 0 if first else max(LEAST, round(OF_PART * space.size * lasting / instants))
 
 
-def response_preconditioner(robots: Sequence[Robot], space: OffsetSpace) -> Preconditioner:
+def response_preconditioner(robots: Sequence[LinearRobot], space: OffsetSpace) -> Preconditioner:
     """The preconditioner from the responses, with all entries of their matrix or with bands of them."""
     basis = space.basis
     if is_whole(robots, space):
@@ -65,14 +65,14 @@ def response_preconditioner(robots: Sequence[Robot], space: OffsetSpace) -> Prec
     return banded_preconditioner(response_bands(robots, space), basis, space.penalty)
 
 
-def is_whole(robots: Sequence[Robot], space: OffsetSpace) -> bool:
+def is_whole(robots: Sequence[LinearRobot], space: OffsetSpace) -> bool:
     """Whether the matrix may hold the entries of all unknowns with all others."""
     # robots follow one after the other: the responses of one are in memory at a time
-    rows = len(robots[0].residuals) * np.count_nonzero(_varying(robots[0]))
+    rows = len(robots[0].at.errors) * np.count_nonzero(_varying(robots[0]))
     return space.size <= _LARGEST and bool(8.0 * space.size * (rows + 3 * space.size) <= _SHARE * spare_memory())
 
 
-def response_gram(robots: Sequence[Robot], space: OffsetSpace) -> Array:
+def response_gram(robots: Sequence[LinearRobot], space: OffsetSpace) -> Array:
     """Matrix of the squared weighted residuals of all robots, linearised where they are, shape [n, n].
 
     Args:
@@ -85,7 +85,7 @@ def response_gram(robots: Sequence[Robot], space: OffsetSpace) -> Array:
     return gram
 
 
-def dense_responses(robot: Robot, space: OffsetSpace, instants: IntArray) -> NDArray[np.float32]:
+def dense_responses(robot: LinearRobot, space: OffsetSpace, instants: IntArray) -> NDArray[np.float32]:
     """Changes of the weighted residuals by the unknowns at some instants, shape [t, K, 6, n]."""
     places = _varying(robot)
     changes = np.zeros((len(instants), *places.shape, space.size), np.float32)
@@ -97,7 +97,7 @@ def dense_responses(robot: Robot, space: OffsetSpace, instants: IntArray) -> NDA
     return changes
 
 
-def response_bands(robots: Sequence[Robot], space: OffsetSpace, lasting: int | None = None) -> Array:
+def response_bands(robots: Sequence[LinearRobot], space: OffsetSpace, lasting: int | None = None) -> Array:
     """The same where each response ends some time after its unknown has acted, as lower bands, shape [bands, n].
 
     It is as definite as the whole matrix, since it is that of changes, although these are cut.
@@ -113,9 +113,9 @@ def response_bands(robots: Sequence[Robot], space: OffsetSpace, lasting: int | N
     return bands
 
 
-def _lasting(robot: Robot) -> int:
+def _lasting(robot: LinearRobot) -> int:
     """Instants for which responses of long shots are followed."""
-    return round(LASTING / robot.simulator.h)
+    return round(LASTING / robot.linear.h)
 
 
 def _spans(space: OffsetSpace, lasting: int) -> tuple[IntArray, IntArray]:
@@ -166,7 +166,7 @@ class _Responses:
         return part.reshape(-1, self.changes.shape[2]).astype(float)
 
 
-def _responses(robot: Robot, space: OffsetSpace) -> list[_Responses]:
+def _responses(robot: LinearRobot, space: OffsetSpace) -> list[_Responses]:
     """The responses to all unknowns, in blocks."""
     component, jacobian = _rows(robot)
     motors, basis = len(space.motors), space.basis
@@ -179,7 +179,7 @@ def _responses(robot: Robot, space: OffsetSpace) -> list[_Responses]:
     def made(k: int) -> _Responses:
         start, stop = k * step, min((k + 1) * step, basis.count)
         curves = values[:, start:stop].toarray(), rates[:, start:stop].toarray()
-        first, found = robot.simulator.responses(*curves, 0, space.coupling, component, jacobian)
+        first, found = robot.linear.responses(*curves, 0, space.coupling, component, jacobian)
         changes = held[k, : rows[0] * rows[1] * found.shape[2]].reshape(*rows, -1)[first:]
         changes[:] = found
         return _Responses(slice(start * motors, stop * motors), first, changes)
@@ -202,7 +202,7 @@ def _add_products(gram: Array, blocks: Sequence[_Responses]) -> None:
     in_parallel(add, range(len(blocks)))
 
 
-def _add_bands(bands: Array, robot: Robot, space: OffsetSpace, lasting: int) -> None:
+def _add_bands(bands: Array, robot: LinearRobot, space: OffsetSpace, lasting: int) -> None:
     """Add the products of responses that are followed for a time with each other to lower bands.
 
     A few blocks are worked on at once, and blocks that have ended are forgotten: memory does not grow with the shot.
@@ -216,7 +216,7 @@ def _add_bands(bands: Array, robot: Robot, space: OffsetSpace, lasting: int) -> 
         stop = min(start + step, basis.count)
         begin, end = max(0, int(starts[start:stop].min()) - 1), int(ends[start:stop].max())
         curves = tuple(part[:, start:stop][begin:end].toarray() for part in (values, rates))
-        first, found = robot.simulator.responses(curves[0], curves[1], begin, space.coupling, component, jacobian)
+        first, found = robot.linear.responses(curves[0], curves[1], begin, space.coupling, component, jacobian)
         return _Responses(slice(start * motors, stop * motors), first, found.astype(np.float32))
 
     def add(pair: tuple[_Responses, _Responses]) -> None:
@@ -236,14 +236,14 @@ def _add_bands(bands: Array, robot: Robot, space: OffsetSpace, lasting: int) -> 
         in_parallel(add, [(one, part) for part in new for one in active if one.unknowns.start <= part.unknowns.start])
 
 
-def _rows(robot: Robot) -> tuple[IntArray, Array]:
+def _rows(robot: LinearRobot) -> tuple[IntArray, Array]:
     """The component and the derivatives of each residual that is not always zero, shapes [r] and [T, r, N]."""
-    jacobian = robot.jacobian
+    jacobian = robot.errors.jacobian
     target, row = np.nonzero(_varying(robot))
-    component = np.asarray(robot.model.targets.component)[target].astype(np.int32)
+    component = np.asarray(robot.linear.model.targets.component)[target].astype(np.int32)
     return component, np.ascontiguousarray(jacobian[:, target, row])
 
 
-def _varying(robot: Robot) -> BoolArray:
+def _varying(robot: LinearRobot) -> BoolArray:
     """Which weighted residuals depend on the motion at any instant, shape [K, 6]."""
-    return np.asarray(np.any(robot.jacobian, axis=(0, 3)))
+    return np.asarray(np.any(robot.errors.jacobian, axis=(0, 3)))

@@ -1,137 +1,177 @@
-"""One robot of a retargeting problem: its simulation, the residuals of its targets and gears, and their derivatives."""
+"""One robot of a retargeting problem: what it does with motor curves, and the derivatives of that."""
 
 from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.multibody.model.model import Model, with_damping
-from calmotion.retargeting.problem.ground import GroundSlopes, ground_values
-from calmotion.retargeting.problem.reversals import ReversalTerms, transmitted_by
+from calmotion.retargeting.quantities.base import Quantity, RobotChange, Slopes
+from calmotion.retargeting.quantities.efforts import Efforts
+from calmotion.retargeting.quantities.target_errors import ErrorSlopes, TargetErrors
 from calmotion.simulation.forward import ForwardRun
-from calmotion.simulation.simulator import Simulator
-from calmotion.simulation.standing.ground_limits import GroundLimits
+from calmotion.simulation.simulator import LinearRun, Simulator
 from calmotion.simulation.target_errors import Objective
 
+EFFORT, GROUND = "effort", "ground"
 
+
+def of_robot(name: str, robot: int) -> str:
+    """The name of a limited quantity of one of the robots of a problem."""
+    return f"{name} of robot {robot}" if robot else name
+
+
+@dataclass(frozen=True, eq=False)
 class Robot:
     """A robot that performs the motor curves.
 
-    Args:
+    Attributes:
         simulator: Of the robot.
         objective: Errors at its targets.
-        weight: Of its squared errors among those of all robots of the problem.
+        weight: Of its squared residuals among those of all robots of the problem.
+        residuals: Of which the squares are made small beside those of the errors.
+        limited: What may have limits, by name, beside the curves; its efforts where nothing is given.
     """
 
-    def __init__(self, simulator: Simulator, objective: Objective, weight: float = 1.0):
-        self.simulator, self.objective, self.weight = simulator, objective, weight
-        self.residuals = self._inverse = self._jacobian = np.zeros(0)
-        self.reversals: ReversalTerms | None = None  # of the play of its gears, where reversals are to be avoided
-        self.ground: GroundLimits | None = None  # of what ground can do to its feet
-        self._ground_slopes: GroundSlopes | None = None  # where it was linearised last
-        self._efforts = np.zeros(0)  # transmitted by its gears, where they count
-        self._run: ForwardRun | None = None
+    simulator: Simulator
+    objective: Objective
+    weight: float = 1.0
+    residuals: tuple[Quantity, ...] = ()
+    limited: Mapping[str, Quantity] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if EFFORT not in self.limited:
+            object.__setattr__(self, "limited", {EFFORT: Efforts(self.model), **self.limited})
 
     @property
     def model(self) -> Model:
         """Its multibody system."""
         return self.simulator.model
 
-    @property
-    def run(self) -> ForwardRun:
-        """The simulation of the curves performed last."""
-        assert self._run is not None
-        return self._run
+    def perform(self, angles: Array, rates: Array, near: RobotRun | None = None) -> RobotRun:
+        """Simulate motor curves of shape [T, M].
 
-    @property
-    def jacobian(self) -> Array:
-        """Weighted residuals by their component's coordinates where it was linearised last, shape [T, K, 6, N]."""
-        return self._jacobian
-
-    def perform(self, angles: Array, rates: Array) -> None:
-        """Simulate motor curves of shape [T, M]; `residuals` are then the weighted errors, shape [T, K, 6].
+        Args:
+            near: From which the simulation goes on where the curves begin to differ.
 
         Raises:
             SimulationFailure: They cannot be simulated.
         """
-        self._run = self.simulator.run(angles, rates)
-        residuals, self._inverse = self.objective.residuals(self._run.target_positions, self._run.target_rotations)
-        self.residuals = np.sqrt(self.weight) * residuals
-        self.count(self.reversals)
-
-    def count(self, reversals: ReversalTerms | None) -> None:
-        """Count the play of its gears, where there are terms of it, for the curves performed last and from now on."""
-        self.reversals = reversals
-        if reversals is not None:
-            self._efforts = transmitted_by(self.model, self.run)
-
-    @property
-    def stacked(self) -> Array:
-        """Its R residuals at each instant, shape [T, R]: the weighted errors, and those of its gears' play."""
-        errors = self.residuals.reshape(len(self.residuals), -1)
-        if self.reversals is None:
-            return errors
-        return np.concatenate([errors, np.sqrt(self.weight) * self.reversals.residuals(self._efforts)], axis=1)
-
-    def by_effort(self) -> Array:
-        """Gauss-Newton matrix of the residuals of its gears' play by the efforts: its diagonal, shape [T, M]."""
-        assert self.reversals is not None
-        found = np.zeros(self._efforts.shape)
-        found[:, self.reversals.motors] = self.weight * self.reversals.slopes(self._efforts) ** 2
-        return found
-
-    def on_ground(self) -> Array:
-        """The limited quantities of its feet, `ground.ground_values`, for the curves performed last."""
-        assert self.ground is not None
-        return ground_values(self.ground, self.run, self.simulator.h)
-
-    def linearize(self) -> None:
-        """Linearise about the curves performed last."""
-        self.simulator.linearize(self.run)
-        self._differentiate()
-
-    def _differentiate(self) -> None:
-        states = self.run.trajectory.states
-        self._jacobian = self.objective.jacobian(states.c, states.q, states.u, self._inverse)
-        self._jacobian *= np.sqrt(self.weight)
-        if self.ground is not None:
-            self._ground_slopes = GroundSlopes.about(self.ground, self.run, self.simulator.h)
-
-    def tangent(self, values: Array, rates: Array, efforts: bool, ground: bool = False) -> tuple[Array, Array, Array]:
-        """Change of the residuals, shape [T, R], and where wanted of the motors' efforts and of the quantities of its
-        feet, with the motor curves, shape [T, M] each."""
-        slopes, on_ground = self._ground_slopes if ground else None, np.zeros((len(values), 0))
-        loads = None if slopes is None else np.zeros_like(self.run.trajectory.states.lam)
-        motion, effort = self.simulator.tangent(values, rates, efforts or self.reversals is not None, loads)
-        if slopes is not None and loads is not None:
-            on_ground = slopes.tangent(motion, loads)
-        errors = self.objective.gather(self._jacobian, motion)
-        errors = errors.reshape(len(errors), -1)
-        if self.reversals is None:
-            return errors, effort, on_ground
-        by_effort = np.sqrt(self.weight) * self.reversals.slopes(self._efforts)
-        return np.concatenate([errors, by_effort * effort[:, self.reversals.motors]], axis=1), effort, on_ground
-
-    def adjoint(self, residuals: Array, effort: Array | None, ground: Array | None = None) -> tuple[Array, Array]:
-        """The transpose of `tangent`: derivatives by the motors' values and rates, shape [T, M] each."""
-        count = int(np.prod(self.residuals.shape[1:]))
-        if self.reversals is not None:
-            slopes = np.sqrt(self.weight) * self.reversals.slopes(self._efforts)
-            effort = np.zeros(self._efforts.shape) if effort is None else effort.copy()
-            effort[:, self.reversals.motors] += slopes * residuals[:, count:]
-        errors = residuals[:, :count].reshape(self.residuals.shape)
-        gradient, loads = self.objective.scatter(self._jacobian, errors), None
-        if ground is not None and self._ground_slopes is not None:
-            loads = np.zeros_like(self.run.trajectory.states.lam)
-            self._ground_slopes.adjoint(ground, gradient, loads)
-        return self.simulator.adjoint(gradient, effort, loads)
-
-    def continuous_adjoint(self) -> tuple[Array, Array]:
-        """Derivatives of half the squared residuals by the continuous adjoint."""
-        self._differentiate()
-        return self.simulator.continuous_adjoint(self.run, self.objective.scatter(self._jacobian, self.residuals))
+        known = near.run if near is not None and near.robot.simulator is self.simulator else None
+        run = self.simulator.run(angles, rates, known)
+        return near if near is not None and near.run is run and near.robot is self else RobotRun(self, run)
 
     def damped(self, ratio: float, frequency: float) -> Robot:
-        """The robot with more damping, see `model.with_damping`; the play of its gears does not count."""
-        damped = with_damping(self.model, ratio, frequency)
-        return Robot(self.simulator.of(damped), self.objective, self.weight)
+        """The robot with more damping, see `model.with_damping`; only its errors count."""
+        return Robot(self.simulator.of(with_damping(self.model, ratio, frequency)), self.objective, self.weight)
+
+
+@dataclass(frozen=True, eq=False)
+class RobotRun:
+    """A robot and what it does with some curves."""
+
+    robot: Robot
+    run: ForwardRun
+    _linear: dict[int, LinearRobot] = field(default_factory=dict)  # the last one that was worked out, by its instant
+
+    @cached_property
+    def parts(self) -> tuple[Array, ...]:
+        """Weighted errors, shape [T, 6 K], and further residuals."""
+        quantities = (TargetErrors(self.robot.objective), *self.robot.residuals)
+        return tuple(np.sqrt(self.robot.weight) * quantity.values(self.run) for quantity in quantities)
+
+    @property
+    def errors(self) -> Array:
+        """Weighted errors, shape [T, 6 K]."""
+        return self.parts[0]
+
+    @cached_property
+    def residuals(self) -> Array:
+        """All weighted residuals, the errors first, shape [T, R]."""
+        return np.concatenate(self.parts, axis=1) if len(self.parts) > 1 else self.parts[0]
+
+    def linearized(self, first: int) -> LinearRobot:
+        """The derivatives by curves that do not change before an instant.
+
+        Raises:
+            SimulationFailure: A singular step.
+        """
+        if first in self._linear and self._linear[first].linear.is_held:
+            return self._linear[first]
+        robot, run = self.robot, self.run
+        linear, errors = robot.simulator.linearize(run, first), TargetErrors(robot.objective).slopes(run)
+        errors = ErrorSlopes(robot.objective, np.sqrt(robot.weight) * errors.jacobian)
+        self._linear.clear()
+        self._linear[first] = LinearRobot(
+            self, linear, errors, tuple(residual.slopes(run) for residual in robot.residuals),
+            {name: quantity.slopes(run) for name, quantity in robot.limited.items()},
+        )  # fmt: skip
+        return self._linear[first]
+
+    def continuous_adjoint(self) -> tuple[Array, Array]:
+        """Derivatives of half the squared errors by the continuous adjoint."""
+        objective, root = self.robot.objective, np.sqrt(self.robot.weight)
+        jacobian = TargetErrors(objective).slopes(self.run).jacobian
+        pulls = objective.scatter(root * jacobian, self.errors.reshape(jacobian.shape[:3]))
+        return self.robot.simulator.continuous(self.run).continuous_adjoint(pulls)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearRobot:
+    """The derivatives of what a robot does about a run.
+
+    Attributes:
+        at: The run.
+        linear: Of its motion.
+        errors: Of its weighted errors.
+        residuals, limited: Of further residuals, not weighted, and of limited quantities.
+    """
+
+    at: RobotRun
+    linear: LinearRun
+    errors: ErrorSlopes
+    residuals: tuple[Slopes, ...]
+    limited: Mapping[str, Slopes]
+    known: dict[str, Any] = field(default_factory=dict)  # `responses.Responses` keeps its rows here
+
+    def tangent(self, values: Array, rates: Array, names: Collection[str]) -> tuple[Array, dict[str, Array]]:
+        """Change of the weighted residuals, shape [T, R], and of some limited quantities, with the motor curves, shape
+        [T, M] each."""
+        robot = self.at.robot
+        efforts, loads = self._needs(names)
+        d_load = np.zeros_like(self.at.run.trajectory.states.lam) if loads else None
+        motion, effort = self.linear.tangent(values, rates, efforts, d_load)
+        change = RobotChange(motion, effort if efforts else None, d_load)
+        errors = self.errors.change(change)
+        others = [np.sqrt(robot.weight) * slopes.change(change) for slopes in self.residuals]
+        residuals = np.concatenate([errors, *others], axis=1) if others else errors
+        return residuals, {name: self.limited[name].change(change) for name in names}
+
+    def adjoint(self, residuals: Array, limited: Mapping[str, Array]) -> tuple[Array, Array]:
+        """The transpose of `tangent`: derivatives by the motors' values and rates, shape [T, M] each."""
+        run, root = self.at.run, np.sqrt(self.at.robot.weight)
+        efforts, loads = self._needs(limited)
+        pulls = RobotChange(
+            np.zeros((len(residuals), len(self.linear.model.system.parent), self.errors.jacobian.shape[3])),
+            np.zeros(run.commands.shape) if efforts else None,
+            np.zeros_like(run.trajectory.states.lam) if loads else None,
+        )
+        ends = np.cumsum([part.shape[1] for part in self.at.parts])
+        errors, *others = np.split(residuals, ends[:-1], axis=1)
+        self.errors.pull(errors, pulls)
+        for slopes, values in zip(self.residuals, others, strict=True):
+            slopes.pull(root * values, pulls)
+        for name, values in limited.items():
+            self.limited[name].pull(values, pulls)
+        return self.linear.adjoint(pulls.motion, pulls.efforts, pulls.loads)
+
+    def _needs(self, names: Collection[str]) -> tuple[bool, bool]:
+        """Whether the changes of efforts and of multipliers are needed for these limits and the residuals."""
+        robot = self.at.robot
+        used = [*robot.residuals, *(robot.limited[name] for name in names)]
+        return any(q.by_efforts for q in used), any(q.by_loads for q in used)

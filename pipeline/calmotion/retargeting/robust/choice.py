@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
 
 from calmotion.arrays import Array
-from calmotion.errors import ShotError
 from calmotion.model import Track
 from calmotion.model.robust.robots import Scenario
 from calmotion.model.robust.settings import WORST
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.robust.measure import deviations_on, errors_on
 from calmotion.retargeting.robust.scenarios import Parameter, scenario_at
+from calmotion.retargeting.robust.worst_case import beyond_simulation, largest_weighted
 from calmotion.simulation.compiled_shot import CompiledShot
 
 REACH = 3.0  # standard deviations of the farthest robots of a worst case: one of 370 is farther along a direction
-TRIED, STRETCH = 48, 1.25  # robots that are tried, so far off that their farthest ones are as far as those of 200
-ADDED = 2  # most of them that are added
-LARGER, ALIKE = 1.05, 0.5  # least error of those added over the largest known, and least distance over their own
-NEAR = 0.6  # least error, over the largest one, of robots that are tried once more: others are taken in in between
-_SEED = 20190705
 LEAST = 0.05  # weight of the nominal robot in a mean, where the rule would give it less
 
 
@@ -63,47 +60,54 @@ def chosen_scenarios(
     )
 
 
-def tried_robots(parameters: Sequence[Parameter]) -> Array:
-    """Random robots on which curves may be tried, in standard deviations of the parameters, shape [n, d].
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Random robots, from which those with the largest errors are taken; curves are measured on others.
 
-    They are not those on which curves are measured.
+    Attributes:
+        shot, options, parameters: The shot, the settings with the time step, and what is uncertain.
+        points: In standard deviations of the parameters, shape [n, d].
     """
-    return np.asarray(STRETCH * np.random.default_rng(_SEED).standard_normal((TRIED, len(parameters))))
 
+    shot: CompiledShot
+    options: RunSettings
+    parameters: Sequence[Parameter]
+    points: Array
 
-def worse_robots(
-    shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], parameters: Sequence[Parameter], known: float,
-    points: Array,
-) -> tuple[tuple[Scenario, ...], Array]:  # fmt: skip
-    """Those of some robots on which curves leave larger errors than on the known ones, and those that are near it.
+    COUNT: ClassVar[int] = 48
+    STRETCH: ClassVar[float] = 1.25  # so that the farthest ones are as far as those of 200
+    SEED: ClassVar[int] = 20190705
+    ALIKE: ClassVar[float] = 0.5  # least distance of two that are taken, over their own
+    LARGER: ClassVar[float] = 1.05  # least error of those that are added over the largest known
+    ADDED: ClassVar[int] = 2  # most of them
+    NEAR: ClassVar[float] = 0.6  # least error, over the largest one, of those that are tried once more
 
-    Args:
-        shot, options, parameters: As of `chosen_scenarios`.
-        tracks: Curves with the smallest largest error on the known robots.
-        known: That error as it weighs, see `largest_weighted` [m].
-        points: The robots to try, in standard deviations of the parameters, shape [n, d].
+    @classmethod
+    def of(cls, shot: CompiledShot, options: RunSettings, parameters: Sequence[Parameter]) -> Candidates:
+        """All of them."""
+        points = cls.STRETCH * np.random.default_rng(cls.SEED).standard_normal((cls.COUNT, len(parameters)))
+        return cls(shot, options, parameters, points)
 
-    Returns:
-        Some of them, to be known as well; and the points of others that are to be tried on the next curves, shape
-        [m, d].
-    """
-    tried = [scenario_at(parameters, x) for x in points]
-    found = largest_weighted(shot, errors_on(shot, options, {"": tracks}, tried)[""])
-    found = np.where(np.isfinite(found), found, 0.0)
-    picked: list[int] = []
-    for k in np.argsort(-found):
-        if found[k] <= LARGER * known or len(picked) == ADDED:
-            break
-        if all(np.linalg.norm(points[k] - points[j]) > ALIKE * np.linalg.norm(points[j]) for j in picked):
-            picked.append(int(k))
-    near = found > NEAR * max(known, found.max(initial=0.0))
-    near[picked] = False
-    return tuple(tried[k] for k in picked), points[near]
+    def worst(self, tracks: Sequence[Track], known: float) -> tuple[tuple[Scenario, ...], Candidates]:
+        """A few that are not alike on which curves leave larger errors than on known robots, and those that are near.
 
-
-def largest_weighted(shot: CompiledShot, errors: Array) -> Array:
-    """The largest error of any target as it weighs, shape [S], of errors of the targets, shape [S, K]."""
-    return np.asarray((errors * np.sqrt([t.position_weight for t in shot.character.targets])).max(axis=1))
+        Args:
+            tracks: Curves with the smallest largest error on the known robots.
+            known: That error as it weighs, see `largest_weighted` [m].
+        """
+        tried = [scenario_at(self.parameters, x) for x in self.points]
+        found = largest_weighted(self.shot, errors_on(self.shot, self.options, {"": tracks}, tried)[""])
+        found = np.where(np.isfinite(found), found, 0.0)
+        picked: list[int] = []
+        for k in np.argsort(-found):
+            x = self.points[k]
+            if len(picked) == self.ADDED or not found[k] > self.LARGER * known:
+                break
+            if all(np.linalg.norm(x - self.points[j]) > self.ALIKE * np.linalg.norm(self.points[j]) for j in picked):
+                picked.append(int(k))
+        near = found > self.NEAR * max(known, found.max(initial=0.0))
+        near[picked] = False
+        return tuple(tried[k] for k in picked), replace(self, points=self.points[near])
 
 
 def _equal(pairs: int) -> tuple[Array, Array]:
@@ -139,17 +143,6 @@ def _directions(
     axes = vectors[:, order].T
     signs = np.sign(axes[np.arange(len(axes)), np.argmax(np.abs(axes), axis=1)])
     return np.asarray(signs[:, None] * axes), np.asarray(sizes)
-
-
-def beyond_simulation(shot: CompiledShot, scenario: Scenario, reason: str = "") -> ShotError:
-    """The error that says that a robot is too different from the model to be simulated, and the reason."""
-    different = ", ".join(f"{name} times {factor:.3g}" for name, factor in scenario.factors.items() if factor != 1.0)
-    return ShotError(
-        f"a robot with {different} cannot be simulated" + (f": {reason}" if reason else ""),
-        path=shot.character.path,
-        attribute="calm:retarget:uncertainty",
-        remedy="Set a smaller uncertainty: the model is near buckling, or near another limit of what stands.",
-    )
 
 
 def _flat(deviations: Array | None) -> Array:

@@ -14,18 +14,13 @@ from calmotion.model.robust.robots import Compromise, Robustness, Scenario
 from calmotion.model.robust.settings import WORST
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import tolerance_of
+from calmotion.multibody.failure import SimulationFailure
 from calmotion.retargeting.found_curves import best_so_far
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.retargeting.robust.choice import (
-    beyond_simulation,
-    chosen_scenarios,
-    largest_weighted,
-    tried_robots,
-    worse_robots,
-)
+from calmotion.retargeting.robust.choice import Candidates, chosen_scenarios
 from calmotion.retargeting.robust.measure import errors_on, silent
 from calmotion.retargeting.robust.scenarios import Parameter, random_scenarios, uncertain_parameters
-from calmotion.retargeting.robust.worst_case import LeastMaximum, least_maximum
+from calmotion.retargeting.robust.worst_case import LeastMaximum, beyond_simulation, largest_weighted, least_maximum
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
@@ -89,21 +84,22 @@ def _worst(
     progress: Progress,
 ) -> LeastMaximum:  # fmt: skip
     """The smallest largest error over some robots, and those on which it turns out larger."""
-    parameters = uncertainties_of(shot)
-    points, found = tried_robots(parameters), least_maximum(shot, options, tracks, scenarios, allowed, progress)
-    for _ in range(SEARCHES - 1):
-        known = float(largest_weighted(shot, found.errors).max())
-        added, points = worse_robots(shot, options, found.tracks, parameters, known, points)
+    candidates, counts = Candidates.of(shot, options, uncertainties_of(shot)), np.zeros(3, int)
+    for _ in range(SEARCHES):
+        try:
+            found = least_maximum(shot, options, tracks, scenarios, allowed, progress)
+        except SimulationFailure as failure:
+            off = errors_on(shot, options, {"": shot.animation.tracks, "now": tracks}, scenarios)
+            worst = int(np.argmax(off[""].max(axis=1) + off["now"].max(axis=1)))
+            raise beyond_simulation(shot, scenarios[worst]) from failure
+        tracks, scenarios = found.tracks, found.scenarios
+        counts += found.search.evaluations, found.search.gradients, found.search.products
+        added, candidates = candidates.worst(tracks, float(largest_weighted(shot, found.errors).max()))
         if not added:
             break
-        latest = least_maximum(shot, options, found.tracks, (*found.scenarios, *added), allowed, progress)
-        found = replace(
-            latest,
-            evaluations=found.evaluations + latest.evaluations,
-            linearizations=found.linearizations + latest.linearizations,
-            sweeps=found.sweeps + latest.sweeps,
-        )
-    return found
+        scenarios = (*scenarios, *added)
+    evaluations, gradients, products = (int(count) for count in counts)
+    return replace(found, search=replace(found.search, evaluations=evaluations, gradients=gradients, products=products))
 
 
 def _simulated(shot: CompiledShot, options: RunSettings, worst: LeastMaximum, begin: tuple[float, float]) -> Result:
@@ -112,10 +108,10 @@ def _simulated(shot: CompiledShot, options: RunSettings, worst: LeastMaximum, be
     found = optimize_shot(shot.with_tracks(worst.tracks), as_they_are, silent, None, worst.scenarios)
     return replace(
         found,
-        iterations=worst.evaluations,
-        gradients=worst.linearizations,
-        linearized_sweeps=worst.sweeps,
-        forward_simulations=found.forward_simulations + worst.evaluations,
+        iterations=len(worst.search.history),
+        gradients=worst.search.gradients,
+        linearized_sweeps=2 * worst.search.products + worst.search.gradients,
+        forward_simulations=found.forward_simulations + worst.search.evaluations,
         wall_s=time.perf_counter() - begin[0],
         processor_s=time.process_time() - begin[1],
     )

@@ -10,7 +10,8 @@ import numpy as np
 
 from calmotion.arrays import IntArray
 from calmotion.model import Character
-from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.problem.linear_problem import LinearProblem
+from calmotion.retargeting.problem.problem import Evaluation
 from calmotion.simulation.inputs.gearing import coupling_of
 
 STEPS = 2  # of conjugate gradients
@@ -22,17 +23,18 @@ def idle_motors(character: Character) -> IntArray:
     return np.flatnonzero([m.optimize and m.idle and m.follows is None for m in character.motors]).astype(np.int32)
 
 
-def idle_gain(problem: RetargetProblem, character: Character) -> float | None:
+def idle_gain(at: Evaluation, linear: LinearProblem, character: Character) -> float | None:
     """Decrease of the root-mean-square error that the idle motors would bring [m]; None where there are none.
 
     Args:
-        problem: Linearised where its search ended; its state does not change.
+        at, linear: Where the search ended, and the problem linearised there.
     """
     motors = idle_motors(character)
     if not len(motors):
         return None
-    other = problem.over_motors(motors, coupling_of(character, motors))
-    residual = -other.gradient()
+    over = at.problem.over_motors(motors, coupling_of(character, motors))
+    other = linear.over(over.space, np.zeros(over.size), over.rigid)
+    residual = -other.gradient
     direction, square = residual, float(residual @ residual)
     decrease = 0.0
     for _ in range(STEPS):
@@ -45,4 +47,4 @@ def idle_gain(problem: RetargetProblem, character: Character) -> float | None:
         residual = residual - length * product
         before, square = square, float(residual @ residual)
         direction = residual + (square / before) * direction
-    return problem.gain(decrease, problem.objective_value())
+    return at.gain(decrease, at.objective_value)

@@ -24,7 +24,7 @@ from calmotion.arrays import Array, BoolArray
 from calmotion.model import Simplification
 from calmotion.retargeting.problem.adaptive_knots import halved
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
-from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
 from calmotion.retargeting.simplification.pruning import UNCHANGED
 from calmotion.retargeting.solver.gauss_newton import Search
 from calmotion.simulation.inputs.time_grid import TimeGrid
@@ -51,34 +51,35 @@ class InactiveInterval:
 
 
 def inactive_intervals(
-    problem: RetargetProblem, start: Array, frequency: float, tolerance: float, ranges: str = "auto"
+    at: Evaluation, start: Array, frequency: float, tolerance: float, ranges: str = "auto"
 ) -> tuple[InactiveInterval, ...]:
     """The inactive intervals of a shot; none in a cyclic shot, or where no coefficient is active.
 
     Args:
-        problem: Evaluated last at zero, the input.
+        at: Zero, the input.
         start: Where the search begins, shape [n]; functions with an offset there are active.
         frequency: Lowest frequency of the character [Hz].
         tolerance: Acceptable error [m].
         ranges: "auto", or "on": there are no inactive intervals.
     """
-    grid, basis = problem.grid, problem.space.basis
+    problem, grid, basis = at.problem, at.problem.grid, at.problem.space.basis
     if ranges == "on" or grid.cyclic or not frequency > 0.0:
         return ()
-    gradient = problem.rigid_gradient()
-    solved = problem.precondition(np.zeros(problem.size, bool))(gradient)
+    gradient, own = at.rigid_gradient(), problem.rigid.preconditioner(problem.space, problem.objective.weights)
+    own.factor(np.zeros(problem.size, bool))
+    solved = own.solve(gradient)
     gains = 0.5 * np.abs(gradient * solved).reshape(basis.count, -1).sum(axis=1)
     # the same decrease of the objective is a larger part of the error once the error is smaller
-    budget = problem.merit_of_gain(NEGLIGIBLE * tolerance) * min(1.0, tolerance / max(problem.error, tolerance))
+    budget = at.merit_of_gain(NEGLIGIBLE * tolerance) * min(1.0, tolerance / max(at.error, tolerance))
     order = np.argsort(gains)
     active = np.any(np.abs(start).reshape(basis.count, -1) > UNCHANGED, axis=1)
     active[order[np.cumsum(gains[order]) > budget]] = True
-    exceeding = grid.times[_exceeding(problem)]
+    exceeding = grid.times[_exceeding(at)]
     away = PERIODS / frequency
     needed = np.concatenate([basis.support[active], np.stack([exceeding, exceeding], axis=1)]) + [-away, away]
     if not len(needed):
         return ()
-    value = problem.objective_value()
+    value = at.objective_value
     return tuple(
         InactiveInterval(a, b, problem.gain(float(gains[_acting(basis, a, b)].sum()), value))
         for a, b in _gaps(needed, grid.end)
@@ -86,11 +87,11 @@ def inactive_intervals(
     )
 
 
-def _exceeding(problem: RetargetProblem) -> BoolArray:
-    """Instants at which the point evaluated last exceeds a limit, shape [T]."""
-    exceeded, limits = np.zeros(len(problem.grid.times), bool), problem.limits
+def _exceeding(at: Evaluation) -> BoolArray:
+    """Instants at which a point exceeds a limit, shape [T]."""
+    exceeded, limits = np.zeros(len(at.problem.grid.times), bool), at.problem.limits
     if limits is not None:
-        for name, values in problem.limited.items():
+        for name, values in at.limited.items():
             exceeded |= np.any(limits.gradient(name, values) != 0.0, axis=1)
     return exceeded
 
@@ -144,10 +145,8 @@ def with_gains(
 ) -> tuple[tuple[InactiveInterval, ...], Search]:
     """The intervals with their gains after a search, from one preconditioned gradient step of the linearised robot.
 
-    Only locked coefficients remain fixed in the problem afterwards.
-
     Args:
-        problem: Of the search.
+        problem: Of the search, in which only what the shot locks is fixed.
         search: Where it ended.
         intervals: The inactive intervals.
         locked_on: Maps a basis to the coefficients that the shot locks, shape [n], bool.
@@ -156,15 +155,15 @@ def with_gains(
         The intervals, and the search with this work counted.
     """
     basis, motors = problem.space.basis, len(problem.space.motors)
-    problem.hold(first_change(problem.grid, basis, locked_on))
-    problem.value(search.x)
+    at = problem.at(search.x, search.at)
+    linear = at.linearized()
     fixed = ~inactive_coefficients(basis, intervals, motors) | locked_on(basis)
-    gradient = np.where(fixed, 0.0, problem.linearize())
-    step = problem.precondition(fixed)(gradient)
-    curvature = float(step @ problem.product(step))
+    gradient = np.where(fixed, 0.0, linear.gradient)
+    step = linear.precondition(fixed, search.sharpened)(gradient)
+    curvature = float(step @ linear.product(step))
     slopes = np.abs(gradient * step).reshape(basis.count, motors).sum(axis=1)
     total = 0.5 * float(gradient @ step) ** 2 / curvature if curvature > 0.0 else 0.0
-    value = problem.objective_value()
+    value = at.objective_value
     shares = [
         float(slopes[_acting(basis, r.start, r.stop)].sum()) / max(float(slopes.sum()), 1e-300) for r in intervals
     ]

@@ -7,12 +7,13 @@ solution is the start of the next problem.
 
 from __future__ import annotations
 
-import numpy as np
+from contextlib import suppress
+from dataclasses import replace
 
-from calmotion.arrays import Array, BoolArray
-from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.arrays import BoolArray
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.retargeting.problem.problem import Evaluation
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
-from calmotion.retargeting.solver.recycling import Recycled
 
 FAR = 0.1  # error over the largest lever arm of a motor [rad] from which the homotopy is used
 DAMPING = (0.2, 0.05)  # damping ratios of the lowest mode
@@ -20,28 +21,28 @@ GAIN = 1e-3  # predicted gain that ends a stage, relative to the error at its st
 STEPS = 5  # most iterations of a stage
 
 
-def damping_homotopy(problem: RetargetProblem, start: Array, fixed: BoolArray, frequency: float) -> Search:
+def damping_homotopy(start: Evaluation, fixed: BoolArray, frequency: float) -> Search:
     """A search that begins at the given point, or at the result of the homotopy if the error there is large.
 
     Args:
-        problem: Evaluated last at the start.
-        start: Shape [n].
+        start: Where it begins.
         fixed: Unknowns that keep their values, shape [n].
         frequency: Lowest frequency of the character [Hz].
     """
+    problem, best = start.problem, start
     evaluations = gradients = products = 0
-    x = start
-    if problem.error > FAR * problem.lever() and frequency > 0.0:
+    if start.error > FAR * problem.lever() and frequency > 0.0:
         for ratio in DAMPING:
             damped = problem.damped(ratio, frequency)
-            if not np.isfinite(damped.value(x)):
-                continue
-            stage = minimize(damped, Search.start(x), fixed, GAIN * damped.error, max_iterations=STEPS)
-            x = stage.x
-            evaluations, gradients = evaluations + stage.evaluations + 1, gradients + stage.gradients
-            products += stage.products
+            evaluations += 1
+            with suppress(SimulationFailure):
+                there = damped.at(best.x)
+                stage = minimize(damped, Search.start(best.x, there), fixed, GAIN * there.error, max_iterations=STEPS)
+                best = stage.at
+                evaluations, gradients = evaluations + stage.evaluations, gradients + stage.gradients
+                products += stage.products
         # a result that is no better, or cannot be simulated, is not used
-        reached, before = problem.value(x), problem.value(start)
-        evaluations += 2
-        x = x if reached < before else start
-    return Search(x, np.inf, Recycled.none(len(x)), evaluations=evaluations, gradients=gradients, products=products)
+        evaluations += 1
+        reached = problem.tried(best.x)
+        best = start if reached is None or not reached.merit < start.merit else reached
+    return replace(Search.start(best.x, best), evaluations=evaluations, gradients=gradients, products=products)

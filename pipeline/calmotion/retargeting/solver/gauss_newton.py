@@ -3,60 +3,86 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray
-from calmotion.retargeting.solver.limited_step import LimitedProblem, LimitedStep, limited_step
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.retargeting.solver.limited_step import LimitedStep, LinearLimited, limited_step
+from calmotion.retargeting.solver.preconditioner import Sharpened
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.retargeting.solver.truncated_cg import Path, conjugate_gradients
 
 PAIRS = 24  # directions that are kept for the next system
 TRIES = 10  # most reductions of a step in one iteration
 SHARE = 0.01  # share of the decrease of an iteration at which conjugate gradients end
+LEFT = 0.1  # share of the gain that ends a search, which systems may leave: what they leave is not predicted
 ACCEPTED = 0.05  # smallest share of the predicted decrease for a step to be accepted
 
 
-class LeastSquares(LimitedProblem, Protocol):
-    """A problem min G(x), G = 1/2 |r(x)|^2 + quadratic, that can be linearised where it was last evaluated."""
+class Linear(LinearLimited, Protocol):
+    """A least-squares problem min G(x), G = 1/2 |r(x)|^2 + quadratic, linearised at a point."""
 
-    def value(self, x: Array) -> float:
-        """Merit at x; infinite where it cannot be evaluated."""
-
-    def linearize(self) -> Array:
-        """Gradient at the point last evaluated; products refer to the same point."""
+    @property
+    def gradient(self) -> Array:
+        """Gradient of the merit, shape [n]."""
 
     def product(self, direction: Array) -> Array:
         """Gauss-Newton matrix times a direction."""
 
+    def patience(self, sharpened: Sharpened | None) -> int | None:
+        """Number of products of one system from which `sharpened` pays; None where it is of no use here."""
+
+    def sharpened(self) -> Sharpened:
+        """A better preconditioner, from what is known here."""
+
+
+class Evaluated(Protocol):
+    """What was computed at a point; nothing of it changes."""
+
+    @property
+    def problem(self) -> Any:
+        """The problem, a `LeastSquares`."""
+
+    @property
+    def x(self) -> Array:
+        """The point, shape [n]."""
+
+    @property
+    def merit(self) -> float:
+        """G and the terms of limits that act."""
+
     @property
     def limits_act(self) -> bool:
-        """Whether limits are part of the merit now, so that `limited_step` finds the step."""
+        """Whether limits are part of the merit, so that `limited_step` finds the step."""
 
-    def merit(self) -> float:
-        """The merit at the point evaluated last, as it is now."""
+    def linearized(self) -> Any:
+        """The derivatives, a `Linear`."""
 
-    @property
-    def patience(self) -> int | None:
-        """Number of products of one system from which `sharpen` pays; None where it is of no use here."""
+    def with_limits(self, limits: Any) -> Any:
+        """The same point where other limits are part of the merit."""
 
-    def sharpen(self) -> None:
-        """Make the preconditioner better, where the problem is linearised."""
-
-    @property
-    def sharpened_at(self) -> Array:
-        """The point at which `sharpen` was called last; empty if it was not."""
+    def tightened(self) -> Any:
+        """At a minimum: the same point of a merit that changed because limits are violated; None if it does not."""
 
     def gain(self, decrease: float, value: float) -> float:
         """Decrease of the root-mean-square error that corresponds to a decrease of the merit [m]."""
 
     def merit_of_gain(self, gain: float) -> float:
-        """Decrease of the merit that corresponds to a gain [m], at the point evaluated last."""
+        """Decrease of the merit that corresponds to a gain [m]."""
 
-    def tighten(self) -> bool:
-        """Called at a minimum: whether the merit changed because limits are violated, so that the search continues."""
+
+class LeastSquares(Protocol):
+    """What can be evaluated."""
+
+    def at(self, x: Array, near: Any = None) -> Any:
+        """The `Evaluated` at a point; from what is known at another one, where that helps.
+
+        Raises:
+            SimulationFailure: It cannot be evaluated.
+        """
 
 
 @dataclass(frozen=True)
@@ -81,50 +107,58 @@ class Search:
         x: The best point, shape [n].
         radius: Of the trust region.
         recycled: Search directions of earlier linear systems.
+        sharpened: Preconditioner that was made on the way; None for the first one. Its point is of another size where
+            the unknowns have changed since.
         history: Iterates so far, first the start.
-        sharpened: Point of the problem's preconditioner (`LeastSquares.sharpen`), shape [n]; empty for the first one,
-            and of another size where the unknowns have changed since.
         evaluations, gradients, products: Counts.
         reason: Why it ended; empty while it runs.
+        at: What is known at the point, or at another one of the same robots.
     """
 
     x: Array
     radius: float
     recycled: Recycled
-    sharpened: Array = field(default_factory=lambda: np.zeros(0))
+    sharpened: Sharpened | None = None
     history: tuple[Iterate, ...] = ()
     evaluations: int = 0
     gradients: int = 0
     products: int = 0
     reason: str = ""
+    at: Any = None
 
     @classmethod
-    def start(cls, x: Array) -> Search:
+    def start(cls, x: Array, at: Any = None) -> Search:
         """A search that has not begun."""
-        return cls(x, np.inf, Recycled.none(len(x)))
+        return cls(x, np.inf, Recycled.none(len(x)), at=at)
 
 
 @dataclass
 class _Counter:
     """Calls of a problem."""
 
-    problem: LeastSquares
+    fixed: BoolArray
     evaluations: int = 0
     gradients: int = 0
     products: int = 0
-    fixed: BoolArray = field(default_factory=lambda: np.zeros(0, bool))
 
-    def value(self, x: Array) -> float:
+    def at(self, problem: LeastSquares, x: Array, near: Any) -> Any:
+        """The evaluation of a point; None where it cannot be evaluated."""
         self.evaluations += 1
-        return self.problem.value(x)
+        try:
+            return problem.at(x, near)
+        except SimulationFailure:
+            return None
 
-    def gradient(self) -> Array:
+    def gradient(self, linear: Linear) -> Array:
         self.gradients += 1
-        return np.where(self.fixed, 0.0, self.problem.linearize())
+        return np.where(self.fixed, 0.0, linear.gradient)
 
-    def product(self, d: Array) -> Array:
-        self.products += 1
-        return np.where(self.fixed, 0.0, self.problem.product(d))
+    def product(self, linear: Linear) -> Callable[[Array], Array]:
+        def times(d: Array) -> Array:
+            self.products += 1
+            return np.where(self.fixed, 0.0, linear.product(d))
+
+        return times
 
 
 def minimize(
@@ -135,82 +169,77 @@ def minimize(
     max_iterations: int = 30,
     max_products: int = 60,
     on_iterate: Callable[[Search], None] | None = None,
-    onto_limits: Callable[[Array], Array] | None = None,
+    onto_limits: Callable[[Any], tuple[Any, Array]] | None = None,
 ) -> Search:
     """Minimise over the entries that are not fixed.
 
     Args:
-        search: State to begin or to resume from.
+        search: State to begin or to resume from, whose point can be evaluated.
         fixed: Entries that keep their values, shape [n].
         gain: A smaller predicted gain ends the search [m].
         max_iterations: Most iterations, including those of the state.
         max_products: Most products of one iteration.
         on_iterate: Called with the search after every iteration.
-        onto_limits: The point from which to go on where limits begin to act, from that of the minimum without them.
+        onto_limits: The problem and the point with which to go on where limits begin to act, from the minimum without
+            them.
+
+    Raises:
+        SimulationFailure: The first point cannot be evaluated.
     """
-    calls = _Counter(problem, search.evaluations, search.gradients, search.products, fixed)
-    x, radius, recycled, history = search.x, search.radius, search.recycled, list(search.history)
-    eager = len(search.sharpened) > 0
-    if len(search.sharpened) == len(x) and not np.array_equal(search.sharpened, problem.sharpened_at):
-        calls.value(search.sharpened)  # a resumed search
-        calls.gradient()
-        problem.sharpen()
-    value = calls.value(x)
+    calls = _Counter(fixed, search.evaluations, search.gradients, search.products)
+    radius, recycled, history, sharpened = search.radius, search.recycled, list(search.history), search.sharpened
+    eager = sharpened is not None
+    if sharpened is not None and sharpened.preconditioner is None and len(sharpened.point) == len(search.x):
+        calls.evaluations, calls.gradients = calls.evaluations + 1, calls.gradients + 1  # a resumed search
+        sharpened = problem.at(sharpened.point).linearized().sharpened()
+    calls.evaluations += 1
+    at = problem.at(search.x, search.at)
+    if sharpened is not None and len(sharpened.point) != len(search.x):
+        sharpened = None
 
     def here(reason: str = "") -> Search:
-        return Search(
-            x, radius, recycled, problem.sharpened_at, tuple(history), calls.evaluations, calls.gradients,
-            calls.products, reason,
-        )  # fmt: skip
+        counts = calls.evaluations, calls.gradients, calls.products
+        return Search(at.x, radius, recycled, sharpened, tuple(history), *counts, reason, at)
 
     while True:
         if len(history) >= max_iterations:
-            history.append(Iterate(value, np.nan, np.nan, calls.evaluations, calls.products))
+            history.append(Iterate(at.merit, np.nan, np.nan, calls.evaluations, calls.products))
             return here("iteration limit")
-        gradient = calls.gradient()
+        linear = at.linearized()
+        gradient = calls.gradient(linear)
         norm = float(np.linalg.norm(gradient))
-        enough = problem.merit_of_gain(gain)
-        if problem.limits_act:
-            if (patience := problem.patience) is not None and _last_products(history) > patience:
-                problem.sharpen()
-            limited = limited_step(problem, fixed, SHARE, enough, max_products)
+        enough = LEFT * at.merit_of_gain(gain)
+        if at.limits_act:
+            if (patience := linear.patience(sharpened)) is not None and _last_products(history) > patience:
+                sharpened = linear.sharpened()
+            limited = limited_step(linear, fixed, SHARE, enough, max_products, sharpened)
             calls.products += limited.products
-            value, predicted = problem.merit(), limited.predicted(1.0)
+            at, predicted = at.with_limits(limited.limits), limited.predicted(1.0)
         else:
-            path = _path(problem, calls, gradient, recycled, radius, enough, max_products, eager)
+            path, sharpened = _path(linear, calls, gradient, (recycled, sharpened), radius, enough, max_products, eager)
             recycled = recycled.followed_by(path.p, path.Hp, PAIRS)
             _, predicted, _ = path.within(radius)
-        expected = problem.gain(predicted, value)
-        history.append(Iterate(value, norm, expected, calls.evaluations, calls.products))
+        expected = at.gain(predicted, at.merit)
+        history.append(Iterate(at.merit, norm, expected, calls.evaluations, calls.products))
         better = None
         if expected >= gain:
-            if problem.limits_act:
-                better = _limited_step(calls, x, value, limited)
-            else:
-                better = _step(calls, x, value, path, radius)
+            better = _limited_step(calls, at, limited) if at.limits_act else _step(calls, at, path, radius)
         if better is None:
-            if expected >= gain:
-                calls.value(x)  # the point evaluated last is that of a rejected step
-            acted = problem.limits_act
-            if problem.tighten():
-                if onto_limits is not None and not acted:
-                    x = _if_finite(calls, x, onto_limits(x))
-                value, radius = problem.merit(), np.inf
-                if on_iterate is not None:
-                    on_iterate(here())
-                continue
-            return here("converged" if expected < gain else "no further decrease")
-        x, value, radius = better
+            tightened = at.tightened()
+            if tightened is None:
+                return here("converged" if expected < gain else "no further decrease")
+            if onto_limits is not None and not at.limits_act:
+                tightened = _moved(calls, tightened, *onto_limits(tightened))
+            better = tightened, np.inf
+        at, radius = better
         if on_iterate is not None:
             on_iterate(here())
 
 
-def _if_finite(calls: _Counter, x: Array, other: Array) -> Array:
-    """Another point, or the same one where the other cannot be evaluated; it is the point evaluated last."""
-    if np.array_equal(other, x) or np.isfinite(calls.value(other)):
-        return other
-    calls.value(x)
-    return x
+def _moved(calls: _Counter, at: Any, problem: LeastSquares, x: Array) -> Any:
+    """Another point of another problem; the same point of that problem where the other cannot be evaluated."""
+    found = None if np.array_equal(x, at.x) else calls.at(problem, x, at)
+    return at.of(problem) if found is None else found
 
 
 def _last_products(history: list[Iterate]) -> int:
@@ -220,51 +249,52 @@ def _last_products(history: list[Iterate]) -> int:
 
 
 def _path(
-    problem: LeastSquares, calls: _Counter, gradient: Array, recycled: Recycled, radius: float, enough: float,
-    max_products: int, eager: bool,
-) -> Path:  # fmt: skip
-    """Conjugate gradients; if they take long, again with a better preconditioner.
+    linear: Linear, calls: _Counter, gradient: Array, known: tuple[Recycled, Sharpened | None], radius: float,
+    enough: float, max_products: int, eager: bool,
+) -> tuple[Path, Sharpened | None]:  # fmt: skip
+    """Conjugate gradients; if they take long, again with a better preconditioner, which is the second value.
 
     Args:
+        known: Directions of earlier systems, and the preconditioner so far.
         eager: Whether the first preconditioner has failed already.
     """
-    patience = problem.patience
-    if eager and patience is not None and not len(problem.sharpened_at):
-        problem.sharpen()
-        patience = None
+    recycled, sharpened = known
+    patience = linear.patience(sharpened)
+    if eager and patience is not None and sharpened is None:
+        sharpened, patience = linear.sharpened(), None
     for limit in (max_products if patience is None else min(patience, max_products), max_products):
-        inverse = recycled.inverse(problem.precondition(calls.fixed))
-        path = conjugate_gradients(calls.product, gradient, inverse, radius, SHARE, enough, limit)
+        inverse = recycled.inverse(linear.precondition(calls.fixed, sharpened))
+        path = conjugate_gradients(calls.product(linear), gradient, inverse, radius, SHARE, enough, limit)
         if len(path.p) < limit or limit == max_products:
             break
-        problem.sharpen()
-    return path
+        sharpened = linear.sharpened()
+    return path, sharpened
 
 
-def _limited_step(calls: _Counter, x: Array, value: float, limited: LimitedStep) -> tuple[Array, float, float] | None:
-    """The same under limits: the step is shortened until the simulation agrees with the model."""
+def _limited_step(calls: _Counter, at: Any, limited: LimitedStep) -> tuple[Any, float] | None:
+    """The point after a step under limits, which is shortened until the simulation agrees with the model."""
     t = 1.0
     for _ in range(TRIES):
-        merit, predicted = calls.value(x + t * limited.step), limited.predicted(t)
-        if predicted > 0.0 and value - merit > ACCEPTED * predicted:
-            return x + t * limited.step, merit, np.inf
+        there, predicted = calls.at(at.problem, at.x + t * limited.step, at), limited.predicted(t)
+        if there is not None and predicted > 0.0 and at.merit - there.merit > ACCEPTED * predicted:
+            return there, np.inf
         t *= 0.3
     return None
 
 
-def _step(calls: _Counter, x: Array, value: float, path: Path, radius: float) -> tuple[Array, float, float] | None:
-    """The point after a step in the trust region, its merit and the next radius; None if no step is accepted."""
+def _step(calls: _Counter, at: Any, path: Path, radius: float) -> tuple[Any, float] | None:
+    """The point after a step in the trust region, and the next radius; None if no step is accepted."""
     size = radius
     for _ in range(TRIES):
         step, predicted, length = path.within(size)
         if not predicted > 0.0:
             return None
-        merit = calls.value(x + step)
-        share = (value - merit) / predicted
+        there = calls.at(at.problem, at.x + step, at)
+        share = -np.inf if there is None else (at.merit - there.merit) / predicted
         if share > ACCEPTED:
             if share < 0.25:
-                return x + step, merit, 0.5 * length
+                return there, 0.5 * length
             grown = length >= 0.99 * size and share > 0.7
-            return x + step, merit, 2.5 * length if grown else max(size, 2.0 * length)
-        size = (0.1 if not np.isfinite(merit) else 0.25) * length
+            return there, 2.5 * length if grown else max(size, 2.0 * length)
+        size = (0.1 if there is None else 0.25) * length
     return None

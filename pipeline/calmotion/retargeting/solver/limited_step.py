@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray
 from calmotion.retargeting.solver.norm import Norm
+from calmotion.retargeting.solver.preconditioner import Sharpened
 from calmotion.retargeting.solver.truncated_cg import conjugate_gradients
 
 Values = dict[str, Array]
@@ -52,12 +53,25 @@ class Limits(Protocol):
     def curvature(self, name: str, v: Array) -> Array:
         """Second derivative of the terms where they act, shape of v."""
 
-    def update(self, values: Values) -> bool:
-        """New multipliers after a minimum; False, and no new ones, where all limits are kept."""
+    def updated(self, values: Values) -> Self | None:
+        """With new multipliers after a minimum; None where all limits are kept."""
 
 
-class LimitedProblem(Protocol):
-    """A least-squares problem with limits, linearised at the point x that was evaluated last; n unknowns."""
+class Regulariser(Protocol):
+    """A quadratic function of the unknowns."""
+
+    def penalty_gradient(self, x: Array) -> Array:
+        """Its gradient, shape [n]."""
+
+    def penalty_product(self, x: Array) -> Array:
+        """Its matrix times x, shape [n]."""
+
+    def penalty_value(self, x: Array) -> float:
+        """Its value."""
+
+
+class LinearLimited(Protocol):
+    """A least-squares problem with limits, linearised at a point x; n unknowns."""
 
     @property
     def x(self) -> Array:
@@ -76,8 +90,12 @@ class LimitedProblem(Protocol):
         """Values of the limited quantities there."""
 
     @property
-    def limits(self) -> Limits | None:
-        """The limits; None where there are none."""
+    def limits(self) -> Any:
+        """The limits that act, `Limits`; None where there are none."""
+
+    @property
+    def regulariser(self) -> Regulariser:
+        """Of the unknowns; it may hold steps back."""
 
     def jvp(self, direction: Array) -> tuple[Array, Values]:
         """Change of the residuals and of the limited quantities along a direction of shape [n]."""
@@ -85,17 +103,10 @@ class LimitedProblem(Protocol):
     def vjp(self, residuals: Array, limited: Values) -> Array:
         """The transpose of `jvp`, shape [n]."""
 
-    def penalty_gradient(self, x: Array) -> Array:
-        """Gradient of the regulariser, shape [n]."""
-
-    def penalty_product(self, x: Array) -> Array:
-        """Matrix of the regulariser times x, shape [n]."""
-
-    def penalty_value(self, x: Array) -> float:
-        """The regulariser."""
-
-    def precondition(self, fixed: BoolArray, values: Values | None = None) -> Callable[[Array], Array]:
-        """An approximate inverse of the Gauss-Newton matrix; values of the limited quantities say which limits act."""
+    def precondition(
+        self, fixed: BoolArray, sharpened: Sharpened | None = None, limits: Any = None, values: Values | None = None
+    ) -> Callable[[Array], Array]:
+        """An approximate inverse of the Gauss-Newton matrix; limits and values of their quantities say which act."""
 
 
 @dataclass(eq=False)
@@ -107,29 +118,33 @@ class LimitedStep:
         products: Number of products with the Gauss-Newton matrix.
         predicted: Decrease of the merit that the model predicts for a share of the step.
         eased: Decrease of the objective, without the terms of the limits.
+        limits: With the multipliers of the minimum.
     """
 
     step: Array
     products: int
     predicted: Callable[[float], float]
     eased: float
+    limits: Any
 
 
 class LimitedModel:
     """Residuals and limited quantities linear in the step, squared and penalised: a convex, piecewise quadratic merit.
 
     Args:
-        problem: Linearised at the point evaluated last.
+        linear: The problem at a point.
+        limits: With multipliers; None: those of the problem.
     """
 
-    def __init__(self, problem: LimitedProblem):
-        assert problem.limits is not None
-        self.problem, self.limits = problem, problem.limits
-        self.start = ModelPoint(np.zeros(len(problem.x)), problem.residuals, dict(problem.limited))
+    def __init__(self, linear: LinearLimited, limits: Limits | None = None):
+        self.linear, self.limits = linear, limits or linear.limits
+        self.start = ModelPoint(np.zeros(len(linear.x)), linear.residuals, dict(linear.limited))
 
     def objective(self, point: ModelPoint) -> float:
         """The objective, without the terms of the limits."""
-        return self.problem.norm.value(point.residuals) + self.problem.penalty_value(self.problem.x + point.step)
+        return self.linear.norm.value(point.residuals) + self.linear.regulariser.penalty_value(
+            self.linear.x + point.step
+        )
 
     def merit(self, point: ModelPoint) -> float:
         """The objective and the terms of the limits."""
@@ -138,13 +153,13 @@ class LimitedModel:
     def gradient(self, point: ModelPoint) -> Array:
         """Gradient of the merit, shape [n]."""
         pulls = {name: self.limits.gradient(name, v) for name, v in point.values.items()}
-        regularized = self.problem.penalty_gradient(self.problem.x + point.step)
-        return self.problem.vjp(self.problem.norm.gradient(point.residuals), pulls) + regularized
+        regularized = self.linear.regulariser.penalty_gradient(self.linear.x + point.step)
+        return self.linear.vjp(self.linear.norm.gradient(point.residuals), pulls) + regularized
 
     def slope(self, point: ModelPoint, direction: ModelPoint) -> float:
         """Slope of the merit along a direction."""
-        regularized = self.problem.penalty_gradient(self.problem.x + point.step)
-        errors = self.problem.norm.gradient(point.residuals)
+        regularized = self.linear.regulariser.penalty_gradient(self.linear.x + point.step)
+        errors = self.linear.norm.gradient(point.residuals)
         slope = float(np.sum(errors * direction.residuals)) + float(direction.step @ regularized)
         return slope + sum(
             float(np.sum(self.limits.gradient(name, v) * direction.values[name])) for name, v in point.values.items()
@@ -152,22 +167,24 @@ class LimitedModel:
 
 
 def limited_step(
-    problem: LimitedProblem, fixed: BoolArray, share: float, enough: float, max_products: int
-) -> LimitedStep:
+    linear: LinearLimited, fixed: BoolArray, share: float, enough: float, max_products: int,
+    sharpened: Sharpened | None = None,
+) -> LimitedStep:  # fmt: skip
     """The minimum of the model at the point that was linearised.
 
     Args:
-        problem: With limits that act; their multipliers are updated.
+        linear: With limits that act.
         fixed: Unknowns that keep their values, shape [n].
         share, enough: As `truncated_cg.conjugate_gradients` takes them.
         max_products: Most products of one solution.
+        sharpened: Preconditioner; None for that of the problem.
     """
-    model = LimitedModel(problem)
+    model = LimitedModel(linear)
     start = point = model.start
     gained, products = 0.0, 0
     for _ in range(INNER):
         gradient = np.where(fixed, 0.0, model.gradient(point))
-        direction, used = _newton_direction(model, point, gradient, fixed, share, enough, max_products)
+        direction, used = _newton_direction(model, point, gradient, fixed, (share, enough, max_products), sharpened)
         products += used
         t = _line_search(model, point, direction)
         before = model.merit(point)
@@ -176,8 +193,10 @@ def limited_step(
         gained += decrease
         if products > MOST * max_products:
             break
-        if decrease <= max(enough, share * gained) and not model.limits.update(point.values):
-            break
+        if decrease <= max(enough, share * gained):
+            if (updated := model.limits.updated(point.values)) is None:
+                break
+            model = LimitedModel(linear, updated)
 
     def predicted(t: float) -> float:
         there = ModelPoint(
@@ -187,27 +206,28 @@ def limited_step(
         )
         return model.merit(start) - model.merit(there)
 
-    return LimitedStep(point.step, products, predicted, model.objective(start) - model.objective(point))
+    eased = model.objective(start) - model.objective(point)
+    return LimitedStep(point.step, products, predicted, eased, model.limits)
 
 
 def _newton_direction(
-    model: LimitedModel, point: ModelPoint, gradient: Array, fixed: BoolArray, share: float, enough: float,
-    max_products: int,
+    model: LimitedModel, point: ModelPoint, gradient: Array, fixed: BoolArray, ends: tuple[float, float, int],
+    sharpened: Sharpened | None,
 ) -> tuple[ModelPoint, int]:  # fmt: skip
     """Direction to the minimum of the model with the active limits fixed, and the number of its products."""
-    problem = model.problem
+    linear = model.linear
     weights = {name: model.limits.curvature(name, v) for name, v in point.values.items()}
     changes: list[tuple[Array, Values]] = []
 
     def product(d: Array) -> Array:
-        residuals, values = problem.jvp(d)
+        residuals, values = linear.jvp(d)
         changes.append((residuals, values))
         weighted = {name: weights[name] * v for name, v in values.items()}
-        curved = problem.norm.product(point.residuals, residuals)
-        return np.where(fixed, 0.0, problem.vjp(curved, weighted) + problem.penalty_product(d))
+        curved = linear.norm.product(point.residuals, residuals)
+        return np.where(fixed, 0.0, linear.vjp(curved, weighted) + linear.regulariser.penalty_product(d))
 
-    inverse = problem.precondition(fixed, point.values)
-    path = conjugate_gradients(product, gradient, inverse, np.inf, share, enough, max_products)
+    inverse = linear.precondition(fixed, sharpened, model.limits, point.values)
+    path = conjugate_gradients(product, gradient, inverse, np.inf, *ends)
     direction = ModelPoint(
         path.steps[-1], np.zeros_like(point.residuals), {name: np.zeros_like(v) for name, v in point.values.items()}
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -94,6 +95,24 @@ class Preconditioner(Protocol):
 
     def solve(self, x: Array) -> Array:
         """The factor's inverse applied to a vector."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sharpened:
+    """A preconditioner from what was worked out at a point, shape [n]; None while only the point is known."""
+
+    point: Array
+    preconditioner: Preconditioner | None = None
+
+    def factor(self, fixed: BoolArray, terms: list[tuple[csr_matrix, Array]] | None = None) -> None:
+        """As of `Preconditioner`."""
+        assert self.preconditioner is not None
+        self.preconditioner.factor(fixed, terms)
+
+    def solve(self, x: Array) -> Array:
+        """As of `Preconditioner`."""
+        assert self.preconditioner is not None
+        return self.preconditioner.solve(x)
 
 
 class BandedPreconditioner:

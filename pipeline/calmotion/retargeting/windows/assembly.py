@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from calmotion.arrays import Array
 from calmotion.model import LimitUse, MotorCurve, OptimizerStep, Result, Simplification, Simulation, WindowRow
+from calmotion.model.limits.bounds import excesses, motor_bounds
 from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.posing import SMOOTHNESS, closeness_of
@@ -21,7 +22,6 @@ from calmotion.retargeting.windows.search import Found
 from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
-from calmotion.simulation.motor_limits import excesses, motor_bounds
 from calmotion.simulation.preparation import Prepared
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion
 from calmotion.simulation.target_errors import IntendedMotion, Objective

@@ -12,7 +12,7 @@ from calmotion.multibody.integrators.trajectory import Trajectory
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.model.system import State
 from calmotion.simulation.forward import ForwardRun, followed
-from calmotion.simulation.simulator import Simulator
+from calmotion.simulation.simulator import LinearRun, Simulator
 
 FEWEST = 4  # instants that BDF2 needs to go on exactly: two for the step, and two for the memory of the one before
 
@@ -79,22 +79,15 @@ class ContinuedSimulator(Simulator):
     def __init__(self, model: Model, h: float, world: Array, beginning: Beginning):
         super().__init__(model, h, world, False)
         self._roots, self._beginning = world, beginning
-        self._first = beginning.count
-
-    def hold(self, first: int) -> None:
-        """As of `Simulator`; what is known is held in any case."""
-        self._first = max(first, self._beginning.count)
 
     def of(self, model: Model) -> Simulator:
         """The same of another model of the same character, which begins in the same states."""
-        other = ContinuedSimulator(model, self.h, self._roots, self._beginning)
-        other._first = self._first
-        return other
+        return ContinuedSimulator(model, self.h, self._roots, self._beginning)
 
-    def run(self, angles: Array, rates: Array) -> ForwardRun:
+    def run(self, angles: Array, rates: Array, near: ForwardRun | None = None) -> ForwardRun:
         """As of `Simulator`."""
         joints = followed(self.model, angles, rates, self.h, False)
-        known, first = self._known, self._beginning.count
+        known, first = near, self._beginning.count
         if known is None:
             known = self._beginning.begun(self.model, self.h, self._roots, angles)
         else:
@@ -104,5 +97,8 @@ class ContinuedSimulator(Simulator):
                 return known
             changed = int(np.argmin(same))
             first = first if changed - 1 in known.trajectory.refined else changed
-        self._known = self._from(known, first, angles, joints)
-        return self._known
+        return self._from(known, first, angles, joints)
+
+    def linearize(self, run: ForwardRun, first: int = 0) -> LinearRun:
+        """As of `Simulator`; what is known does not change in any case."""
+        return super().linearize(run, max(first, self._beginning.count))

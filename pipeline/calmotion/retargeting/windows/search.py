@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray
+from calmotion.model.limits.bounds import motor_bounds
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.checkpoint import Checkpoint, problem_key
 from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.problem.adaptive_knots import first_breaks
-from calmotion.retargeting.problem.limits import FIRST_PENALTY, LimitTerms
+from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on, uniform_breaks
 from calmotion.retargeting.problem.offset_space import BaseOffsets, OffsetSpace
 from calmotion.retargeting.problem.posing import SMOOTHNESS, closeness_of, knot_spacing, locked_coefficients
-from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.problem.problem import RetargetProblem, with_first_penalty
 from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.search import RetargetSearch
 from calmotion.retargeting.solver.gauss_newton import Search
@@ -24,7 +25,6 @@ from calmotion.retargeting.windows.continued import Beginning, ContinuedSimulato
 from calmotion.retargeting.windows.parts import Part
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
-from calmotion.simulation.motor_limits import motor_bounds
 from calmotion.simulation.simulate import Progress
 from calmotion.simulation.target_errors import IntendedMotion, Objective
 
@@ -91,18 +91,13 @@ def search_window(
     problem, locked = _posed(part, curves, base, intended, beginning, setting)
     if problem is None:
         return None
-    problem.hold(0)
     start = np.zeros(problem.size)
-    if not np.isfinite(problem.value(start)):
-        assert problem.failure is not None
-        raise problem.failure
-    if problem.limits is not None:
-        value = max(problem.objective_value(), problem.merit_of_gain(1e-3 * setting.tolerance))
-        problem.limits.rho = FIRST_PENALTY * value / problem.grid.end
+    at = with_first_penalty(problem.at(start), setting.tolerance)
+    problem = at.problem
     options, animation, character = setting.options, prepared.shot.animation, prepared.character
     known = problem_key(problem, locked, (options, setting.tolerance, "window", part.first, problem.grid.continues))
     searched = RetargetSearch(
-        problem, Search.start(start), (), character, animation, options, setting.tolerance, setting.frequency,
+        at, Search.start(start), (), character, animation, options, setting.tolerance, setting.frequency,
         not knot_spacing(character, options), Checkpoint(setting.checkpoint, known), progress,
     )  # fmt: skip
     searched.run(start)
@@ -150,12 +145,12 @@ def _posed(
     smoothness = next(v for v in (options.smoothness, settings.smoothness, SMOOTHNESS) if v is not None)
     there = BaseOffsets(base.angles, base.accelerations, grid.h) if np.any(base.angles) else None
     objective = Objective.over(model, part.intended_of(intended), grid, prepared.shot.animation.weights)
-    problem = RetargetProblem(
+    problem = RetargetProblem.of_model(
         model, grid, part.curves_of(curves).plus(base.derivatives), objective,
         OffsetSpace(basis, motors, coupling, smoothness, closeness_of(character), there), prepared.world,
-        LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None,
+        LimitTerms.of(bounds, grid.judged, grid.h),
     )  # fmt: skip
     if beginning is not None:
         simulator = ContinuedSimulator(model, grid.h, prepared.world, beginning)
-        problem.robots = (Robot(simulator, objective),)
+        problem = replace(problem, robots=(Robot(simulator, objective),))
     return problem, locked

@@ -9,6 +9,7 @@ from calmotion.arrays import Array
 from calmotion.model import Animation, Character
 from calmotion.model.character import with_ideal_motors
 from calmotion.model.limits.base import CurveLimit
+from calmotion.model.limits.bounds import excesses, motor_bounds
 from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.model.limits.use import is_exceeded
 from calmotion.model.outputs import ExceededLimits
@@ -23,7 +24,6 @@ from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import ForwardRun, limited_values, run_forward
 from calmotion.simulation.inputs.curves import Curves, sample_curves
-from calmotion.simulation.motor_limits import excesses, motor_bounds
 from calmotion.simulation.preparation import Prepared, prepare
 from calmotion.simulation.report import limit_uses
 from calmotion.simulation.tempo import MOST_INSTANTS, MotorEfforts, TempoLimits, needed_tempo

@@ -1,6 +1,6 @@
 """The play of gears in the objective: gears should not change their sides for little, where the targets matter.
 
-A gear with play b lies on the side to which the torque tau that it transmits pushes it (`accuracy.motors.backlash`).
+A gear with play b lies on the side to which the torque tau that it transmits pushes it (`tolerance.motors.backlash`).
 With J the motion of the targets by the joint, weighted as their errors are, they move by |J| b where it changes its
 side. Some reversals cannot be avoided: a link that swings must be braked. Others are short, or hardly push. Sides
 sigma(t) = +1 or -1 that a gear should have are those of least
@@ -19,12 +19,17 @@ where a torque is far on the wrong side, r no longer depends on it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.multibody.analysis.reactions import reactions, transmitted
 from calmotion.multibody.model.model import Model
+from calmotion.retargeting.problem.offset_space import OffsetSpace
+from calmotion.retargeting.quantities.base import Quantity, RobotChange
+from calmotion.retargeting.quantities.efforts import Efforts
 from calmotion.simulation.forward import ForwardRun
 
 WIDTH = 0.05  # of a gear's largest torque in the input: within it the side changes smoothly
@@ -33,31 +38,61 @@ REVERSAL = 0.01  # what a reversal counts [s]: the largest torque on the wrong s
 
 
 @dataclass(frozen=True, eq=False)
-class ReversalTerms:
-    """Residuals of P motors with play, functions of the efforts that their gears transmit.
+class GearPlay(Quantity):
+    """Residuals of P motors with play, functions of the efforts that their gears transmit, R = P.
 
     Attributes:
+        model: The robot.
         motors: Their numbers, shape [P].
         sides: On which side each should lie, 1 or -1, shape [T, P].
         widths: w, the effort within which it changes its side [N m or N], shape [P].
         ways: sqrt(weight) |J| b / 2; 0 while a gear changes its side, shape [T, P].
     """
 
+    model: Model
     motors: IntArray
     sides: Array
     widths: Array
     ways: Array
+    by_efforts: ClassVar[bool] = True
 
-    def residuals(self, efforts: Array) -> Array:
-        """r for the efforts of all motors, shape [T, M] to [T, P]."""
-        return np.asarray(self.ways * (1.0 - self._side(efforts)))
+    def values(self, run: ForwardRun) -> Array:
+        """r."""
+        return np.asarray(self.ways * (1.0 - self._side(transmitted_by(self.model, run))))
 
-    def slopes(self, efforts: Array) -> Array:
-        """Derivative of each residual by the effort of its motor, shape [T, P]."""
-        return np.asarray(-self.ways * self.sides * (1.0 - self._side(efforts) ** 2) / self.widths)
+    def slopes(self, run: ForwardRun) -> PlaySlopes:
+        """By the effort of each motor."""
+        side = self._side(transmitted_by(self.model, run))
+        return PlaySlopes(self.motors, np.asarray(-self.ways * self.sides * (1.0 - side**2) / self.widths))
+
+    def rigid_metric(
+        self, weights: Array, run: ForwardRun, inertia: Array, space: OffsetSpace
+    ) -> tuple[csr_matrix, Array]:
+        """As that of efforts."""
+        squared = np.zeros(inertia.shape[:2])
+        squared[:, self.motors] = weights * self.slopes(run).by_effort ** 2
+        return Efforts(self.model).rigid_metric(squared, run, inertia, space)
 
     def _side(self, efforts: Array) -> Array:
         return np.asarray(np.tanh(self.sides * efforts[:, self.motors] / self.widths + 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class PlaySlopes:
+    """Derivatives of the residuals by the efforts of their motors, shape [T, P]."""
+
+    motors: IntArray
+    by_effort: Array
+
+    def change(self, by: RobotChange) -> Array:
+        """With the efforts."""
+        assert by.efforts is not None
+        return np.asarray(self.by_effort * by.efforts[:, self.motors])
+
+    def pull(self, values: Array, onto: RobotChange) -> None:
+        """By the efforts."""
+        assert onto.efforts is not None
+        onto.efforts[:, self.motors] += self.by_effort * values
 
 
 def transmitted_by(model: Model, run: ForwardRun) -> Array:
@@ -66,12 +101,13 @@ def transmitted_by(model: Model, run: ForwardRun) -> Array:
     return model.motor_values(transmitted(model.system, found))
 
 
-def reversal_terms(
-    play: Array, efforts: Array, h: float, judged: BoolArray, levers: Array, weight: float
-) -> ReversalTerms:
+def gear_play(
+    model: Model, play: Array, efforts: Array, h: float, judged: BoolArray, levers: Array, weight: float
+) -> GearPlay:
     """The terms of the motors that have play.
 
     Args:
+        model: The robot.
         play: Of all motors [rad or m], shape [M].
         efforts: That their gears transmit with the curves of the input, shape [T, M].
         h: Step [s].
@@ -86,7 +122,7 @@ def reversal_terms(
     wanted = np.stack([wanted_sides(share, h) for share in shares.T], axis=1)
     changing = np.stack([_changing(*pair) for pair in zip(wanted.T, shares.T, strict=True)], axis=1)
     ways = 0.5 * np.sqrt(weight) * np.sqrt(np.sum(levers**2, axis=(1, 2))) * play[motors]
-    return ReversalTerms(motors, wanted, WIDTH * np.where(largest > 0.0, largest, 1.0), np.where(changing, 0.0, ways))
+    return GearPlay(model, motors, wanted, WIDTH * np.where(largest > 0.0, largest, 1.0), np.where(changing, 0.0, ways))
 
 
 def wanted_sides(share: Array, h: float) -> Array:

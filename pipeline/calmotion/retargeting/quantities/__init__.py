@@ -1,0 +1,1 @@
+"""What a search makes small, and what it keeps within limits: one module for each kind."""
