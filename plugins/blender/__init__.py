@@ -5,7 +5,13 @@ from __future__ import annotations
 
 import bpy
 
-from .operators import CALMOTION_OT_cancel, CALMOTION_OT_optimize, CALMOTION_OT_worst_frame
+from .operators import (
+    CALMOTION_OT_cancel,
+    CALMOTION_OT_optimize,
+    CALMOTION_OT_pick_bone,
+    CALMOTION_OT_pick_selected,
+    CALMOTION_OT_worst_frame,
+)
 from .panel import CALMOTION_PT_panel
 from .preferences import CalmotionPreferences
 from .settings import CalmotionSettings
@@ -15,6 +21,8 @@ CLASSES = (
     CalmotionSettings,
     CALMOTION_OT_optimize,
     CALMOTION_OT_cancel,
+    CALMOTION_OT_pick_bone,
+    CALMOTION_OT_pick_selected,
     CALMOTION_OT_worst_frame,
     CALMOTION_PT_panel,
 )

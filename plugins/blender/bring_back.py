@@ -5,10 +5,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import bpy
 from mathutils import Matrix, Quaternion
+
+from .character import exported_name
 
 CHANGED = 2e-5  # a smaller difference counts as unchanged [rad or m]
 _PATHS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
@@ -30,9 +33,12 @@ def bring_back(context: bpy.types.Context, character: bpy.types.Object, root: Pa
     """
     scene, frame = context.scene, context.scene.frame_current
     before, names = set(bpy.data.objects), {kind: set(getattr(bpy.data, kind)) for kind in _KINDS}
+    # From 4.3 on the importer takes a unit of the scene for a metre; the layer has those of the scene.
+    converts = "apply_unit_conversion_scale" in bpy.ops.wm.usd_import.get_rna_type().properties
+    units = {"apply_unit_conversion_scale": False} if converts else {}
     bpy.ops.wm.usd_import(
         filepath=str(root), import_meshes=False, import_materials=False, import_cameras=False, import_lights=False,
-        set_frame_range=False,
+        set_frame_range=False, **units,
     )  # fmt: skip
     imported = [obj for obj in bpy.data.objects if obj not in before]
     try:
@@ -47,14 +53,15 @@ def bring_back(context: bpy.types.Context, character: bpy.types.Object, root: Pa
 def _put_on_bones(
     context: bpy.types.Context, armature: bpy.types.Object, imported: list[bpy.types.Object], frames: range
 ) -> list[str]:
-    source = _matching(imported, armature)
+    source = _matching(imported, armature).pose.bones
+    posed = {bone.name: source[exported_name(bone.name)] for bone in armature.pose.bones}
     new: dict[str, list[Quaternion]] = {bone.name: [] for bone in armature.pose.bones}
     old: dict[str, list[Quaternion]] = {bone.name: [] for bone in armature.pose.bones}
     for number in frames:
         context.scene.frame_set(number)
         for bone in armature.pose.bones:
-            new[bone.name].append(_basis(armature, source, bone.name).to_quaternion())
-            old[bone.name].append(_basis(armature, armature, bone.name).to_quaternion())
+            new[bone.name].append(_basis(armature, posed, bone.name).to_quaternion())
+            old[bone.name].append(_basis(armature, armature.pose.bones, bone.name).to_quaternion())
     changed = [name for name in new if max(map(_apart, old[name], new[name])) > CHANGED]
     data, action = _copied_action(armature)
     for name in changed:
@@ -68,8 +75,8 @@ def _put_on_objects(
 ) -> list[str]:
     """Imported transforms come from a cache file, so they are read frame by frame."""
     parts = [top, *top.children_recursive]
-    sources = {_exported_name(re.sub(r"\.\d{3}$", "", obj.name)): obj for obj in imported}
-    pairs = [(part, sources[_exported_name(part.name)]) for part in parts if _exported_name(part.name) in sources]
+    sources = {exported_name(re.sub(r"\.\d{3}$", "", obj.name)): obj for obj in imported}
+    pairs = [(part, sources[exported_name(part.name)]) for part in parts if exported_name(part.name) in sources]
     if not pairs:
         raise RuntimeError("the optimised layer contains no object of this character")
     new: dict[str, list[Matrix]] = {part.name: [] for part, _ in pairs}
@@ -95,11 +102,6 @@ def _put_on_objects(
     return changed
 
 
-def _exported_name(name: str) -> str:
-    """The name of an object as USD has it."""
-    return re.sub(r"\W", "_", name)
-
-
 def _differ(one: Matrix, other: Matrix) -> bool:
     far = (one.to_translation() - other.to_translation()).length
     return far > CHANGED or _apart(one.to_quaternion(), other.to_quaternion()) > CHANGED
@@ -109,16 +111,18 @@ _KINDS = ("armatures", "actions", "meshes", "materials")
 
 
 def _matching(imported: list[bpy.types.Object], armature: bpy.types.Object) -> bpy.types.Object:
-    wanted = set(armature.pose.bones.keys())
+    wanted = set(map(exported_name, armature.pose.bones.keys()))
+    if len(wanted) < len(armature.pose.bones):
+        raise RuntimeError("two bones have the same name but for dots and spaces, which USD does not allow: rename one")
     for obj in imported:
         if obj.type == "ARMATURE" and wanted <= set(obj.pose.bones.keys()):
             return obj
     raise RuntimeError("the optimised layer contains no armature with the bones of this one")
 
 
-def _basis(armature: bpy.types.Object, source: bpy.types.Object, name: str) -> Matrix:
-    """The transform of a bone from its rest, by the rests of the armature and the pose of the source."""
-    bone, posed = armature.data.bones[name], source.pose.bones
+def _basis(armature: bpy.types.Object, posed: Mapping[str, bpy.types.PoseBone], name: str) -> Matrix:
+    """The transform of a bone from its rest, by the rests of the armature and bones in a pose, by their names in it."""
+    bone = armature.data.bones[name]
     if bone.parent is None:
         return bone.matrix_local.inverted() @ posed[name].matrix
     rest = bone.parent.matrix_local.inverted() @ bone.matrix_local

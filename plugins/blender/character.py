@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import bpy
+
+_METERS_PER_UNIT = re.compile(r"^    metersPerUnit = .*$", re.MULTILINE)
 
 
 def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -34,11 +37,16 @@ def parts_of(character: bpy.types.Object) -> list[bpy.types.Object]:
     return parts + moved if character.type == "ARMATURE" else parts
 
 
+def exported_name(name: str) -> str:
+    """The name of a bone or an object as Blender's exporter writes it, since USD allows no dots (`arm.L`: `arm_L`)."""
+    return re.sub(r"^(?=\d)", "_", re.sub(r"\W", "_", name))
+
+
 def export_character(context: bpy.types.Context, character: bpy.types.Object, path: Path) -> Path:
-    """Write a character, with its animation, in metres; the selection stays unchanged."""
+    """Write a character, with its animation, in units of the scene; the selection stays unchanged."""
     active, selected = context.view_layer.objects.active, list(context.selected_objects)
     parts = parts_of(character)
-    # Before 4.3 the exporter does not convert, and writes the scene's scale as metersPerUnit.
+    # Before 4.3 the exporter writes the scene's scale as metersPerUnit; later it takes a unit of the scene for a metre.
     converts = "convert_scene_units" in bpy.ops.wm.usd_export.get_rna_type().properties
     units = {"convert_scene_units": "METERS"} if converts else {}
     try:
@@ -57,4 +65,8 @@ def export_character(context: bpy.types.Context, character: bpy.types.Object, pa
         for obj in selected:
             obj.select_set(True)
         context.view_layer.objects.active = active
+    if converts:
+        scale = context.scene.unit_settings.scale_length  # 0.01 in centimetres
+        text = path.read_text(encoding="utf-8")
+        path.write_text(_METERS_PER_UNIT.sub(f"    metersPerUnit = {scale:.9g}", text, count=1), encoding="utf-8")
     return path

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from .bring_back import bring_back
-from .character import character_of, export_character, is_animated
+from .character import character_of, export_character, exported_name, is_animated
 from .error_table import read_errors
 from .errors import show_errors, worst_frame
 from .pipeline import PipelineRun, job_for
@@ -85,7 +85,8 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
         shot = export_character(context, character, self._folder / "shot.usda")
         job = job_for(
             command, shot, self._folder, robot=bpy.path.abspath(settings.robot_layer) if settings.robot_layer else "",
-            material=settings.material, flexible=settings.flexible, tolerance=settings.tolerance,
+            material=settings.material, flexible=",".join(map(exported_name, picked_bones(settings))),
+            tolerance=settings.tolerance,
         )  # fmt: skip
         self._run = _RUNNING[context.scene.name] = PipelineRun(job).start()
         return self._run
@@ -117,6 +118,72 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
             preferences = preferences_of(context)
             if not (bpy.data.filepath and (preferences is None or preferences.keep_files)):
                 shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def picked_bones(settings: bpy.types.PropertyGroup) -> list[str]:
+    """The bones with flexible links; `all` for all."""
+    return [name.strip() for name in settings.flexible.split(",") if name.strip()]
+
+
+def _bones(self: bpy.types.Operator, context: bpy.types.Context) -> list[tuple[str, str, str]]:
+    """The bones to choose from; kept, since Blender does not keep the strings of a list."""
+    character = character_of(context)
+    bones = character.data.bones if character is not None and character.type == "ARMATURE" else ()
+    _bones.kept = [("all", "All bones", "")] + [(bone.name, bone.name, "") for bone in bones]
+    return _bones.kept
+
+
+class CALMOTION_OT_pick_bone(bpy.types.Operator):
+    """Make the link of a bone flexible, or rigid again"""
+
+    bl_idname = "calmotion.pick_bone"
+    bl_label = "Pick Bone"
+    bl_options = {"REGISTER", "UNDO"}
+    bl_property = "bone"
+
+    bone: bpy.props.EnumProperty(name="Bone", items=_bones)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether an armature is selected."""
+        character = character_of(context)
+        return character is not None and character.type == "ARMATURE"
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Search in the list of bones."""
+        context.window_manager.invoke_search_popup(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Add the bone, or remove it where it is there; `all` takes the place of all others."""
+        settings = context.scene.calmotion
+        names = [name for name in picked_bones(settings) if name != "all"]
+        if self.bone == "all":
+            names = ["all"]
+        elif self.bone in names:
+            names.remove(self.bone)
+        else:
+            names.append(self.bone)
+        settings.flexible = ", ".join(names)
+        return {"FINISHED"}
+
+
+class CALMOTION_OT_pick_selected(bpy.types.Operator):
+    """Make the links of the selected bones flexible, and all others rigid"""
+
+    bl_idname = "calmotion.pick_selected"
+    bl_label = "Selected Bones"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether bones are selected."""
+        return bool(context.selected_pose_bones)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Take their names."""
+        context.scene.calmotion.flexible = ", ".join(bone.name for bone in context.selected_pose_bones)
+        return {"FINISHED"}
 
 
 class CALMOTION_OT_worst_frame(bpy.types.Operator):

@@ -27,6 +27,9 @@ class CALMOTION_PT_panel(bpy.types.Panel):
         made.active = not settings.robot_layer
         made.prop(settings, "material")
         made.prop(settings, "flexible")
+        buttons = made.row(align=True)
+        buttons.operator("calmotion.pick_bone", icon="BONE_DATA")
+        buttons.operator("calmotion.pick_selected", icon="RESTRICT_SELECT_OFF")
         layout.prop(settings, "tolerance")
         layout.prop(settings, "show_errors")
         if command_of(context) is None:

@@ -46,17 +46,16 @@ class CalmotionSettings(bpy.types.PropertyGroup):
     )
     flexible: bpy.props.StringProperty(
         name="Flexible",
-        description="Names of the bones with flexible links, separated by commas, or all",
+        description="Bones with flexible links, separated by commas, or all; the buttons below it pick them",
         default="all",
     )
     tolerance: bpy.props.FloatProperty(
-        name="Tolerance",
-        description="Acceptable error at the targets",
+        name="Tolerance (m)",
+        description="Accuracy of the simulation at the targets in metres, whatever the units of the scene",
         default=0.001,
         min=1e-6,
         soft_max=0.1,
         precision=4,
-        unit="LENGTH",
     )
     show_errors: bpy.props.BoolProperty(
         name="Show Errors",

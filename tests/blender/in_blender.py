@@ -11,20 +11,27 @@ from mathutils import Quaternion, Vector
 BONES, LENGTH, WIDTH = ("root", "upper", "hand"), 0.4, 0.015
 
 
-def character(folder: Path) -> bpy.types.Object:
-    """An arm of three bones with a skin; the two outer ones wave."""
+def character(folder: Path, size: float = 1.0, names: tuple[str, str, str] = BONES) -> bpy.types.Object:
+    """An arm of three bones with a skin; the two outer ones wave.
+
+    Args:
+        folder: For the file.
+        size: Units of the scene in a metre: 100 in centimetres.
+        names: Of the bones.
+    """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
+    scene.unit_settings.scale_length = 1.0 / size
     scene.frame_start, scene.frame_end, scene.render.fps = 1, 25, 24
     from calmotion_extension.demo.arm import rigged
 
-    rig = rigged(BONES, Vector((0.0, 0.0, 1.0)), Vector((LENGTH, 0.0, 0.0)), tube())
+    rig = rigged(names, Vector((0.0, 0.0, size)), Vector((size * LENGTH, 0.0, 0.0)), tube(size))
     for frame in range(1, 26):
         turn = 2.0 * math.pi * (frame - 1) / 24.0
-        for name, angle in (("upper", 0.5 * math.sin(turn)), ("hand", 0.6 * (1.0 - math.cos(turn)))):
+        for name, angle in ((names[1], 0.5 * math.sin(turn)), (names[2], 0.6 * (1.0 - math.cos(turn)))):
             bone = rig.pose.bones[name]
-            bone.rotation_mode = "XYZ" if name == "hand" else "QUATERNION"
-            if name == "hand":
+            bone.rotation_mode = "XYZ" if name == names[2] else "QUATERNION"
+            if name == names[2]:
                 bone.rotation_euler = (angle, 0.0, 0.0)
                 bone.keyframe_insert("rotation_euler", frame=frame)
             else:
@@ -35,11 +42,12 @@ def character(folder: Path) -> bpy.types.Object:
     return rig
 
 
-def tube() -> bpy.types.Mesh:
-    """A closed box along x, in slices."""
+def tube(size: float) -> bpy.types.Mesh:
+    """A closed box along x, in slices; `size` units of the scene are a metre."""
     slices = 24
     xs = [len(BONES) * LENGTH * k / slices for k in range(slices + 1)]
-    points = [(x, y * WIDTH, 1 + z * WIDTH) for x in xs for y, z in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    points = [(size * x, size * y * WIDTH, size * (1 + z * WIDTH)) for x in xs for y, z in corners]
     sides = [(i, k, (k + 1) % 4) for i in range(slices) for k in range(4)]
     faces = [(4 * i + k, 4 * i + n, 4 * i + 4 + n, 4 * i + 4 + k) for i, k, n in sides]
     faces += [(3, 2, 1, 0), tuple(4 * slices + k for k in range(4))]
@@ -116,6 +124,27 @@ def check_errors(folder: Path, before: float, after: float) -> None:
     _show(bpy.context, folder / "scene_calmotion" / "errors.csv")
     again = [len(getattr(bpy.data, kind)) for kind in ("objects", "curves", "meshes", "actions", "collections")]
     assert again == blocks, "a second run takes the place of the first"
+
+
+def check_other_units_and_names(folder: Path) -> None:
+    """Scenes in centimetres and feet, and bones with dots, give what the scene in metres gives."""
+    found = {}
+    names = {"dots": ("Bone", "Bone.001", "hand.L")}
+    for kind, size in (("metres", 1.0), ("centimetres", 100.0), ("feet", 1.0 / 0.3048), ("dots", 1.0)):
+        rig = character(folder, size, names.get(kind, BONES))
+        settings, before = bpy.context.scene.calmotion, curves(rig.animation_data.action)
+        settings.flexible, settings.tolerance = "", 0.0005
+        for bone in names.get(kind, BONES)[1:]:
+            assert bpy.ops.calmotion.pick_bone(bone=bone) == {"FINISHED"}
+        assert bpy.ops.calmotion.optimize() == {"FINISHED"}, (kind, settings.status)
+        after = curves(rig.animation_data.action)
+        moved = max(abs(a - b) for path in before for a, b in zip(before[path], after[path], strict=True))
+        found[kind] = (*(float(part.split()[0]) for part in settings.status.split(" -> ")), moved)
+        print(kind, found[kind])
+    for kind, values in found.items():
+        assert all(abs(a - b) < 0.05 * b for a, b in zip(values, found["metres"], strict=True)), (kind, found)
+    assert bpy.ops.calmotion.pick_bone(bone="hand.L") == {"FINISHED"} and settings.flexible == "Bone.001"
+    assert bpy.ops.calmotion.pick_bone(bone="all") == {"FINISHED"} and settings.flexible == "all"
 
 
 def export_again(folder: Path) -> None:
@@ -249,6 +278,8 @@ def main() -> None:
         check_optimize(folder / "work")
         export_again(folder / "work")
         check_wrong_bone(folder / "work")
+        (folder / "units").mkdir()
+        check_other_units_and_names(folder / "units")
         check_objects(folder / "work")
         calmotion_extension.unregister()
         assert not hasattr(bpy.types.Scene, "calmotion") and not hasattr(bpy.types, "CALMOTION_OT_optimize")
