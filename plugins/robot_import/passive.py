@@ -24,14 +24,15 @@ from .robot_motors import Axis, axes_of, free_axes, is_driven, named
 if TYPE_CHECKING:
     from pxr import Usd
 
+_SLOW = 1e5  # time in which the spring beside a damper alone would pull a joint back [s]
 _KINDS = ("PhysicsRevoluteJoint", "PhysicsPrismaticJoint")
 
 
 def author_springs(stage: Usd.Stage, units: StageUnits) -> list[str]:
-    """Make drives of the springs of joints that no motor drives and that are in no closed chain.
+    """Make drives of the springs and dampers of joints that no motor drives and that are in no closed chain.
 
     The torque of such a drive, k (springref - theta) - d theta', is that of MuJoCo's joint. In a closed chain a rigid
-    robot could not hold all springs where they pull to.
+    robot could not hold all springs where they pull to. A damper alone gets a spring that hardly pulls within a shot.
 
     Args:
         stage: Where they are authored; motors are there already.
@@ -42,29 +43,40 @@ def author_springs(stage: Usd.Stage, units: StageUnits) -> list[str]:
     """
     radians = any(prim.GetAttribute("mjc:compiler:angle").Get() == "radian" for prim in prims_of(stage))
     joints = list(joint_prims(stage))
-    made, driven, others = [], [], []
+    free = {axis.prim for axis in free_axes([axis for prim in joints for axis in axes_of(prim)])}
+    made, damped, driven, others = [], [], [], []
     for prim in joints:
-        stiffness = prim.GetAttribute("mjc:stiffness")
-        if not (stiffness and stiffness.Get()):
-            continue
-        if prim.GetTypeName() not in _KINDS or _in_closed_chain(stage, prim, joints):
-            others.append(named(prim))
-        elif is_driven(axes_of(prim)[0]):
+        spring, damping = (_number(prim, name) for name in ("mjc:stiffness", "newton:damping"))
+        held = bool(axes_of(prim)) and is_driven(axes_of(prim)[0])
+        if held and spring:
             driven.append(named(prim))
+        elif held or not (spring or damping) or (axes_of(prim) and prim not in free):
+            continue
+        elif prim.GetTypeName() not in _KINDS or _in_closed_chain(stage, prim, joints):
+            others.append(named(prim))
         else:
             _author(prim, radians, units)
-            made.append(named(prim))
+            (made if spring else damped).append(named(prim))
     notes = []
     if made:
         notes.append(f"springs of joints are drives that hold one value and are not optimised: {', '.join(made)}")
+    if damped:
+        notes.append(f"dampers of joints without motors are drives that are not optimised: {', '.join(damped)}")
     if driven:
         notes.append(
             "springs of joints with motors are not read: efforts, and commands of motors that give, are without them: "
             f"{', '.join(driven)}"
         )
     if others:
-        notes.append(f"springs of ball joints and of joints in closed chains are not read: {', '.join(others)}")
+        notes.append(
+            f"springs and dampers of ball joints and of joints in closed chains are not read: {', '.join(others)}"
+        )
     return notes
+
+
+def _number(prim: Usd.Prim, name: str) -> float:
+    attribute = prim.GetAttribute(name)
+    return float(attribute.Get() or 0.0) if attribute else 0.0
 
 
 def author_locks(stage: Usd.Stage, units: StageUnits, locks: Mapping[str, float]) -> list[str]:
@@ -110,7 +122,7 @@ def passive_joints(stage: Usd.Stage, chosen: bool) -> list[str]:
     if free and not chosen:
         names = ", ".join(axis.name for axis in free)
         notes.append(f"joints that nothing in the file drives move freely: {names}; --motors all makes motors of them")
-    rough = [axis.name for axis in axes if not is_driven(axis) and _is_rough(axis)]
+    rough = [axis.name for axis in free if _is_rough(axis)]
     if rough:
         notes.append(f"damping, friction and rotors of joints without motors are not simulated: {', '.join(rough)}")
     return notes
@@ -125,20 +137,19 @@ def _is_rough(axis: Axis) -> bool:
 def _author(prim: Usd.Prim, radians: bool, units: StageUnits) -> None:
     from pxr import Sdf, UsdPhysics
 
-    axis = axes_of(prim)[0]
-    stiffness = float(prim.GetAttribute("mjc:stiffness").Get())
-    at = float(prim.GetAttribute("mjc:springref").Get() or 0.0)
+    axis, damping = axes_of(prim)[0], _number(prim, "newton:damping")
+    stiffness, at = _number(prim, "mjc:stiffness"), _number(prim, "mjc:springref")
     drive = UsdPhysics.DriveAPI.Apply(prim, axis.drive)
     if axis.linear:
-        drive.CreateStiffnessAttr(stiffness / units.force(1.0) * units.length(1.0))
+        stiffness *= units.length(1.0) / units.force(1.0)
         drive.CreateTargetPositionAttr(at / units.length(1.0))
     else:
-        drive.CreateStiffnessAttr(stiffness / units.torque(1.0) * np.radians(1.0))
+        stiffness *= np.radians(1.0) / units.torque(1.0)
         drive.CreateTargetPositionAttr(float(np.degrees(at)) if radians else at)
-    damping = prim.GetAttribute("newton:damping")
-    drive.CreateDampingAttr(float(damping.Get() or 0.0) if damping else 0.0)
+    drive.CreateStiffnessAttr(stiffness or damping / _SLOW)
+    drive.CreateDampingAttr(damping)
     if damping:
-        damping.Block()  # a servo would add it
+        prim.GetAttribute("newton:damping").Block()  # a servo would add it
     prim.AddAppliedSchema("CalmMotorAPI")
     for name, kind, value in (
         ("calm:motor:model", Sdf.ValueTypeNames.Token, "drive"),

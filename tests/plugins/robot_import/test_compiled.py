@@ -223,8 +223,17 @@ def test_actuators_of_a_group_that_is_switched_off_make_no_motors(tmp_path):
 
 
 def test_friction_of_a_joint_without_a_motor_is_noted(tmp_path):
-    made, _ = imported(tmp_path, robot(grip='damping="0.3"', tail=MOTOR.format("")))
+    made, _ = imported(tmp_path, robot(grip='frictionloss="0.3"', tail=MOTOR.format("")))
     assert any("joints without motors are not simulated: grip" in note for note in made.notes)
+
+
+def test_a_damper_of_a_joint_without_a_motor_is_a_drive_that_pulls_nowhere(tmp_path):
+    made, model = imported(tmp_path, robot(grip='damping="0.3"', tail=MOTOR.format("")))
+    damper = made.character.motors[1]
+    assert damper.path.endswith("grip") and damper.damping_on == "joint" and not damper.optimize
+    assert damper.velocity_gain == pytest.approx(model.dof_damping[1], rel=1e-6)
+    assert 0.0 < damper.position_gain < 1e-4 * damper.velocity_gain
+    assert any("dampers of joints without motors are drives" in note and "grip" in note for note in made.notes)
 
 
 def test_what_mujoco_does_not_load_is_refused_in_its_words(tmp_path):

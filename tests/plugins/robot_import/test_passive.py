@@ -1,4 +1,4 @@
-"""Springs of MuJoCo's joints hold what no motor drives."""
+"""Springs and dampers hold what no motor drives."""
 
 from __future__ import annotations
 
