@@ -62,7 +62,7 @@ class Export:
         rounded_loss: Of the same without delay.
         fastest: Largest speed of each target [m/s]: what a second of delay costs at most.
         lowest_rate: Lowest whole rate that keeps the tolerance [Hz]; None where none does, or it was not looked for.
-        tolerance: Acceptable error at the targets [m].
+        tolerance: Accuracy of the simulation at the targets [m].
         step: Of the simulations [s].
         simulations: Number of simulations.
         motors: Prim paths of the motors and the names of their joints in the file.

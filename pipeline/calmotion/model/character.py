@@ -261,7 +261,7 @@ class Target:
     rotation_weight: float = 0.0
 
 
-DEFAULT_TOLERANCE = 1e-3  # acceptable error at the targets where none is given [m]
+DEFAULT_TOLERANCE = 1e-3  # accuracy of the simulation at the targets where none is given [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,7 +269,7 @@ class RetargetSettings:
     """The shot's settings of the optimisation; None: chosen automatically.
 
     Attributes:
-        tolerance: Acceptable error at the targets [m].
+        tolerance: Accuracy of the simulation at the targets [m].
         time_step: Step of the simulation [s].
         knot_spacing: Distance of the spline's knots [s].
         smoothness: Weight of the regulariser.

@@ -263,7 +263,7 @@ class Result:
         idle_gain_m: By how much the root-mean-square error would fall with the motors that were left out of the search
             since they move no target [m]; None where there are none.
         resumed_iterations: Iterations of an interrupted search from which this one resumed.
-        tolerance_m: Acceptable error at the targets [m].
+        tolerance_m: Accuracy of the simulation at the targets [m].
         budget: What each approximation may cost and is estimated to cost, largest first; empty where it is not known.
         error_shares: What motors and links have in the error of the input; None where motors are ideal.
         lost_motion: What the play of gears would do to the input, and to the curves found; empty without play.

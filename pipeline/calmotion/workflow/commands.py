@@ -44,7 +44,7 @@ def simulate(
 
     Args:
         shot: The shot, or its USD file.
-        tolerance: Acceptable error at the targets, [m] or text with a unit (`"1mm"`); None: the shot's own.
+        tolerance: Accuracy of the simulation at the targets, [m] or text with a unit (`"1mm"`); None: the shot's own.
         step: Time step, [s] or text with a unit; None: from the tolerance.
         integrator: `bdf2`, `newmark`, `generalized-alpha`, `rk4` or `radau`; None: automatic.
         pre_roll: Time that eases into the motion, [s] or text with a unit; None: automatic.

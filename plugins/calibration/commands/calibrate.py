@@ -79,7 +79,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     command.add_argument(
         "--tolerance", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
-        help="acceptable error of the model at the targets, with a unit (1mm; default: the tolerance of the shot)",
+        help="accuracy of the simulation at the targets, with a unit (1mm; default: the tolerance of the shot)",
     )  # fmt: skip
     command.add_argument(
         "--integrator", metavar="NAME", help="bdf2, newmark or generalized-alpha (default: the last one)"

@@ -46,7 +46,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     prior_option(command)
     command.add_argument(
         "--tolerance", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
-        help="acceptable error at the targets, with a unit (1mm; default: the tolerance of the shot)",
+        help="accuracy of the simulation at the targets, with a unit (1mm; default: the tolerance of the shot)",
     )  # fmt: skip
     command.add_argument(
         "--step", metavar="TIME", type=quantity("s", positive=True), help="first time step of the calibration"

@@ -101,7 +101,7 @@ def calibrate(
         priors: Standard deviations of what is known before, by kind; relative ones, or SI of those about zero.
         by_motor_type: Motors of one type (`calm:motor:type`) share their parameters.
         validate: Hold out a fifth of the recordings, and compare it with the result.
-        tolerance: Acceptable error of the model at the targets, [m] or text with a unit; None: the shot's own.
+        tolerance: Accuracy of the simulation at the targets, [m] or text with a unit; None: the shot's own.
         step: First time step, [s] or text with a unit; it is halved until the estimates no longer depend on it.
         integrator: Of the simulations; None: automatic.
         figures: Folder for figures.
