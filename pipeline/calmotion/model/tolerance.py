@@ -12,7 +12,7 @@ SMALLEST = 1e-6  # of a character without extent [m]
 
 
 def tolerance_of(character: Character, requested: float | None = None) -> float:
-    """Accuracy of the simulation at the targets [m]: the requested one, else the shot's, else a thousandth of the reach."""
+    """Accuracy of the simulation at the targets [m]: as requested, or of the shot, or a thousandth of the reach."""
     return requested or character.retarget.tolerance or max(SHARE_OF_REACH * reach(character), SMALLEST)
 
 
