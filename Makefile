@@ -54,6 +54,8 @@ test: $(INSTALLED_DEV)
 	check ruff $(RUN) -m ruff check .; \
 	check format $(RUN) -m ruff format --check --quiet .; \
 	check mypy $(RUN) -m mypy; \
+	check "mypy for Windows" $(RUN) -m mypy --platform win32 --cache-dir .mypy_cache/win32; \
+	check "mypy for macOS" $(RUN) -m mypy --platform darwin --cache-dir .mypy_cache/darwin; \
 	check bandit $(RUN) -m bandit -q -ll -r pipeline plugins; \
 	check pytest $(RUN) -m pytest -n 2 -q; \
 	echo "== summary"; printf "$$summary"; exit $$status

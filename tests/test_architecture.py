@@ -257,3 +257,13 @@ def test_a_reason_is_read_above_a_function_and_in_its_first_lines():
     assert without_reason(f"def f():\n{body}") == ["f"]
     assert without_reason(body.join(["def f():\n", ""]).replace("    x", "    # long: one table\n    x", 1)) == []
     assert without_reason(f"def f():\n{body}    # long: too late\n    x = 2\n") == ["f"]
+
+
+def test_one_module_knows_operating_systems():
+    """Others name nothing that only some systems have: no Windows machine would tell."""
+    own = PACKAGE / "support" / "operating_system.py"
+    names = r"\bfcntl\b|\bimport resource\b|os\.(fork|getuid|geteuid|sched_\w+)\b|\bprctl\b"
+    names += r"|signal\.SIG(KILL|XCPU|HUP|QUIT|ALRM)\b|[\"'](/dev|/tmp|/proc/meminfo)\b"
+    sources = [path for root in (PACKAGE, PLUGINS) for path in root.rglob("*.py") if path != own]
+    assert len(sources) > 500
+    assert [str(path) for path in sources if re.search(names, path.read_text(encoding="utf-8"))] == []

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import rerun as rr
+from calmotion.support import PIPES
 
 _PIECE = 2**20  # read at once [bytes]
 
@@ -25,7 +26,7 @@ def saved(recording: rr.RecordingStream, file: Path) -> Iterator[None]:
     Raises:
         OSError, RuntimeError: It cannot be written.
     """
-    if not os.path.isdir("/dev/fd"):  # pipes have no names here
+    if not os.path.isdir(PIPES):  # pipes have no names here
         recording.save(str(file))
         yield
         recording.flush()
@@ -35,7 +36,7 @@ def saved(recording: rr.RecordingStream, file: Path) -> Iterator[None]:
     with ThreadPoolExecutor(1) as threads:
         copied = threads.submit(_copy, taken, file)
         try:
-            recording.save(f"/dev/fd/{given}")
+            recording.save(f"{PIPES}/{given}")
             yield
             recording.flush()
         finally:

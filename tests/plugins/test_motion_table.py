@@ -162,7 +162,7 @@ def test_arrays_that_would_fill_the_memory_are_not_made(read, tmp_path, monkeypa
     with pytest.raises(ShotError, match="not an NPZ file"):
         read("claims.npz", None)
     archive(tmp_path / "holds.npz", 10**6, bytes(8 * 10**6))
-    monkeypatch.setattr(memory, "_free_memory", lambda: 1e6)
+    monkeypatch.setattr(memory, "free_memory", lambda: 1e6)
     with pytest.raises(ShotError, match="GB are free"):
         read("holds.npz", None, rate=24.0)
 

@@ -10,11 +10,11 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from calmotion.support import locked
 from calmotion.support.files import (
     PREFIX,
     _machine,
     is_own,
-    locked,
     remove_abandoned,
     replaced,
     system_temporary,
@@ -183,8 +183,8 @@ def test_the_folder_for_temporary_files_is_one_that_takes_files_and_keeps_none(t
 
 def test_temporary_files_of_other_users_are_left_alone(tmp_path, monkeypatch):
     (tmp_path / f"{PREFIX}{_machine()}-999999999-x").mkdir()
-    user = os.getuid()
-    monkeypatch.setattr(os, "getuid", lambda: user + 1)
+    user = os.geteuid()
+    monkeypatch.setattr(os, "geteuid", lambda: user + 1)
     remove_abandoned(tmp_path)
     assert len(names(tmp_path)) == 1
 
@@ -218,7 +218,7 @@ def test_what_is_no_file_is_not_replaced(tmp_path, make):
 @pytest.mark.skipif(os.name == "nt", reason="folders are not locked there")
 def test_a_folder_is_locked_for_one_process_at_a_time_and_nothing_is_left(tmp_path):
     code = (
-        "import pathlib, sys, time\nfrom calmotion.support.files import locked\nfolder = pathlib.Path(sys.argv[1])\n"
+        "import pathlib, sys, time\nfrom calmotion.support import locked\nfolder = pathlib.Path(sys.argv[1])\n"
         "with locked(folder):\n    count = len(list(folder.iterdir()))\n    time.sleep(0.05)\n"
         "    (folder / str(count)).write_text('')\n"
     )

@@ -21,12 +21,6 @@ def test_a_container_limits_it(tmp_path, monkeypatch):
     assert memory.available_memory() > 2e6
 
 
-def test_little_free_memory_limits_it(tmp_path, monkeypatch):
-    (tmp_path / "meminfo").write_text("MemTotal: 9000 kB\nMemAvailable:   2000 kB\n")
-    monkeypatch.setattr(memory, "_MEMINFO", str(tmp_path / "meminfo"))
-    assert memory.available_memory() == 2048000.0
-
-
 def test_a_limit_of_the_address_space_counts():
     code = (
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (2**30, 2**30));"

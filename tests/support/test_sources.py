@@ -1,7 +1,7 @@
 """Hashes of sources: they change with every module that is imported, directly or not."""
 
 import pytest
-from calmotion.support.sources import digest_of, with_imports
+from calmotion.support.caching.sources import digest_of, with_imports
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from calmotion.host.errors import SettingError
 from calmotion.support.caching.cache_folder import CONFIGURATION_VARIABLE, configuration_folder
-from calmotion.support.files import locked, write_text
+from calmotion.support.files import write_text
+from calmotion.support.operating_system import locked
 from calmotion.support.reading import read_toml
 
 FILE_NAME = "plugins.toml"

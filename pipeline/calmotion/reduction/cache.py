@@ -22,7 +22,7 @@ from calmotion.model.result import Simplification
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
 from calmotion.support.caching.cache_folder import REDUCTIONS
 from calmotion.support.caching.caches import key_of, store_arrays, stored_arrays
-from calmotion.support.sources import source_digest
+from calmotion.support.caching.sources import source_digest
 
 T = TypeVar("T")
 

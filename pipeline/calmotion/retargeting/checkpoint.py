@@ -18,8 +18,8 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.gauss_newton import Iterate, Search
 from calmotion.retargeting.solver.preconditioner import Sharpened
 from calmotion.retargeting.solver.recycling import Recycled
+from calmotion.support.caching.sources import source_digest
 from calmotion.support.caching.verified_files import DamagedFileError, read_arrays, write_arrays
-from calmotion.support.sources import source_digest
 
 # The state of a search belongs to the code that computed it.
 _ROOMS = ("linear_algebra", "multibody", "retargeting", "simulation", "support")

@@ -31,6 +31,9 @@ from calmotion.simulation.inputs.shapers import delay as delay
 from calmotion.simulation.inputs.shapers import shaped as shaped
 from calmotion.simulation.inputs.supported import refuse_half_turns as refuse_half_turns
 from calmotion.simulation.inputs.supported import refuse_unsupported as refuse_unsupported
+from calmotion.simulation.inputs.tempo import MotorEfforts as MotorEfforts
+from calmotion.simulation.inputs.tempo import TempoLimits as TempoLimits
+from calmotion.simulation.inputs.tempo import needed_tempo as needed_tempo
 from calmotion.simulation.inputs.time_grid import MAX_STEP as MAX_STEP
 from calmotion.simulation.inputs.time_grid import TimeGrid as TimeGrid
 from calmotion.simulation.inputs.time_grid import over_grid as over_grid
@@ -48,6 +51,3 @@ from calmotion.simulation.simulate import shape_tracks as shape_tracks
 from calmotion.simulation.simulate import simulate_shot as simulate_shot
 from calmotion.simulation.simulator import Simulator as Simulator
 from calmotion.simulation.target_errors import Objective as Objective
-from calmotion.simulation.tempo import MotorEfforts as MotorEfforts
-from calmotion.simulation.tempo import TempoLimits as TempoLimits
-from calmotion.simulation.tempo import needed_tempo as needed_tempo

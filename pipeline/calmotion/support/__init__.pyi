@@ -4,7 +4,6 @@ from calmotion.support.caching.cache_folder import cache_folder as cache_folder
 from calmotion.support.compilation import kernel_folder as kernel_folder
 from calmotion.support.files import is_own as is_own
 from calmotion.support.files import is_special as is_special
-from calmotion.support.files import locked as locked
 from calmotion.support.files import refuse_special as refuse_special
 from calmotion.support.files import replaced as replaced
 from calmotion.support.files import temporary_folder as temporary_folder
@@ -19,6 +18,8 @@ from calmotion.support.memory import too_large as too_large
 from calmotion.support.naming import distinct_names as distinct_names
 from calmotion.support.naming import grouped_notes as grouped_notes
 from calmotion.support.naming import nearest as nearest
+from calmotion.support.operating_system import PIPES as PIPES
+from calmotion.support.operating_system import locked as locked
 from calmotion.support.reading import read_text as read_text
 from calmotion.support.reading import read_toml as read_toml
 from calmotion.support.time_columns import TIME_UNITS as TIME_UNITS

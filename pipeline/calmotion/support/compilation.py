@@ -28,8 +28,8 @@ from numba import config, njit
 from calmotion.errors import ShotError
 from calmotion.support.caching.cache_folder import KERNELS, cache_folder
 from calmotion.support.caching.caches import mark_used, prune
+from calmotion.support.caching.sources import digest_of, with_imports
 from calmotion.support.files import is_own
-from calmotion.support.sources import digest_of, with_imports
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

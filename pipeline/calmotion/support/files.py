@@ -16,8 +16,9 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from calmotion.support import operating_system
+
 PREFIX = ".calmotion-"  # of the names of temporary files
-_SYSTEM = ("proc", "sys")  # folders of the root whose files are the system's, as are those in /dev itself
 _ABANDONED = 3600.0  # a temporary file of another machine of that age [s] was left by a process that was killed
 _NAME = re.compile(re.escape(PREFIX) + r"([0-9a-f]{8})-(\d+)-")
 
@@ -95,7 +96,7 @@ def system_temporary() -> Path:
     """
     if tempfile.tempdir is None:
         # where everybody may write: names are random
-        for name in filter(None, (*map(os.environ.get, ("TMPDIR", "TEMP", "TMP")), "/tmp")):  # nosec B108
+        for name in filter(None, (*map(os.environ.get, ("TMPDIR", "TEMP", "TMP")), operating_system.TEMPORARY)):
             if os.path.isdir(name) and os.access(name, os.W_OK | os.X_OK):
                 tempfile.tempdir = os.path.abspath(name)
                 break
@@ -154,9 +155,10 @@ def refuse_special(path: str | os.PathLike[str]) -> None:
 
 def is_own(status: os.stat_result) -> bool:
     """Whether what has this status is of this user, or of the system, and no other user can write it."""
-    if not hasattr(os, "geteuid"):
+    owner = operating_system.owner()
+    if owner is None:
         return True
-    return status.st_uid in (0, os.geteuid()) and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return status.st_uid in (0, owner) and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def _refuse_devices(target: Path) -> None:
@@ -168,7 +170,8 @@ def _refuse_devices(target: Path) -> None:
     """
     refuse_special(target)
     folder = os.path.realpath(target.parent)
-    if folder == "/dev" or folder.split("/")[1:2] in ([top] for top in _SYSTEM):
+    devices, *others = operating_system.SYSTEM_FOLDERS
+    if folder == devices or any(folder == top or folder.startswith(f"{top}/") for top in others):
         raise OSError(errno.EINVAL, "This is a file of the system, which is never replaced", str(target))
 
 
@@ -187,26 +190,6 @@ def remove_abandoned(folder: Path) -> None:
                 path.unlink()
 
 
-@contextlib.contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Wait until no other process is in such a block with the same folder, which is there.
-
-    The lock is of the folder itself, so that no file of it is left, and ends with the process. Systems and file systems
-    that cannot lock a folder run the block at once.
-    """
-    descriptor = None
-    try:
-        with contextlib.suppress(ImportError, OSError):
-            import fcntl
-
-            descriptor = os.open(folder, os.O_RDONLY)
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        if descriptor is not None:
-            os.close(descriptor)
-
-
 def _own_prefix() -> str:
     """What the names of temporary files of this process begin with."""
     return f"{PREFIX}{_machine()}-{os.getpid()}-"
@@ -214,11 +197,11 @@ def _own_prefix() -> str:
 
 def _is_abandoned(path: Path) -> bool:
     state = path.lstat()
-    if hasattr(os, "getuid") and state.st_uid != os.getuid():  # in a folder that several users share
+    if operating_system.owner() not in (None, state.st_uid):  # in a folder that several users share
         return False
     name = _NAME.match(path.name)
     if name is not None and name[1] == _machine():
-        return not _runs(int(name[2]))
+        return not operating_system.runs(int(name[2]))
     return time.time() - state.st_mtime > _ABANDONED
 
 
@@ -230,19 +213,6 @@ def _machine() -> str:
     except OSError:  # no Linux
         numbers = 0
     return hashlib.sha256(f"{platform.node()} {numbers}".encode()).hexdigest()[:8]
-
-
-def _runs(process: int) -> bool:
-    """Whether a process of this machine runs; True where it cannot be told."""
-    if os.name == "nt":  # there, signal 0 ends a process
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        pass
-    return True
 
 
 def _flush(path: Path) -> None:

@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterable
 
 from calmotion.errors import ShotError
+from calmotion.support.operating_system import SHARED_MEMORY, SYSTEM_FOLDERS
 
 _HEAD = 4096  # bytes that tell the kind of a file
 _LFS = b"version https://git-lfs.github.com/spec/"  # first line of a pointer (git-lfs, docs/spec.md)
@@ -41,8 +42,6 @@ _KINDS = {
 # installed.
 _SCHEMES = ("http", "https", "ftp", "ftps", "sftp", "ssh", "scp", "smb", "cifs", "nfs", "dav", "davs", "webdav", "file",
             "data", "ldap", "telnet", "git", "ws", "wss")  # fmt: skip
-_SYSTEM = ("/dev", "/proc", "/sys")  # devices and processes
-_SHARED = "/dev/shm/"  # nosec B108  # memory that is used like a disk
 
 
 def forbidden_place(path: str) -> str | None:
@@ -59,8 +58,8 @@ def forbidden_place(path: str) -> str | None:
         return "a file of another machine is not opened"
     real = os.path.realpath(text) if os.path.isabs(text) else text
     for place in (os.path.normpath(text), real):
-        if not place.startswith(_SHARED) and any(
-            place == folder or place.startswith(f"{folder}/") for folder in _SYSTEM
+        if not place.startswith(SHARED_MEMORY) and any(
+            place == folder or place.startswith(f"{folder}/") for folder in SYSTEM_FOLDERS
         ):
             return "devices and files of the system are not opened"
     return None

@@ -18,7 +18,7 @@ import numba
 
 from calmotion.support.caching.bundled_kernels import FOLDER, BundledKernels, name_of
 from calmotion.support.caching.caches import store, stored
-from calmotion.support.files import locked
+from calmotion.support.operating_system import locked
 
 _FOR_KERNELS = "without an entrance for Python"
 

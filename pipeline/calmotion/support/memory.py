@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 
 from calmotion.errors import ShotError
+from calmotion.support import operating_system
+from calmotion.support.operating_system import address_limit, free_memory
 
 # Files with the limit and the use of memory [bytes] of a control group, of the second and the first version.
 _GROUPS = (
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
 )
-_MEMINFO = "/proc/meminfo"
 # What native libraries may ask for inside a stage [bytes]: buffers of OpenBLAS, which asks for ever where it gets none,
 # machine code, and stacks of threads.
 RESERVE = 128e6
@@ -21,18 +21,13 @@ RESERVE = 128e6
 
 def peak_memory() -> float:
     """Peak memory of this process [GB]; NaN where the system does not tell."""
-    try:
-        import resource
-    except ImportError:
-        return float("nan")
-    unit = 1.0 if sys.platform == "darwin" else 1024.0
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9
+    return operating_system.peak_memory() / 1e9
 
 
 def available_memory() -> float:
     """Memory that this process can still take without swapping [bytes]: what the machine has free, and what a container
     and the limit of the address space leave; infinite where the system does not tell."""
-    return min(_free_memory(), *(_group_memory(limit, use) for limit, use in _GROUPS), _address_space())
+    return min(free_memory(), *(_group_memory(limit, use) for limit, use in _GROUPS), _address_space())
 
 
 def too_large(path: str, factor: float) -> str:
@@ -53,26 +48,9 @@ def too_large(path: str, factor: float) -> str:
     )
 
 
-def _free_memory() -> float:
-    for line in _read(_MEMINFO).splitlines():
-        if line.startswith("MemAvailable:"):
-            return 1024.0 * float(line.split()[1])
-    return float("inf")
-
-
 def _group_memory(limit: str, use: str) -> float:
     allowed, used = _read(limit).strip(), _read(use).strip()
     return max(0.0, float(allowed) - float(used)) if allowed.isdigit() and used.isdigit() else float("inf")
-
-
-def address_limit() -> float:
-    """The limit of this process's address space (`ulimit -v`) [bytes]; infinite where there is none."""
-    try:
-        import resource
-    except ImportError:
-        return float("inf")
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    return float("inf") if limit == resource.RLIM_INFINITY else float(limit)
 
 
 def require_address_space(wanted: float, what: str) -> None:

@@ -18,6 +18,7 @@ from calmotion.errors import ShotError
 from calmotion.host import SettingError
 from calmotion.support import Fault, answer, try_writing, write_text
 from calmotion.workflow import LOCAL, Progress, executor_on, finished, plain, refuse_unknown_place, result_of
+from filelock import FileLock, Timeout
 
 from .attempt import attempt, attempts, kill_running, stored_report
 from .jobs import EXTRAS, LOGS, Job, forget, is_done, jobs_for
@@ -188,16 +189,14 @@ def _alone(folder: str) -> Iterator[None]:
     Raises:
         ShotError: Another batch holds it.
     """
+    lock = FileLock(os.path.join(folder, LOCK), timeout=0)
     try:
-        import fcntl
-    except ImportError:  # a system without such locks
+        lock.acquire()
+    except Timeout as error:
+        raise ShotError(
+            "another batch runs in this folder", path=folder, remedy="Wait for its end, or choose another folder"
+        ) from error
+    try:
         yield
-        return
-    with open(os.path.join(folder, LOCK), "w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise ShotError(
-                "another batch runs in this folder", path=folder, remedy="Wait for its end, or choose another folder"
-            ) from error
-        yield
+    finally:
+        lock.release()

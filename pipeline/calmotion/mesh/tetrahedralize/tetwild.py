@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import resource
-import signal
-import subprocess
 import sys
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -20,6 +16,7 @@ from calmotion.mesh.tetrahedralize.flat_tets import unflattened
 from calmotion.support.caching.cache_folder import MESHES
 from calmotion.support.caching.caches import key_of, store_arrays, stored_arrays
 from calmotion.support.files import temporary_folder
+from calmotion.support.operating_system import TimeExceeded, run_limited
 
 REMEDY = "Simplify or repair the Mesh, author a larger calm:flexible:elementSize, or give a TetMesh or a mesh file"
 MORE_TIME = ", or allow more with --set fe.mesh.time_limit={:.0f}"
@@ -206,26 +203,13 @@ def _limited(command: list[str], folder: Path, time: ProcessorTime, size: str, p
         size: Of the surface, for errors.
         path: Prim path of the body.
     """
-    left = max(int(np.ceil(time.limit - time.used)), 1)
-    with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=folder
-    ) as process:
-        with contextlib.suppress(ProcessLookupError):  # it has ended
-            _, hard = resource.prlimit(process.pid, resource.RLIMIT_CPU)
-            allowed = left if hard == resource.RLIM_INFINITY else min(left, hard)
-            resource.prlimit(process.pid, resource.RLIMIT_CPU, (allowed, hard))
-            resource.prlimit(process.pid, resource.RLIMIT_CORE, (0, 0))  # no core file of the signal at the limit
-        try:
-            _, messages = process.communicate(timeout=_PATIENCE * left)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            raise ShotError(
-                "the tetrahedraliser does not end", path=path,
-                found=f"{size}, {_PATIENCE * left:g} s without using {left} s of processor time", remedy=REMEDY,
-            ) from None  # fmt: skip
-        except BaseException:  # an interrupt
-            process.kill()
-            raise
-        if process.returncode == -signal.SIGXCPU:
-            raise _out_of_time(size, path, time)
-        return process.returncode, messages
+    left = max(time.limit - time.used, 1.0)
+    try:
+        return run_limited(command, folder, left, _PATIENCE * left)
+    except TimeExceeded as error:
+        if error.processor:
+            raise _out_of_time(size, path, time) from None
+        raise ShotError(
+            "the tetrahedraliser does not end", path=path,
+            found=f"{size}, {_PATIENCE * left:g} s without using {left:.0f} s of processor time", remedy=REMEDY,
+        ) from None  # fmt: skip

@@ -6,11 +6,9 @@ fixed ones, so that a surface has one mesh, whenever and wherever it is made.
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import importlib.util
 import mmap
-import signal
 import struct
 import sys
 import time
@@ -20,17 +18,18 @@ from pathlib import Path
 
 import numpy as np
 
+from calmotion.support.operating_system import end_with_parent
+
 _DRAW = b"_ZNSt13random_device9_M_getvalEv"  # std::random_device::operator()
 _RELOCATIONS = 4  # SHT_RELA
 _WRITABLE = 1 | 2  # PROT_READ | PROT_WRITE
-_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 _SIGNATURE = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_void_p)
 _KEPT: list[object] = []  # callbacks that native code calls as long as the process lives
 
 
 def main(source: str, destination: str) -> None:
     """Tetrahedralise the surface of the source file, and write the destination file."""
-    _end_with_parent()
+    end_with_parent()
     # pytetwild 0.4 imports PyVista (and with it VTK) in its package's __init__ only to add a method to PyVista's
     # classes. A package without that __init__ gives the same compiled module and needs NumPy alone.
     spec = importlib.util.find_spec("pytetwild")
@@ -94,12 +93,6 @@ def fix_random_numbers(library: str, sequence: int) -> bool:
             return False
         ctypes.c_uint64.from_address(slot).value = address or 0
     return bool(slots)
-
-
-def _end_with_parent() -> None:
-    """Let this process end when its parent is killed, which could not end it any more."""
-    with contextlib.suppress(AttributeError, OSError):  # no Linux
-        ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)
 
 
 def _slots(elf: bytes, symbol: bytes) -> Iterator[int]:

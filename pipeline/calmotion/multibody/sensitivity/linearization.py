@@ -11,7 +11,6 @@ with h_V, h_A the parts of dV, dV' that depend on earlier instants.
 from __future__ import annotations
 
 import math
-import os
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -37,6 +36,7 @@ from calmotion.multibody.sensitivity.linearized_steps import (
 )
 from calmotion.multibody.statics.equilibrium import STATIC
 from calmotion.multibody.statics.regularized_statics import regularize
+from calmotion.support import operating_system
 from calmotion.support.compilation import YES, inlined_kernel, kernel
 from calmotion.support.memory import available_memory
 
@@ -47,7 +47,7 @@ _FEW = 64  # instants of a thread at least
 
 def processors() -> int:
     """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return len(operating_system.processors())
 
 
 @inlined_kernel

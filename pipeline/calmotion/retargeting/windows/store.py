@@ -23,8 +23,8 @@ from calmotion.multibody.model.system import State
 from calmotion.reduction.cache import cache_key
 from calmotion.retargeting.windows.continued import Beginning
 from calmotion.retargeting.windows.plan import Window
+from calmotion.support.caching.sources import source_digest
 from calmotion.support.caching.verified_files import DamagedFileError, read_arrays, write_arrays
-from calmotion.support.sources import source_digest
 
 _ROOMS = ("linear_algebra", "multibody", "retargeting", "simulation", "support")
 _AROUND = 0.5  # samples within this time of a window shape its curves [s]

@@ -24,9 +24,9 @@ from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import ForwardRun, limited_values, run_forward
 from calmotion.simulation.inputs.curves import Curves, sample_curves
+from calmotion.simulation.inputs.tempo import MOST_INSTANTS, MotorEfforts, TempoLimits, needed_tempo
 from calmotion.simulation.preparation import Prepared, prepare
 from calmotion.simulation.report import limit_uses
-from calmotion.simulation.tempo import MOST_INSTANTS, MotorEfforts, TempoLimits, needed_tempo
 from calmotion.tolerance.simplification.by_rigid_poses import with_rough_masses
 
 

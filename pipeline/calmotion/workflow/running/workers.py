@@ -6,7 +6,6 @@ worker that dies to another one.
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
@@ -17,6 +16,7 @@ from typing import Any
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
 from calmotion.support import interrupts
+from calmotion.support.operating_system import processors, use_processors
 from calmotion.support.worker_processes import Fault, results_of
 from calmotion.version import __version__
 
@@ -65,9 +65,9 @@ def executor_on(
         with _client(on.removeprefix(_DASK)) as client:
             yield client.get_executor(pure=False, retries=0), workers
         return
-    count, shares = workers or len(_cores()), SimpleQueue[Sequence[int]]()
+    count, shares = workers or len(processors()), SimpleQueue[Sequence[int]]()
     for k in range(count):
-        shares.put(_cores()[k::count] if 1 < count <= len(_cores()) else _cores())
+        shares.put(processors()[k::count] if 1 < count <= len(processors()) else processors())
     executor = ThreadPoolExecutor(count, "calmotion-batch", _take_share, (shares,))
     try:
         yield executor, count
@@ -118,7 +118,7 @@ def results_on(
     refuse_unknown_place(on)
     calls = [(function, arguments) for arguments in work]
     if on == LOCAL:
-        for index, found in results_of(_called, calls, workers or len(_cores())):
+        for index, found in results_of(_called, calls, workers or len(processors())):
             yield index, _value(found)
         return
     with executor_on(on, workers) as (executor, limit):
@@ -192,15 +192,9 @@ def _client(address: str) -> Iterator[Any]:
             client.close(timeout=5)
 
 
-def _cores() -> list[int]:
-    """Numbers of the processors that this process may use."""
-    return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
-
-
 def _take_share(shares: SimpleQueue[Sequence[int]]) -> None:
     """Bind a thread, and so the processes that it starts, to its share of the processors."""
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, shares.get())
+    use_processors(shares.get())
 
 
 def _version() -> str:
