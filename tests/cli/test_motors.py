@@ -13,7 +13,7 @@ def test_motors_are_listed_and_one_is_shown_with_the_source_of_each_value(calmot
     one = calmotion("motors", "XM430-W350-T").stdout
     assert "21.1 N m/rad" in one and "46 rev/min" in one and "Haarnoja" in one and "xm540" not in one
     told = json.loads(calmotion("motors", "mx-64", "--json").stdout)["motors"]["mx-64"]["values"]["armature"]
-    assert told["value"] == 0.01195 and told["unit"] == "kg m^2" and "BAM" in told["source"]
+    assert told["value"] == 0.01124 and told["unit"] == "kg m^2" and "BAM" in told["source"]
     missing = calmotion("motors", "xm430-w35")
     assert missing.returncode == 1 and "xm430-w350" in missing.stderr
 
