@@ -27,10 +27,10 @@ class WriteResult(Operator):
         Property(
             "samples_per_second",
             float,
-            -1.0,
+            None,
             unit="Hz",
             minimum=1e-3,
-            description="Least density of the motor samples, for consumers that interpolate linearly; -1: the frames.",
+            description="Least density of the motor samples, for consumers that interpolate linearly; auto: frames.",
         ),
         Property(
             "splines", bool, False, description="Motor curves as splines with the optimiser's knots, not samples."
@@ -87,8 +87,7 @@ class WriteResult(Operator):
         from calmotion.usd import WriteOptions
 
         values = context.properties
-        rate = values.samples_per_second
-        return WriteOptions(samples_per_second=rate if rate > 0.0 else None, splines=values.splines, bake=values.bake)
+        return WriteOptions(samples_per_second=values.samples_per_second, splines=values.splines, bake=values.bake)
 
 
 register, unregister = registration(WriteResult)

@@ -139,23 +139,26 @@ class OptimizeShot(Operator):
         Property(
             "least_gain",
             float,
-            -1.0,
+            None,
+            minimum=0.0,
             maximum=1.0,
             description="A smaller predicted gain ends the search: a part of the tolerance, by root mean squares; "
-            "-1: a tenth, but less where the shot is searched in windows",
+            "auto: a tenth, but less where the shot is searched in windows",
         ),
         Property(
             "knot_spacing",
             float,
-            -1.0,
+            None,
             unit="s",
-            description="Distance of the knots; -1: that of the shot, or adaptive",
+            minimum=0.0,
+            description="Distance of the knots; auto: that of the shot, or adaptive",
         ),
         Property(
             "smoothness",
             float,
-            -1.0,
-            description="Weight of the second derivative of the offsets; -1: that of the shot",
+            None,
+            minimum=0.0,
+            description="Weight of the second derivative of the offsets; auto: that of the shot",
         ),
         Property(
             "adjoint",
@@ -182,9 +185,10 @@ class OptimizeShot(Operator):
         Property(
             "window",
             float,
-            -1.0,
+            None,
             unit="s",
-            description="Length of the windows in which a long shot is searched; -1: 10 s where it is longer than "
+            minimum=0.0,
+            description="Length of the windows in which a long shot is searched; auto: 10 s where it is longer than "
             "30 s; 0: one search",
         ),
         Property(
@@ -244,7 +248,7 @@ class OptimizeShot(Operator):
         converged = context.get(ConvergedReduction)
         known, memory = (None, None) if converged is None else (converged.known, converged.memory)
         shot = compiled_in(context.get)
-        if not context.properties.least_gain > 0.0:
+        if not context.properties.least_gain:
             options = replace(options, least_gain=least_gain(shot.character, shot.animation, options))
         try:
             result = optimize_to_tolerance(shot, options, context.progress, kept, known, stored, memory)
@@ -271,16 +275,16 @@ class OptimizeShot(Operator):
     @staticmethod
     def _search_options(context: RunContext) -> Any:
         values = context.properties
-        given = {"least_gain": values.least_gain} if values.least_gain > 0.0 else {}
+        given = {"least_gain": values.least_gain} if values.least_gain else {}
         return _options(
             context,
             **given,
             max_iterations=values.max_iterations,
-            knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
-            smoothness=values.smoothness if values.smoothness >= 0.0 else None,
+            knot_spacing=values.knot_spacing or None,
+            smoothness=values.smoothness,
             adjoint=values.adjoint,
             avoid_reversals=values.avoid_reversals,
-            window=values.window if values.window >= 0.0 else None,
+            window=values.window,
             robust=None
             if values.robust == "off"
             else RobustSettings(values.robust, values.scenarios, values.draws, values.nominal_error, values.tradeoff),

@@ -75,3 +75,15 @@ def test_the_nearest_right_value_is_named(declared, value, near):
     with pytest.raises(SettingError) as refused:
         values_of([declared], {declared.name: value}, "fe.mesh")
     assert near in refused.value.remedy.split(". ")[0] + refused.value.remedy.split("? ")[0]
+
+
+def test_an_optional_number_is_left_to_the_operator_unless_it_is_given():
+    spacing = Property("spacing", float, None, unit="s", minimum=0.0)
+    spacing.check()
+    for given in ({}, {"spacing": "auto"}, {"spacing": -1.0}, {"spacing": None}):
+        assert values_of([spacing], given, "x").spacing is None
+    assert values_of([spacing], {"spacing": "20ms"}, "x").spacing == pytest.approx(0.02)
+    with pytest.raises(SettingError, match="out of range"):
+        values_of([spacing], {"spacing": "-2"}, "x")
+    with pytest.raises(PluginError, match="no default"):
+        Property("kind", str, None).check()

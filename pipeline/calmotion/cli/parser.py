@@ -105,7 +105,8 @@ def needed(action: argparse.Action) -> str:
 def property_text(idname: str, declared: Property) -> str:
     """A property of an operator with its default, its range and its meaning."""
     limits = " | ".join(declared.choices) or declared.range_text()
-    default = f"{declared.default!r} {declared.unit}".strip() + (f" ({limits})" if limits else "")
+    value = "auto" if declared.default is None else f"{declared.default!r} {declared.unit}".strip()
+    default = value + (f" ({limits})" if limits else "")
     return f"{idname}.{declared.name} = {default}  {declared.description}"
 
 

@@ -11,6 +11,7 @@ from calmotion.host.errors import PluginError, SettingError
 from calmotion.host.units import has_no_unit, is_unit, parse_quantity
 from calmotion.support.naming import nearest
 
+_AUTOMATIC = ("auto", "-1", "-1.0")
 _WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 _BOOLEANS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
 
@@ -22,7 +23,8 @@ class Property:
     Attributes:
         name: Python name; set as `<operator idname>.<name>`.
         kind: `float`, `int`, `bool` or `str`.
-        default: Value when nobody sets it; always allowed, also outside the range (-1 = choose automatically).
+        default: Value when nobody sets it, always allowed, also outside the range; None for a number that is optional:
+            `auto` then leaves it to the operator.
         unit: Unit of the value (one of `units.py`), empty for a number without one.
         minimum, maximum: Range, bounds included; None: open.
         choices: The allowed strings; empty: any.
@@ -39,11 +41,14 @@ class Property:
     description: str = ""
 
     def read(self, value: object) -> Any:
-        """`value` as this property's type, from a string (`5mm`) or from a typed value.
+        """`value` as this property's type, from a string (`5mm`) or from a typed value; None of an optional one that is
+        left to the operator, by `auto`, or by -1 as in earlier settings.
 
         Raises:
             SettingError: When the value has the wrong type, unit or range.
         """
+        if self.default is None and (value is None or str(value).strip() in _AUTOMATIC):
+            return None
         read = self._parse(value) if isinstance(value, str) and self.kind is not str else self._convert(value)
         if read != self.default:
             self._check_range(read)
@@ -109,6 +114,10 @@ class Property:
             raise PluginError(f"property {self.name} must be float, int, bool or str", found=self.kind)
         if not is_unit(self.unit) or (self.unit and self.kind not in (float, int)):
             raise PluginError(f"property {self.name} has a unit that is not known", found=repr(self.unit))
+        if self.default is None:
+            if self.kind not in (float, int):
+                raise PluginError(f"property {self.name} has no default", found=None)
+            return
         try:
             if self.read(self.default) != self.default or isinstance(self.default, str) != (self.kind is str):
                 raise PluginError(f"property {self.name} has a default of the wrong type", found=repr(self.default))
