@@ -49,10 +49,12 @@ class MotorLimits:
         """Those of a character's motors."""
         joints, motors = [character.joints[motor.joint] for motor in character.motors], character.motors
         return cls(
-            np.array([joint.lower for joint in joints], float), np.array([joint.upper for joint in joints], float),
+            np.array([joint.lower for joint in joints], float),
+            np.array([joint.upper for joint in joints], float),
             np.array([motor.max_velocity for motor in motors], float),
-            np.array([motor.max_acceleration for motor in motors], float), tick,
-        )  # fmt: skip
+            np.array([motor.max_acceleration for motor in motors], float),
+            tick,
+        )
 
     def share(self, of: float) -> MotorLimits:
         """The same positions with a share of velocity and acceleration."""

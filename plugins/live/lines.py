@@ -64,9 +64,11 @@ def sample_of(line: str) -> Sample:
         return float(found["t"]), {str(path): float(value) for path, value in found["joints"].items()}
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise SettingError(
-            "a line of the stream is no sample", path="--in", found=line.strip()[:80],
+            "a line of the stream is no sample",
+            path="--in",
+            found=line.strip()[:80],
             remedy='Send lines such as {"t": 0.1, "joints": {"/Arm/Elbow": 0.3}}, in s and rad (m of sliders).',
-        ) from error  # fmt: skip
+        ) from error
 
 
 class Lines(Source):
@@ -206,14 +208,18 @@ def osc_place(text: str, option: str) -> tuple[str, int] | None:
         port = None
     if place.scheme != "osc" or not port:
         raise SettingError(
-            "this is no place of a stream", path=option, found=text,
+            "this is no place of a stream",
+            path=option,
+            found=text,
             remedy="Use - for standard input and output, or osc://127.0.0.1:9000.",
-        )  # fmt: skip
+        )
     try:
         import pythonosc  # noqa: F401
     except ImportError as error:
         raise SettingError(
-            "OSC needs python-osc, which is not installed", path=option, found=text,
+            "OSC needs python-osc, which is not installed",
+            path=option,
+            found=text,
             remedy='Install it: pip install "python-osc>=1.9,<2".',
-        ) from error  # fmt: skip
+        ) from error
     return place.hostname or "127.0.0.1", port

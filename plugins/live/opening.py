@@ -16,9 +16,14 @@ from .session import Live, LiveSettings
 
 
 def live(
-    shot: Shot | str | os.PathLike[str], *, lookahead: float | str = 0.12, rate: float = 250.0,
-    settings: LiveSettings | None = None, operators: Settings | None = None, hooks: Hooks | None = None,
-) -> Live:  # fmt: skip
+    shot: Shot | str | os.PathLike[str],
+    *,
+    lookahead: float | str = 0.12,
+    rate: float = 250.0,
+    settings: LiveSettings | None = None,
+    operators: Settings | None = None,
+    hooks: Hooks | None = None,
+) -> Live:
     """Calm commands from a stream of joint angles.
 
     Args:
@@ -46,8 +51,13 @@ def compiled(shot: Shot, operators: Settings | None = None, hooks: Hooks | None 
         ShotError: It cannot be made.
     """
     outcome = carry_out(
-        shot, "simulate", wanted=(Character, Animation, Provenance, CompiledShot), optional=(ConvergedReduction,),
-        source=Source("", "", RunSettings()), settings=operators, hooks=hooks,
-    )  # fmt: skip
+        shot,
+        "simulate",
+        wanted=(Character, Animation, Provenance, CompiledShot),
+        optional=(ConvergedReduction,),
+        source=Source("", "", RunSettings()),
+        settings=operators,
+        hooks=hooks,
+    )
     outcome.require(CompiledShot)
     return compiled_in(outcome.run.get)

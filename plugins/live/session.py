@@ -226,17 +226,19 @@ class Live:
             for path, value in angles.items():
                 if path not in self.joints:
                     raise SettingError(
-                        "the robot has no motor of this name", path=path,
+                        "the robot has no motor of this name",
+                        path=path,
                         remedy=f"{nearest(path, self.joints)}Its motors are {', '.join(self.joints)}.",
-                    )  # fmt: skip
+                    )
                 values[self.joints.index(path)] = value
         else:
             given = np.asarray(angles, dtype=float)
             if given.shape != values.shape:
                 raise SettingError(
-                    "the sample has another number of values than the robot has motors", found=given.shape,
+                    "the sample has another number of values than the robot has motors",
+                    found=given.shape,
                     remedy=f"Give {len(values)}, in this order: {', '.join(self.joints)}.",
-                )  # fmt: skip
+                )
             values = given.copy()
         for k, follows in self._follows:
             values[k] = follows.offset + follows.ratio * values[follows.leader]
@@ -250,9 +252,13 @@ class Live:
         weights = np.stack([targets.position_weight, targets.rotation_weight], axis=1)
         spread = (1.0 - settings.uncertainty, 1.0, 1.0 + settings.uncertainty) if settings.uncertainty else (1.0,)
         return Weighting(
-            self.tick_s, self._window_ticks, np.sqrt(np.repeat(weights, 3, axis=1)),
-            self.PENALTY * worth / (largest * self.tick_s), worth, spread,
-        )  # fmt: skip
+            self.tick_s,
+            self._window_ticks,
+            np.sqrt(np.repeat(weights, 3, axis=1)),
+            self.PENALTY * worth / (largest * self.tick_s),
+            worth,
+            spread,
+        )
 
     PENALTY = 1.0  # an acceleration at its limit, as a deviation of the intended one, in tolerances
 
@@ -272,9 +278,11 @@ class Live:
         self.reset(self.start)
         if needed > self.tick_s:
             raise SettingError(
-                "this machine cannot calm this robot at this rate", path="--rate", found=f"{self.settings.rate:g} Hz",
+                "this machine cannot calm this robot at this rate",
+                path="--rate",
+                found=f"{self.settings.rate:g} Hz",
                 remedy=f"Use at most {0.5 / needed:.0f} Hz; a shorter look-ahead or fewer flexible links are faster.",
-            )  # fmt: skip
+            )
 
 
 def _refuse_unfit(shot: CompiledShot, settings: LiveSettings) -> None:
@@ -287,14 +295,18 @@ def _refuse_unfit(shot: CompiledShot, settings: LiveSettings) -> None:
         )
     if not 10.0 <= settings.rate <= 2000.0:
         raise SettingError(
-            "the rate is no rate of commands", path="--rate", found=f"{settings.rate:g} Hz",
+            "the rate is no rate of commands",
+            path="--rate",
+            found=f"{settings.rate:g} Hz",
             remedy="Use 10 to 2000 Hz; most controllers take 50 to 500.",
-        )  # fmt: skip
+        )
     if not 0.0 <= settings.lookahead <= 5.0:
         raise SettingError(
-            "the look-ahead is not within 0 and 5 s", path="--lookahead", found=f"{settings.lookahead:g} s",
+            "the look-ahead is not within 0 and 5 s",
+            path="--lookahead",
+            found=f"{settings.lookahead:g} s",
             remedy="Use a third of the longest period of the robot, such as 120ms; see calmotion inspect --modes.",
-        )  # fmt: skip
+        )
 
 
 def _notes(shot: CompiledShot, forces: VelocityForces) -> tuple[str, ...]:

@@ -123,6 +123,4 @@ class Stream:
         s0 = (p1 - self._samples[k - 2][1]) / (t1 - stamps[k - 2]) if k > 1 else chord
         s1 = (self._samples[k + 1][1] - p0) / (stamps[k + 1] - t0) if k + 1 < len(stamps) else chord
         x = (time - t0) / length
-        return (
-            p0 + (p1 - p0) * x * x * (3.0 - 2.0 * x) + length * x * (1.0 - x) * (s0 * (1.0 - x) - s1 * x)
-        )  # fmt: skip
+        return p0 + (p1 - p0) * x * x * (3.0 - 2.0 * x) + length * x * (1.0 - x) * (s0 * (1.0 - x) - s1 * x)

@@ -95,8 +95,9 @@ def compare(name: str, shot: CompiledShot, frequencies: tuple[float, ...] = FREQ
     prepared = prepare(shot, RunSettings())
     grid, modes = prepared.grid, modes_of(prepared)
     curves = sample_curves(shot.animation.current, grid)
-    streams = [_streamed(shot, CubicSpline(grid.times, curves.angles), grid.times, share / modes[0][0])
-               for share in SHARES]  # fmt: skip
+    streams = [
+        _streamed(shot, CubicSpline(grid.times, curves.angles), grid.times, share / modes[0][0]) for share in SHARES
+    ]
     for factor in frequencies:
         robot = _Robot(prepared, factor)
         yield _row(name, "as animated", factor, robot.left(curves.angles, curves.rates, 0.0))
@@ -136,12 +137,16 @@ def cells(rows: list[Row]) -> list[list[str]]:
     """The table for a person, without its heads."""
     return [
         [
-            row.method, f"{row.frequencies:g}", f"{1e3 * row.delay_s:.0f} ms", f"{row.rms_mm:.2f} mm",
-            f"{row.largest_mm:.2f} mm", f"{row.tick_ms:.2f} ms" if row.tick_ms else "",
+            row.method,
+            f"{row.frequencies:g}",
+            f"{1e3 * row.delay_s:.0f} ms",
+            f"{row.rms_mm:.2f} mm",
+            f"{row.largest_mm:.2f} mm",
+            f"{row.tick_ms:.2f} ms" if row.tick_ms else "",
             f"{row.tick_99_ms:.2f} ms" if row.tick_99_ms else "",
         ]
         for row in rows
-    ]  # fmt: skip
+    ]
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -29,31 +29,46 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--rate", metavar="HZ", type=quantity("Hz"), default=250.0, help="commands a second (default: 250)"
     )
     command.add_argument(
-        "--lookahead", metavar="MS", type=_milliseconds, default=0.12,
+        "--lookahead",
+        metavar="MS",
+        type=_milliseconds,
+        default=0.12,
         help="how late the robot may answer, in ms or with a unit (default: 120)",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "--sender-rate", metavar="HZ", type=quantity("Hz"),
+        "--sender-rate",
+        metavar="HZ",
+        type=quantity("Hz"),
         help="samples a second of a sender that is slower than --rate; its motion is played two samples later",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "--uncertainty", metavar="SHARE", type=_share, default=0.0,
+        "--uncertainty",
+        metavar="SHARE",
+        type=_share,
+        default=0.0,
         help="share by which the robot's frequencies are not known, such as 0.1: calm for slower and faster ones too",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "--in", dest="source", metavar="PLACE", default="-",
+        "--in",
+        dest="source",
+        metavar="PLACE",
+        default="-",
         help="where samples come from: - (JSON lines on standard input, default) or osc://HOST:PORT",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "--out", dest="sink", metavar="PLACE", default="-",
+        "--out",
+        dest="sink",
+        metavar="PLACE",
+        default="-",
         help="where commands go: - (JSON lines on standard output, default) or osc://HOST:PORT",
-    )  # fmt: skip
+    )
     command.add_argument("--replay", metavar="LAYER", help="play the animation of a shot or a layer as the stream")
     command.add_argument(
-        "--clock", choices=("wall", "stamps"),
+        "--clock",
+        choices=("wall", "stamps"),
         help="what ticks follow: the wall's clock (default of a pipe and of OSC), or the time stamps of the samples, "
         "as fast as they can be read (default of a file and of --replay)",
-    )  # fmt: skip
+    )
     command.add_argument("--seconds", metavar="S", type=quantity("s", positive=True), help="stop after this time")
 
 
@@ -90,9 +105,13 @@ def run(args: argparse.Namespace, output: Output) -> int:
     settings = LiveSettings(sender_rate=args.sender_rate, uncertainty=args.uncertainty, background=not stamps)
     with progress_display(args) as display:
         robot = live(
-            shot, lookahead=args.lookahead, rate=args.rate, settings=settings, operators=assignments(args),
+            shot,
+            lookahead=args.lookahead,
+            rate=args.rate,
+            settings=settings,
+            operators=assignments(args),
             hooks=Hooks(progress=display, on_operator=display.done),
-        )  # fmt: skip
+        )
     sink: Sink = OscSink(*sends) if sends else LineSink(sys.stdout)
     with robot:
         for note in robot.notes:
@@ -105,9 +124,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
     return 0
 
 
-def _play(
-    robot: Live, args: argparse.Namespace, stamps: bool, listens: tuple[str, int] | None, sink: Sink
-) -> Source:  # fmt: skip
+def _play(robot: Live, args: argparse.Namespace, stamps: bool, listens: tuple[str, int] | None, sink: Sink) -> Source:
     from ..lines import Lines, OscSource, Samples
     from ..playing import play_clock, play_stamps, samples_of_animation
 

@@ -81,7 +81,5 @@ class VelocityForces:
     def _residual(self, state: State, accelerations: Array, angles: Array, rates: Array) -> Array:
         ws, moving = self._workspace, IMPLICIT["bdf2"](1.0)
         ws.scratch.Hv[:] = 0.0
-        assemble(
-            self._system, moving, state, accelerations, angles, rates, ws.scratch.Hv, False, ws.work, ws.blocks
-        )  # fmt: skip
+        assemble(self._system, moving, state, accelerations, angles, rates, ws.scratch.Hv, False, ws.work, ws.blocks)
         return np.array(ws.blocks.res)

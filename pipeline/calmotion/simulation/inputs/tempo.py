@@ -99,7 +99,7 @@ def _between(times: Array, few: Array, efforts: MotorEfforts | None) -> MotorEff
 
 def _fastest(
     times: Array, curve: CubicSpline, limits: TempoLimits, efforts: MotorEfforts | None, least: float
-) -> Array:  # fmt: skip
+) -> Array:
     """The largest squares of the tempo at T instants, at most 1."""
     length, middle = np.diff(times)[:, None], 0.5 * (times[:-1] + times[1:])
     rate, acceleration = curve(middle, 1), curve(middle, 2)
@@ -127,9 +127,12 @@ def _fastest(
     with np.errstate(divide="ignore"):
         fast = np.min((limits.velocity / np.abs(curve(times, 1))) ** 2, axis=1, initial=1.0)
     found = linprog(
-        -np.ones(len(times)), sparse.vstack(rows), np.concatenate(bounds),
-        bounds=[(least, max(most, least)) for most in fast.tolist()], method="highs",
-    )  # fmt: skip
+        -np.ones(len(times)),
+        sparse.vstack(rows),
+        np.concatenate(bounds),
+        bounds=[(least, max(most, least)) for most in fast.tolist()],
+        method="highs",
+    )
     if found.x is None:
         raise ValueError(f"the linear programme of the tempo has no solution: {found.message}")
     return np.asarray(found.x)

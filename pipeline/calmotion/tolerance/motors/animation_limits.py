@@ -73,7 +73,7 @@ def exceeded_limits(character: Character, animation: Animation, options: RunSett
         efforts = MotorEfforts(*(part[judged] for part in (efforts.at_rest, efforts.by_square, efforts.by_change)))
     return ExceededLimits(
         uses, needed_tempo(grid.times[judged], curves.angles[judged], TempoLimits(**largest), efforts)
-    )  # fmt: skip
+    )
 
 
 _NAMES = ("velocity", "acceleration", "jerk", "effort")
@@ -95,6 +95,6 @@ def _efforts(prepared: Prepared, run: ForwardRun, efforts: Array, curves: Curves
     motors = np.arange(curves.angles.shape[1], dtype=np.int32)
     _, inertia = motor_responses(
         model, states.c[few], states.q[few], run.joint_angles[few], motors, prepared.world[few], grid.times[few]
-    )  # fmt: skip
+    )
     change = CubicSpline(grid.times[few], np.einsum("tmk,tk->tm", inertia, curves.rates[few]))(grid.times)
     return MotorEfforts(weight, efforts - weight, change)
