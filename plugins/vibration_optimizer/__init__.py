@@ -35,13 +35,14 @@ def _options(context: RunContext, **more: Any) -> Any:
 def _with_budget(context: RunContext, result: Result, **more: float) -> Result:
     """The result with the decisions on the model, its error budget, and the parts of motors and links in its error."""
     from calmotion.retargeting import best_so_far
-    from calmotion.tolerance import with_budget, with_error_shares, with_lost_motion
+    from calmotion.tolerance import with_budget, with_error_shares, with_friction_band, with_lost_motion
 
     shot, tolerance = compiled_in(context.get), context.get(Source).settings.tolerance
     try:
         if not result.interrupted:
             result = with_error_shares(shot, result, _options(context), context.progress)
             result = with_lost_motion(shot, result, _options(context))
+            result = with_friction_band(shot, result, _options(context))
     except KeyboardInterrupt:
         if result.after is None:  # of a simulation: it is soon done again
             raise

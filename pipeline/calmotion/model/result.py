@@ -268,6 +268,7 @@ class Result:
         error_shares: What motors and links have in the error of the input; None where motors are ideal.
         lost_motion: What the play of gears would do to the input, and to the curves found; empty without play.
         robustness: The curves on robots that differ from the model; None where they were optimised for one robot.
+        friction_band_m: How far Coulomb friction may hold each target off at rest [m], shape [K]; None without any.
         windows: Windows in time in which the shot was searched; empty where one search covered it.
     """
 
@@ -305,6 +306,7 @@ class Result:
     robustness: Robustness | None = None
     windows: tuple[WindowRow, ...] = ()
     processor_s: float | None = None
+    friction_band_m: Array | None = None
 
     @property
     def improved(self) -> bool | None:

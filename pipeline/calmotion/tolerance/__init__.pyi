@@ -14,6 +14,7 @@ from calmotion.tolerance.meshes.options import MeshOptions as MeshOptions
 from calmotion.tolerance.meshes.options import Volume as Volume
 from calmotion.tolerance.motors.animation_limits import exceeded_limits as exceeded_limits
 from calmotion.tolerance.motors.backlash import with_lost_motion as with_lost_motion
+from calmotion.tolerance.motors.friction_band import with_friction_band as with_friction_band
 from calmotion.tolerance.motors.motor_effects import effects_of_gains as effects_of_gains
 from calmotion.tolerance.motors.motor_effects import with_error_shares as with_error_shares
 from calmotion.tolerance.motors.motor_effects import with_gains_used as with_gains_used

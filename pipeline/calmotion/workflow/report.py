@@ -103,6 +103,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         **_accuracy(run, result),
         "error_shares": _error_shares(character, result),
         "lost_motion": lost_motion(character, result),
+        "friction_band": _friction_band(character, result),
         "main_target": main_target(character, result),
         "still_targets": still_targets(character, result),
         "remaining_errors": remaining_errors(choices.character if choices else character, result),
@@ -141,6 +142,14 @@ def _error_shares(character: Character, result: Result) -> list[dict[str, Any]]:
         {"path": target.path, "motors_m": float(motors), "links_m": float(links)}
         for target, motors, links in zip(character.targets, shares.motors_m, shares.links_m, strict=True)
     ]
+
+
+def _friction_band(character: Character, result: Result) -> list[dict[str, Any]]:
+    """By how much the friction of motors may hold each target off."""
+    found = result.friction_band_m
+    if found is None:
+        return []
+    return [{"path": t.path, "max_error_m": float(size)} for t, size in zip(character.targets, found, strict=True)]
 
 
 def lost_motion(character: Character, result: Result) -> dict[str, Any] | None:

@@ -11,6 +11,7 @@ from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.tolerance.motors.backlash import sides, transmitted_efforts, with_lost_motion
+from calmotion.tolerance.motors.friction_band import with_friction_band
 from linkage_arm import FORE, linkage_arm, performance
 
 FRAMES = np.arange(61) / 30.0
@@ -110,3 +111,14 @@ def test_report_has_reversals_and_the_way_of_each_target():
     assert told["targets"][0]["max_error_m"] == result.lost_motion[0].largest_m[0]
     told = lost_motion(shot.character, replace(result, after=result.before, lost_motion=2 * result.lost_motion))
     assert told["motors"][0]["reversals_before"] == told["motors"][0]["reversals_after"] == 1
+
+
+def test_friction_may_hold_a_pendulum_within_itself_over_the_gain():
+    """0.3 N m over 150 N m/rad, at the end of the link; nothing by a drive."""
+    servo = pendulum(0.0, model="servo", position_gain=150.0, velocity_gain=5.0, rotor=Rotor(friction=0.3))
+    shot, result = simulated(servo, slow(0.2, 0.4))
+    found = with_friction_band(shot, result, OPTIONS).friction_band_m
+    assert found == pytest.approx([LENGTH * 0.3 / 150.0], rel=1e-4)
+    drive = pendulum(0.0, model="drive", position_gain=150.0, velocity_gain=5.0)
+    shot, result = simulated(drive, slow(0.2, 0.4))
+    assert with_friction_band(shot, result, OPTIONS) is result

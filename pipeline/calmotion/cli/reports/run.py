@@ -26,6 +26,7 @@ from calmotion.support.naming import distinct_names
 
 LONG_PATH = 60  # characters of a prim path from which on sentences and tables have its last names alone
 SHORT_STAGE = 0.1  # processor time of a stage that is not listed [s]
+FRICTION = 0.1  # of the tolerance, from which on what friction may hold is told
 COARSE_EFFORT = 0.05  # of the largest effort of a motor, from which on its error is told
 IDLE_EFFORT = 0.01  # of that of the strongest motor
 
@@ -236,6 +237,13 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
         say(console, f"target {path} does not move, so that it shows no shake: choose a point of a link that moves")
     print_shares(console, report["error_shares"])
     print_lost_motion(console, report["lost_motion"], suffix)
+    held = max(report["friction_band"], key=lambda row: row["max_error_m"], default=None)
+    if held and held["max_error_m"] > FRICTION * report["tolerance_m"]:
+        say(
+            console,
+            f"friction of motors may hold {held['path']} off by up to {about(held['max_error_m'])} where it rests, "
+            "beside the errors above: no command takes that away",
+        )
     print_limits(console, report["limits"], bool(suffix))
     sags = {target["path"]: target[f"sag{suffix}_m"] or 0.0 for target in report["targets"]}
     hanging = max(sags, key=sags.__getitem__, default="")

@@ -78,7 +78,7 @@ def sides(efforts: Array) -> IntArray:
 def _lost_motion(prepared: Prepared, motion: Motion, playing: list[int]) -> LostMotion:
     character, judged = prepared.character, motion.judged
     efforts = transmitted_efforts(character, motion)[judged]
-    rest = _positions(prepared, motion.motor_values)
+    rest = rigid_positions(prepared, motion.motor_values)
     off = np.zeros_like(motion.target_positions[judged])
     reversals, unknown = [], []
     times = motion.times[judged]
@@ -88,7 +88,7 @@ def _lost_motion(prepared: Prepared, motion: Motion, playing: list[int]) -> Lost
         reversals.append(times[changed])
         moved = motion.motor_values.copy()
         moved[:, k] += character.motors[k].backlash
-        there = None if rest is None else _positions(prepared, moved)
+        there = None if rest is None else rigid_positions(prepared, moved)
         if rest is None or there is None:
             unknown.append(k)
             continue
@@ -99,7 +99,7 @@ def _lost_motion(prepared: Prepared, motion: Motion, playing: list[int]) -> Lost
     return LostMotion(tuple(playing), tuple(reversals), largest, times[worst], tuple(unknown))
 
 
-def _positions(prepared: Prepared, values: Array) -> Array | None:
+def rigid_positions(prepared: Prepared, values: Array) -> Array | None:
     """Where a rigid robot has its targets for values of its motors, shape [T, K, 3]; None where it cannot follow."""
     grid = prepared.grid
     if grid.cyclic:  # the instant before the first one is left out of motions

@@ -1,10 +1,12 @@
 """Commands in the robot's own MJCF file, as they are written."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.simulation import compile_shot
 from calmotion_plugins.benchmarks.motors.commands import compare, giving_shot
 from calmotion_plugins.benchmarks.motors.original import simulate_original
 
@@ -47,6 +49,21 @@ def test_commands_of_an_imported_robot_work_in_its_own_file(arm):
     row = compare("arm", giving_shot(str(arm), None), str(arm.with_suffix(".xml")))
     assert row.kept and row.mujoco_ideal_mm > 20.0
     assert row.told == pytest.approx(1.0, abs=0.01) and row.mujoco_share < 0.02
+    # 0.1 N m over 400 and over 2 * 2 * 100 N m/rad, in reaches of 0.6 and 0.3 m
+    assert 0.0 < row.friction_mm <= 1e3 * 0.1 * (0.6 / 400 + 0.3 / 400) * 1.01
+
+
+@pytest.mark.parametrize("step", [1e-3, 2.5e-4])
+def test_without_friction_what_optimised_commands_leave_is_told(arm, step):
+    """Both programs without the errors of their steps: the animation to 1e-4, what commands leave within a tenth."""
+    path = arm.with_suffix(".xml")
+    path.write_text(ARM.replace('frictionloss="0.1"', ""))
+    shot = giving_shot(str(arm), None)
+    rotors = (replace(motor, rotor=replace(motor.rotor, friction=0.0)) for motor in shot.character.motors)
+    shot = compile_shot(replace(shot.character, motors=tuple(rotors)), shot.animation)
+    row = compare("arm", shot, str(path), mujoco_step=step)
+    assert row.kept and row.friction_mm == 0.0 and row.told == pytest.approx(1.0, abs=1e-4)
+    assert row.mujoco_optimised_mm == pytest.approx(row.optimised_mm, rel=0.1)
 
 
 @pytest.mark.parametrize(
