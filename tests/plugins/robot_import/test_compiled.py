@@ -120,6 +120,15 @@ SERVOS = {
 }
 
 
+def test_gains_and_limits_of_several_actuators_of_a_joint_add_up(tmp_path):
+    pair = (
+        '<position joint="lift" kp="50" forcerange="-9 9"/><velocity joint="lift" kv="3" gear="2" forcerange="-2 2"/>'
+    )
+    made, _ = imported(tmp_path, robot(tail=f"<actuator>{pair}</actuator>"))
+    (motor,) = made.character.motors
+    assert (motor.position_gain, motor.velocity_gain, motor.max_torque) == pytest.approx((50.0, 12.0, 13.0))
+
+
 @pytest.mark.parametrize("name", SERVOS)
 def test_gains_are_those_of_the_compiled_actuator(tmp_path, name):
     made, model = imported(tmp_path, SERVOS[name])

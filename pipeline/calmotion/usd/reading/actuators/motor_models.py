@@ -15,7 +15,7 @@ from calmotion.rigging.motor_types import MotorType
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dialects import GAINS, POSITION_ACTUATOR, Spelling, authored
-from calmotion.usd.reading.actuators.mujoco_actuators import acts_on, numbers_of
+from calmotion.usd.reading.actuators.mujoco_actuators import numbers_of
 from calmotion.usd.reading.actuators.named_types import TYPE
 from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
 from calmotion.usd.reading.joints import JointPrim
@@ -73,14 +73,14 @@ def _token(prim: Usd.Prim, name: str, allowed: Sequence[str], fallback: str, wha
 
 
 def read_gains(
-    joint: JointPrim, actuator: Usd.Prim | None, newton: NewtonActuator | None, units: StageUnits, model: str,
+    joint: JointPrim, actuators: Sequence[Usd.Prim], newton: NewtonActuator | None, units: StageUnits, model: str,
     kind: MotorType, current: DirectCurrent | None = None,
 ) -> Gains:  # fmt: skip
     """The gains that pull a joint towards the motor's command; those of the first source that has a position gain:
     Calmotion, the named motor, UsdPhysics, an actuator of MuJoCo or of Newton.
 
     Args:
-        actuator: The actuator of a MuJoCo conversion that drives the joint.
+        actuators: The actuators of a MuJoCo conversion that drive the joint.
         newton: The actuator of Newton that does.
         model: Of the motor: one that gives must have gains.
         kind: The named motor; its velocity gain goes with a position gain of Calmotion's, too.
@@ -97,7 +97,7 @@ def read_gains(
         _dialect_gains(joint, units, used, [own], kind.get("velocity_gain", 0.0))
         or _gains_of(kind)
         or _dialect_gains(joint, units, used, others, 0.0)
-        or _actuator_gains(joint, actuator, units)
+        or _actuator_gains(joint, actuators, units)
         or _newton_gains(joint, newton, units)
         or Gains()
     )
@@ -166,20 +166,26 @@ def _newton_gains(joint: JointPrim, newton: NewtonActuator | None, units: StageU
     return Gains(to_si(newton.kp), to_si(newton.kd), f"newton:kp and newton:kd of {newton.path} (Newton)", ON_JOINT)
 
 
-def _actuator_gains(joint: JointPrim, prim: Usd.Prim | None, units: StageUnits) -> Gains | None:
-    """Gains of an actuator of a MuJoCo conversion that holds positions, and acts on the joint itself: its force is
-    gain ctrl + b_0 + b_1 g q + b_2 g q' with the gear ratio g, in radians. A positive b_2 is a damping ratio, of which
-    MuJoCo's compiler makes a gain."""
-    if prim is None or not acts_on(prim, joint):
-        return None
-    gain, bias, gear = (numbers_of(prim, name) for name in POSITION_ACTUATOR)
-    ratio = gear[0] if gear else 1.0
-    if not gain or not gain[0] or len(bias) < 3 or not bias[1] < 0.0 or not math.isfinite(bias[1] * bias[2]):
-        return None  # not one that holds positions
+def _actuator_gains(joint: JointPrim, actuators: Sequence[Usd.Prim], units: StageUnits) -> Gains | None:
+    """Gains of the actuators of a MuJoCo conversion that act on the joint itself; one at least holds positions. The
+    force of each is gain ctrl + b_0 + b_1 g q + b_2 g q' with the gear ratio g, in radians. A positive b_2 is a damping
+    ratio, of which MuJoCo's compiler makes a gain."""
+    stiffness = damping = 0.0
+    sources = []
+    for prim in actuators:
+        gain, bias, gear = (numbers_of(prim, name) for name in POSITION_ACTUATOR)
+        ratio = gear[0] if gear else 1.0
+        if not gain or not gain[0] or len(bias) < 3 or not (math.isfinite(bias[1] * bias[2]) and bias[1] <= 0.0):
+            continue
+        stiffness -= ratio**2 * bias[1]
+        damping += ratio**2 * max(0.0, -bias[2])
+        lost = f" without its damping ratio {bias[2]:g}" if bias[2] > 0.0 else ""
+        sources.append(f"{prim.GetPath()}{lost}")
+    if not stiffness > 0.0:
+        return None  # none holds positions
     to_si = _per_length(units) if joint.kind == "prismatic" else units.torque
-    lost = f", without its damping ratio {bias[2]:g}" if bias[2] > 0.0 else ""
-    names = f"{POSITION_ACTUATOR[0]} and {POSITION_ACTUATOR[1]} of {prim.GetPath()} (MuJoCo{lost})"
-    return Gains(to_si(-(ratio**2) * bias[1]), to_si(ratio**2 * max(0.0, -bias[2])), names, ON_JOINT)
+    names = f"{POSITION_ACTUATOR[0]} and {POSITION_ACTUATOR[1]} of {' and '.join(sources)} (MuJoCo)"
+    return Gains(to_si(stiffness), to_si(damping), names, ON_JOINT)
 
 
 def _per_degree(units: StageUnits) -> Callable[[float], float]:

@@ -10,9 +10,18 @@ if TYPE_CHECKING:
     from pxr import Usd
 
 
-def acts_on(actuator: Usd.Prim, joint: JointPrim) -> bool:
-    """Whether an actuator acts on the joint itself, not on a tendon."""
-    relationship = actuator.GetRelationship("mjc:target")
+def actuators_beside(stage: Usd.Stage, path: str, joint: JointPrim) -> tuple[Usd.Prim, ...]:
+    """The actuators that act on the joint itself, not on a tendon: their forces add up.
+
+    Args:
+        path: Of one of them; the others are beside it.
+    """
+    prim = stage.GetPrimAtPath(path)
+    return tuple(other for other in prim.GetParent().GetChildren() if _acts_on(other, joint)) if prim else ()
+
+
+def _acts_on(actuator: Usd.Prim, joint: JointPrim) -> bool:
+    relationship = actuator.GetRelationship("mjc:target") if actuator.GetTypeName() == "MjcActuator" else None
     return bool(relationship) and joint.prim.GetPath() in relationship.GetTargets()
 
 

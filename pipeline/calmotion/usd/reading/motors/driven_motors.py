@@ -16,6 +16,7 @@ from calmotion.usd import schemas
 from calmotion.usd.dialects import number_of
 from calmotion.usd.reading.actuators.laws import direct_current, gain_factor
 from calmotion.usd.reading.actuators.motor_models import motor_model, read_gains
+from calmotion.usd.reading.actuators.mujoco_actuators import actuators_beside
 from calmotion.usd.reading.actuators.named_types import named_type
 from calmotion.usd.reading.actuators.newton_actuators import ACTUATOR, TARGETS, newton_actuator
 from calmotion.usd.reading.actuators.rotors import read_backlash, read_delay, read_rotor
@@ -229,7 +230,7 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
     from_stage = reading.units.length if linear else np.deg2rad
     gear, model, kind = drive.gear, motor_model(prim), named_type(drive.joint)
     newton = newton_actuator(reading.stage, drive.actuator)
-    mujoco = reading.stage.GetPrimAtPath(drive.actuator) if drive.actuator and newton is None else None
+    mujoco = actuators_beside(reading.stage, drive.actuator, drive.joint) if drive.actuator and newton is None else ()
     current = direct_current(drive.joint, reading.units, kind) if model == SERVO else None
     gains = read_gains(drive.joint, mujoco, newton, reading.units, model, kind, current)
     limit = effort_limit(drive.joint, reading.units, reading.notes, kind, newton, mujoco)

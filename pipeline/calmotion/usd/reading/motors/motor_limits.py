@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,7 @@ from calmotion.errors import ShotError
 from calmotion.rigging.motor_types import MotorType
 from calmotion.usd import schemas
 from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, authored, number_of
-from calmotion.usd.reading.actuators.mujoco_actuators import acts_on, numbers_of
+from calmotion.usd.reading.actuators.mujoco_actuators import numbers_of
 from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.units import StageUnits
@@ -25,13 +25,13 @@ _SCHEMA = "CalmMotorAPI"
 
 def effort_limit(
     joint: JointPrim, units: StageUnits, notes: list[str], kind: MotorType, newton: NewtonActuator | None,
-    mujoco: Usd.Prim | None,
+    mujoco: Sequence[Usd.Prim],
 ) -> float:  # fmt: skip
     """Largest torque [N m] or force [N]; the lower of Calmotion's and UsdPhysics' limit, else that of another dialect.
 
     Args:
         kind: The named motor, whose limit stands for one of Calmotion that is not authored.
-        newton, mujoco: The joint's actuator, of one or the other.
+        newton, mujoco: The joint's actuator, or actuators, of one or the other.
 
     Raises:
         ShotError: A limit that is not positive.
@@ -78,23 +78,32 @@ def _dialect_limit(joint: JointPrim, to_si: Callable[[float], float], notes: lis
 
 
 def _mujoco_limit(
-    joint: JointPrim, actuator: Usd.Prim | None, to_si: Callable[[float], float], notes: list[str]
+    joint: JointPrim, actuators: Sequence[Usd.Prim], to_si: Callable[[float], float], notes: list[str]
 ) -> float:
-    """What the joint of MuJoCo lets through, and what its actuator gives at most, times the gear of that: the range of
-    its forces, and that of its control where it is the force. The narrower side of each range counts."""
+    """What the joint of MuJoCo lets through, and what its actuators give at most together, each times its gear. The
+    narrower side of each range counts."""
     found = {"mjc:actuatorfrcrange": _range(joint.prim, "mjc:actuatorfrcrange")}
-    if actuator is not None and acts_on(actuator, joint):
-        ratio = abs((numbers_of(actuator, "mjc:gear") or [1.0])[0])
-        where = f" of {actuator.GetPath()}"
-        found[f"mjc:forceRange{where}"] = ratio * _range(actuator, "mjc:forceRange")
-        if all(_token(actuator, f"mjc:{what}Type") in ("", "fixed", "none") for what in ("gain", "bias", "dyn")):
-            gain = abs((numbers_of(actuator, "mjc:gainPrm") or [1.0])[0])
-            found[f"mjc:ctrlRange{where}"] = ratio * gain * _range(actuator, "mjc:ctrlRange")
+    if actuators:
+        limits = [_limit_of(prim) for prim in actuators]
+        names = " and ".join(f"{name} of {prim.GetPath()}" for prim, (name, _) in zip(actuators, limits, strict=True))
+        found[names] = sum(limit for _, limit in limits)
     source = min(found, key=found.__getitem__)
     if not found[source] < math.inf:
         return math.inf
     notes.append(f"{joint.path}: its limit is taken from {source} (MuJoCo)")
     return float(to_si(found[source]))
+
+
+def _limit_of(actuator: Usd.Prim) -> tuple[str, float]:
+    """The attribute that limits an actuator, and the limit: the range of its forces, and that of its control where it
+    is the force."""
+    ratio = abs((numbers_of(actuator, "mjc:gear") or [1.0])[0])
+    found = {"mjc:forceRange": ratio * _range(actuator, "mjc:forceRange")}
+    if all(_token(actuator, f"mjc:{what}Type") in ("", "fixed", "none") for what in ("gain", "bias", "dyn")):
+        gain = abs((numbers_of(actuator, "mjc:gainPrm") or [1.0])[0])
+        found["mjc:ctrlRange"] = ratio * gain * _range(actuator, "mjc:ctrlRange")
+    name = min(found, key=found.__getitem__)
+    return name, found[name]
 
 
 def _range(prim: Usd.Prim, name: str) -> float:
