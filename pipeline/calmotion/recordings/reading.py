@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from calmotion.host import Host, SettingError, Settings
 from calmotion.recordings.reader import RecordingReader
-from calmotion.recordings.recording import ACCELEROMETER, MARKER, RecordingRequest, SensorRecording
+from calmotion.recordings.recording import ACCELEROMETER, MARKER, RecordingRequest, SensorRecording, turned_on
 from calmotion.workflow.problems import value_of
 
 AT = "@/"  # FILE@/PRIM: where the sensor of a file sits
@@ -57,7 +57,7 @@ def read_recordings(host: Host, names: Sequence[str], settings: Settings) -> tup
                 "the recording does not exist", path="--recording", found=request.file, remedy="Check the path."
             )
         run = host.run([request], [SensorRecording], settings=settings).finish()
-        found.append(value_of(run, SensorRecording))
+        found.append(turned_on(value_of(run, SensorRecording)))
     return tuple(found)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -81,3 +81,25 @@ class RecordingRequest:
 
     file: str
     prim: str = ""
+
+
+_TURN, _FASTEST = 2.0 * np.pi, 20.0  # [rad]; no joint turns faster between two samples [rad/s]
+
+
+def turned_on(recording: SensorRecording) -> SensorRecording:
+    """A recording whose encoders do not jump by a turn where they pass the end of their range, and a note of it."""
+    channels, told = [], []
+    for channel in recording.channels:
+        known = np.flatnonzero(np.isfinite(channel.values[:, 0])) if channel.kind == ANGLE else np.zeros(0, int)
+        steps = np.diff(channel.values[known, 0])
+        turns = np.round(steps / _TURN)
+        jumps = (np.abs(steps - _TURN * turns) < 0.25 * _TURN) & (
+            np.abs(steps) > np.maximum(0.5 * _TURN, _FASTEST * np.diff(channel.times[known]))
+        )
+        if jumps.any():
+            values = channel.values.copy()
+            values[known[1:], 0] -= _TURN * np.cumsum(np.where(jumps, turns, 0.0))
+            channel = replace(channel, values=values)
+            told.append(f"{recording.file}: {channel.path} jumps by a turn {int(jumps.sum())} times, and is unwrapped")
+        channels.append(channel)
+    return replace(recording, channels=tuple(channels), notes=(*recording.notes, *told)) if told else recording
