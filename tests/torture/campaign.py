@@ -14,7 +14,6 @@ import shutil
 import signal
 import sys
 import tempfile
-from collections import Counter
 from pathlib import Path
 
 import kills
@@ -41,26 +40,24 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=1000, help="number of kills; other faults in proportion")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", choices=tuple(KINDS), action="append", help="kinds of fault (default: all)")
-    parser.add_argument("--before", default="", help="kill only before writes of this kind, such as kernels")
     parser.add_argument("--folder", type=Path, help="where to run (default: a temporary folder)")
     options = parser.parse_args()
     # no TemporaryDirectory: the exit of a forked run would remove it
     folder = options.folder or Path(tempfile.mkdtemp(prefix="torture-"))
     try:
-        tallies, where = disturbed(Workspace(folder.resolve()), options)
+        tallies = disturbed(Workspace(folder.resolve()), options)
     finally:
         if options.folder is None:
             shutil.rmtree(folder, ignore_errors=True)
-    print(*(f"{name.replace(chr(9), ', ')}: {count}" for name, count in sorted(where.items())), sep="\n")
     for kind, tally in tallies.items():
         print(f"{kind}: {tally.runs} runs, {tally.counts}, {len(tally.faults)} faults", *tally.faults, sep="\n- ")
     return int(any(tally.faults for tally in tallies.values()))
 
 
-def disturbed(space: Workspace, options: argparse.Namespace) -> tuple[dict[str, verdicts.Tally], Counter[str]]:
-    """Run a campaign; counts by the kind of fault, and the kills by where they were."""
+def disturbed(space: Workspace, options: argparse.Namespace) -> dict[str, verdicts.Tally]:
+    """Run a campaign; counts by the kind of fault."""
     wanted = {kind: max(1, round(KINDS[kind] * options.runs)) for kind in options.only or KINDS}
-    tallies, where = {kind: verdicts.Tally() for kind in wanted}, Counter[str]()
+    tallies = {kind: verdicts.Tally() for kind in wanted}
     os.environ.update(space.environment())  # before the program is loaded, which reads them
     runs.load_program()
     space.prepare(keep_caches=options.folder is not None)
@@ -74,13 +71,13 @@ def disturbed(space: Workspace, options: argparse.Namespace) -> tuple[dict[str, 
             count = min(max(1, round(PIECE * KINDS[kind])), wanted[kind] - before)
             rng = random.Random(f"{options.seed} {kind} {before}")
             if kind == "kills":
-                kills.campaign(space, rng, count, tally, seconds, where, options.before)
+                kills.campaign(space, rng, count, tally, seconds)
             else:
                 _CAMPAIGNS[kind](space, rng, count, tally)
             print(f"{kind}: {tally.runs} of {wanted[kind]}, {len(tally.faults)} faults", flush=True)
     except KeyboardInterrupt:
         pass
-    return tallies, where
+    return tallies
 
 
 def undisturbed(space: Workspace) -> float:

@@ -62,16 +62,9 @@ class Writes:
         self.counts |= found
         return found
 
-    def draw(self, rng: random.Random, kind: str = "") -> tuple[str, int]:
-        """A kind of write and which one of a run: all kinds alike, however often a run does them.
-
-        Raises:
-            SystemExit: A run has no write of the kind.
-        """
-        names = [name for name in sorted(self.counts) if kind in ("", name.split(":")[0])]
-        if not names:
-            raise SystemExit(f"an undisturbed run has no write of {kind}")
-        name = rng.choice(names)
+    def draw(self, rng: random.Random) -> tuple[str, int]:
+        """A kind of write and which one of a run: all kinds alike, however often a run does them."""
+        name = rng.choice(sorted(self.counts))
         return name, rng.randint(1, self.counts[name])
 
 
@@ -87,34 +80,29 @@ def draw_signal(rng: random.Random) -> int:
     return signal.SIGKILL if share < 0.5 else rng.choice(ASKING) if share < 0.85 else rng.choice(FATAL)
 
 
-def campaign(
-    space: Workspace, rng: random.Random, kills: int, tally: verdicts.Tally, seconds: float, where: Counter[str],
-    before: str = "",
-) -> None:  # fmt: skip
+def campaign(space: Workspace, rng: random.Random, kills: int, tally: verdicts.Tally, seconds: float) -> None:
     """Kill runs.
 
     Args:
         kills: How many more; the last series goes on to its end.
         tally: Takes the outcomes.
         seconds: Processor time of an undisturbed run [s].
-        where: Takes the numbers of kills by stage and signal, and by write.
-        before: Kind of the writes before which all kills are, such as `kernels`; empty: any moment.
     """
     writes = writes_of(space)
     enough = tally.runs + kills
     while tally.runs < enough:
         space.reset(old_outputs=rng.random() < 0.3)
-        figures = before == "figures" or rng.random() < 0.15
+        figures = rng.random() < 0.15
         about = f"series at kill {tally.runs}"
         for _ in range(rng.randint(1, 4)):
-            cooled = space.cool(rng, before if before in CACHED else "")
+            cooled = space.cool(rng)
             parts = {cooled, "layer", "root layer", "table", "recording", "checkpoint", "temporary files"}
             parts |= {"figures"} if figures else set()
-            name, count = writes.draw(rng, before)
+            name, count = writes.draw(rng)
             while name.split(":")[0] not in parts:
-                name, count = writes.draw(rng, before)
+                name, count = writes.draw(rng)
             number = draw_signal(rng)
-            timed = not before and rng.random() < 0.4
+            timed = rng.random() < 0.4
             if timed:
                 cold = rng.random() < COLD / 0.4
                 run = runs.start(space, space.arguments(figures), cold=cold)
@@ -128,9 +116,6 @@ def campaign(
                 ending = runs.run(space, figures, fault)
             tally.runs += 1
             text = f"{about}, {signal.Signals(number).name} {'at a moment' if timed else f'at {name} {count}'}"
-            where[f"stage\t{ending.stage}\t{signal.Signals(number).name}"] += 1
-            if not timed:
-                where[f"write\t{name}"] += 1
             _judge(space, ending, number, cold, text, tally)
             if ending.status == 0:
                 break

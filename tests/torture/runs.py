@@ -46,12 +46,6 @@ class Ending:
     seconds: float
 
     @property
-    def stage(self) -> str:
-        """The stage that it was in at its end."""
-        lines = [line.split("\t") for line in self.err.splitlines() if line.startswith("progress\t")]
-        return lines[-1][1] if lines and len(lines[-1]) > 1 else "before the first stage"
-
-    @property
     def text(self) -> str:
         """What it printed on stderr besides the progress."""
         return "\n".join(line for line in self.err.splitlines() if not line.startswith("progress\t"))

@@ -233,7 +233,7 @@ class PluginCommand:
         return module
 
 
-def plugin_commands(environment: Mapping[str, str] | None = None) -> dict[str, PluginCommand]:
+def plugin_commands() -> dict[str, PluginCommand]:
     """Name to command, of bundled plugins, installed ones and those in the folders of CALMOTION_PLUGINS.
 
     A plugin whose manifest cannot be read has none; where an enabled and a disabled plugin bring a command, it is that
@@ -242,9 +242,9 @@ def plugin_commands(environment: Mapping[str, str] | None = None) -> dict[str, P
     Raises:
         SettingError: A named folder holds no plugin, or the file with the user's choices cannot be read.
     """
-    disabled = disabled_plugins(environment)
+    disabled = disabled_plugins()
     found: dict[str, PluginCommand] = {}
-    for location in discover((), environment):
+    for location in discover():
         try:
             manifest = read_manifest(location.folder)
         except PluginError:

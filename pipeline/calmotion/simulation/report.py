@@ -24,11 +24,11 @@ from calmotion.simulation.target_errors import IntendedMotion, rotation_errors
 from calmotion.support.naming import distinct_names
 
 
-def by_body(model: Model, values: Array, axis: int = 1) -> Array:
-    """Reorder an axis of components to the character's bodies."""
+def by_body(model: Model, values: Array) -> Array:
+    """Reorder the second axis, of components, to the character's bodies."""
     order = np.empty(len(model.tree.body), int)
     order[list(model.tree.body)] = np.arange(len(order))
-    return np.take(values, order, axis=axis)
+    return np.take(values, order, axis=1)
 
 
 def elastic_by_body(model: Model, u: Array) -> tuple[Array, ...]:

@@ -25,12 +25,11 @@ from calmotion.model import (
 LENGTH, WIDTH, DENSITY = 0.4, 0.04, 1200.0
 
 
-def small_shot(flexible: bool = False, frames: int = 25) -> tuple[Character, Animation]:
+def small_shot(flexible: bool = False) -> tuple[Character, Animation]:
     """An arm of two beams that lies along x, turns about y, and swings down and back within a second.
 
     Args:
         flexible: The outer beam bends; it then carries its own tetrahedra.
-        frames: Number of frames, 24 a second.
 
     Returns:
         The character (gravity along -z), and its animation.
@@ -52,7 +51,7 @@ def small_shot(flexible: bool = False, frames: int = 25) -> tuple[Character, Ani
         targets=(Target("/Arm/Fore/Tip", 1, Frame(tip, np.array([1.0, 0.0, 0.0, 0.0]))),),
         gravity=np.array([0.0, 0.0, -9.81]),
     )
-    times = np.arange(frames) / 24.0
+    times = np.arange(25) / 24.0
     swing = 0.25 * (1.0 - np.cos(2.0 * np.pi * times))
     tracks = (Track(times, swing), Track(times, -0.5 * swing))
     return character, Animation(frame_times=times, tracks=tracks, current=tracks)

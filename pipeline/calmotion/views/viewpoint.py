@@ -33,7 +33,7 @@ class Viewpoint:
     up: Array
 
 
-def choose_viewpoint(character: Character, skins: tuple[Skin | None, ...], motion: Motion, rows: int = 12) -> Viewpoint:
+def choose_viewpoint(character: Character, skins: tuple[Skin | None, ...], motion: Motion) -> Viewpoint:
     """A viewpoint from which the whole motion is visible.
 
     The front of a character is the side of its targets. Up is opposite to gravity.
@@ -42,11 +42,10 @@ def choose_viewpoint(character: Character, skins: tuple[Skin | None, ...], motio
         character: The character.
         skins: One for each body.
         motion: The motion to show.
-        rows: Number of instants of the motion that are used.
     """
     clouds = [motion.target_positions.reshape(-1, 3)]
     fixed = []
-    for row in np.unique(np.linspace(0, len(motion.times) - 1, rows).astype(int)):
+    for row in np.unique(np.linspace(0, len(motion.times) - 1, 12).astype(int)):
         for index, body in enumerate(character.bodies):
             points = [
                 p
@@ -79,7 +78,7 @@ def moving_cloud(character: Character, skins: tuple[Skin | None, ...], motion: M
     A picture that has the corners of a hull has all of its surface; robots have surfaces of a hundred thousand points.
     """
     clouds = [motion.target_positions.reshape(-1, 3)]
-    instants = np.unique(np.linspace(0, len(motion.times) - 1, rows).astype(int))
+    instants = np.unique(np.linspace(0, len(motion.times) - 1, 12).astype(int))
     matrices = rotation_matrices(motion.rotations[instants])
     for index, body in enumerate(character.bodies):
         for s, surface in enumerate(body.surfaces):
