@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import synthetic
-from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, moving_cloud, near_scenery
+from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, hull_corners, moving_cloud, near_scenery
 
 
 def test_the_sphere_contains_every_target_but_not_the_hidden_guide():
@@ -51,6 +51,11 @@ def test_the_eye_is_as_near_as_the_whole_motion_allows():
     across = np.abs(offset @ right) / depth / (aspect * np.tan(half))
     upright = np.abs(offset @ np.cross(right, forward)) / depth / np.tan(half)
     assert max(across.max(), upright.max()) == pytest.approx(1.0), "inside the picture, and reaching its edge"
+
+
+def test_of_a_flat_surface_all_points_are_taken():
+    flat = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.5, 0.5, 0.0]])
+    assert hull_corners(flat).tolist() == [0, 1, 2, 3, 4]
 
 
 def test_scenery_near_the_character_belongs_into_the_picture_and_a_stage_does_not():

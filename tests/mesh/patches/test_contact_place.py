@@ -56,3 +56,8 @@ def test_the_place_turns_with_the_body(flanged):
     there = placed(turned, *(turn[:3, :3] @ [0.1, 0.0, 0.2]), axis=turn[:3, 2])
     here = placed(flanged, 0.1, 0.0, 0.2)
     assert there.kind == "ring" and turn[:3, :3].T @ there.position == pytest.approx(here.position, abs=1e-3)
+
+
+def test_a_flat_surface_has_no_inside():
+    sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    assert placed(sheet, 0.5, 0.5, 0.5).kind in ("flange", "face")

@@ -56,3 +56,9 @@ def test_a_flat_element_does_not_change_the_frequencies_of_a_free_body(thinness)
     found = frequencies(model, 9)
     assert np.all(found[:6] < 1.0) and found[6:] == pytest.approx([427.6, 427.7, 1114.5], rel=1e-3)
     assert clamped_modes(model, 3)[0] == pytest.approx(found[6:], rel=1e-6)
+
+
+def test_more_modes_than_there_are_is_all_of_them(helpers, steel):
+    tiny = assemble(*helpers.box((1, 1, 1), (0.1, 0.1, 0.1)), steel)
+    clamped = held(tiny)
+    assert len(frequencies(tiny, 1000, clamped)) == 3 * (len(tiny.mesh.nodes) - len(clamped))

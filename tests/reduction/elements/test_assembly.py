@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from boxes import quadratic_shapes
+from calmotion.mesh.quadratic import quadratic_nodes
 from calmotion.reduction.elements.assembly import assemble
 
 
@@ -25,6 +26,11 @@ def test_nodes_are_corners_then_midpoints_of_edges(block):
     assert np.array_equal(ten[:, :4], tets)
     for middle, (i, j) in zip(range(4, 10), ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)), strict=True):
         assert np.allclose(nodes[ten[:, middle]], 0.5 * (nodes[ten[:, i]] + nodes[ten[:, j]]), atol=1e-15)
+
+
+def test_nodes_are_counted_without_making_them(block):
+    points, tets, model = block
+    assert quadratic_nodes(points, tets) == len(model.mesh.nodes)
 
 
 def test_the_mass_matrix_equals_independent_quadrature(block, helpers, steel):

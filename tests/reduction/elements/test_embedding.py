@@ -29,8 +29,9 @@ def quadratic(x):
     return u[:, :, None], 0.5 * curl[:, :, None]
 
 
-def test_a_quadratic_field_and_its_rotation_are_exact_inside(mesh):
-    points = inside(mesh)
+@pytest.mark.parametrize("count", [300, 20_000])  # many points look for their elements in a tree
+def test_a_quadratic_field_and_its_rotation_are_exact_inside(mesh, count):
+    points = inside(mesh, count)
     tied = embedding.embed(mesh, points)
     u, rotation = quadratic(points)
     modes = quadratic(mesh.nodes)[0]
