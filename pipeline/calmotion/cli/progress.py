@@ -38,7 +38,7 @@ class ProgressDisplay:
         self._farm = FarmProgress() if openjd else None
         self._bars: Bars | None = None
         self._tasks: dict[str, TaskID] = {}
-        self._stage, self._since = "", 0.0
+        self._stage, self._since, self._logged = "", 0.0, ""
 
     def __enter__(self) -> ProgressDisplay:
         if not self._quiet and not self._machine and sys.stderr.isatty():
@@ -75,13 +75,13 @@ class ProgressDisplay:
 
     def _log(self, stage: str, message: str) -> None:
         """In a log, tell what takes long: a message that begins with an estimate (`about 20 s`), or after `QUIET_S`."""
-        now, new = time.monotonic(), stage != self._stage
-        if new:
-            self._stage, self._since = stage, now
-        told = message.startswith("about ") or (message and now - self._since > QUIET_S)
+        now = time.monotonic()
+        if stage != self._stage:
+            self._stage, self._since, self._logged = stage, now, ""
+        told = message.startswith("about ") or (message not in ("", self._logged) and now - self._since > QUIET_S)
         if told and not self._quiet and not self._machine:
             self._tell(f"{stage}: {message}")
-            self._since = now
+            self._since, self._logged = now, message
 
     def done(self, result: OperatorResult) -> None:
         """Show the outcome of an operator, and its messages."""

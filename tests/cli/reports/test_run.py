@@ -157,7 +157,7 @@ def test_how_far_motors_move_and_why_errors_remain_are_told():
     lines = stream.getvalue().splitlines()
     assert lines[0].startswith("Angles of motors change by at most: J7 4.01°, J6") and "2 more by less" in lines[0]
     assert lines[1].startswith(
-        "What remains, 5.5 mm at /Elbow, 1.4 mm at /Cup: 5 motors cannot follow all 9 directions"
+        "What remains, 5.5 mm at /Elbow, 1.4 mm at /Cup: 5 motors cannot follow the targets in all 9 "
     )
     assert lines[2].startswith(
         "What remains, 2 mm at /Nose: limits of motors hold it (see the table of limits) and gravity"

@@ -29,9 +29,9 @@ CAUSES = {
     "limits": "limits of motors hold it (see the table of limits)",
     "search": "the search ended early (see below)",
     "sag": "gravity alone causes half of it, already at rest",
-    "motors": "{motors} motors cannot follow all {directions} directions of the targets (positions and rotations), and "
-    "the weights of the targets decide (CalmTargetAPI)",
-    "weight": "other targets have a larger weight",
+    "motors": "{motors} motors cannot follow the targets in all {directions} directions, so that their weights decide "
+    "(CalmTargetAPI)",
+    "weight": "other targets have larger weights",
     "reach": "these motors cannot take away more, and the search has converged",
 }
 
