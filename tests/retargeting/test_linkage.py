@@ -8,7 +8,7 @@ from calmotion.retargeting.problem.offset_basis import make_basis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.posing import CLOSENESS, SMOOTHNESS
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.retargeting.solver.damping_homotopy import FAR, damping_homotopy
+from calmotion.retargeting.solver.damping_homotopy import LARGE_ANGLE, damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion
@@ -61,7 +61,7 @@ def test_the_way_through_damped_problems_is_shorter(shot):
     problem = make_problem(shot, prepared, 0.05)
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
     begin = problem.at(zero)
-    assert begin.error > FAR * problem.lever()
+    assert begin.error > LARGE_ANGLE * problem.lever()
     start = damping_homotopy(begin, free, float(modes_of(prepared)[0][0]))
     near = start.at.merit
     # as much work as the approach took, spent on the problem itself; a product is a fifth of a simulation

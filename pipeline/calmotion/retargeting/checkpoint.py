@@ -24,7 +24,7 @@ from calmotion.support.caching.verified_files import DamagedFileError, read_arra
 # The state of a search belongs to the code that computed it.
 _ROOMS = ("linear_algebra", "multibody", "retargeting", "simulation", "support")
 _OF_LIMITS = ("rho", "first", "left", "reached", "stalled", "on")
-SAME = 1e-4  # largest relative difference of the merit when a stored point is simulated again
+MERIT_ROUNDING = 1e-4  # largest relative difference of the merit when a stored point is simulated again
 LOG = logging.getLogger("calmotion")
 
 
@@ -78,7 +78,7 @@ class StoredSearch:
 
     def matches(self, merit: float) -> bool:
         """Whether the point has the recorded merit when it is simulated again."""
-        return bool(np.isfinite(merit) and abs(merit - self.merit) <= SAME * max(abs(self.merit), abs(merit)))
+        return bool(np.isfinite(merit) and abs(merit - self.merit) <= MERIT_ROUNDING * max(abs(self.merit), abs(merit)))
 
     def restored(self, limits: LimitTerms | None) -> LimitTerms | None:
         """Limits in the stored state."""

@@ -36,8 +36,8 @@ from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
 
 AS_THEY_ARE = "converged"  # reason of the end where nothing is searched: another search has found the curves
-NEAR = 2.0  # of the tolerance: where a largest error is beyond the tolerance, but no farther, smaller gains count
-BEYOND = 0.2  # share of the least gain, which is one of a mean over time, that counts there
+NEAR_TOLERANCE = 2.0  # where a largest error is beyond the tolerance, but not by this factor, smaller gains count
+GAIN_NEAR_TOLERANCE = 0.2  # share of the least gain, which is one of a mean over time, that counts there
 MISSED = 0.5  # share of the least gain that changes in the inactive intervals may gain together
 
 
@@ -195,8 +195,8 @@ class RetargetSearch:
 
     def _minimized(self, search: Search, fixed: BoolArray) -> Search:
         found = self._to_gain(search, fixed, self._least)
-        if found.reason == "converged" and 1.0 < self._largest_error(found.at) / self.tolerance < NEAR:
-            found = self._to_gain(replace(found, reason=""), fixed, BEYOND * self._least)
+        if found.reason == "converged" and 1.0 < self._largest_error(found.at) / self.tolerance < NEAR_TOLERANCE:
+            found = self._to_gain(replace(found, reason=""), fixed, GAIN_NEAR_TOLERANCE * self._least)
         return found
 
     def _to_gain(self, search: Search, fixed: BoolArray, gain: float) -> Search:

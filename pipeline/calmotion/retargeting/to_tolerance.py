@@ -20,7 +20,7 @@ from calmotion.retargeting.input_run import with_input_resolved
 from calmotion.retargeting.optimize import optimize_shot, refuse_other_integrators
 from calmotion.retargeting.robust.retarget import retarget_robustly
 from calmotion.retargeting.search_progress import SuccessiveSearches
-from calmotion.retargeting.simplification.idle_motors import ENOUGH
+from calmotion.retargeting.simplification.idle_motors import JOINING_GAIN
 from calmotion.retargeting.windows.optimize import optimize_windows
 from calmotion.retargeting.windows.plan import window_length
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -45,7 +45,7 @@ from calmotion.tolerance.simulation import (
 from calmotion.tolerance.step_choice import FIRST, LAST, allowed_step_error, chooses_step
 from calmotion.tolerance.step_error import StepRun, distance, frames_of_result, largest_step, order_of, simulate_at
 
-MARGIN, MOST = 0.8, 3  # safety factor of a new step, and most searches
+STEP_SAFETY, SEARCHES = 0.8, 3  # safety factor of a new step, and most searches
 FIRST_STEP = 0.2  # of the shake: the error that the step of the first search may have
 
 
@@ -86,7 +86,7 @@ def optimize_to_tolerance(
         progress(0.0, "choosing the time step")
         step = _first_step(projected.shot, options, shake)
     result, tracks, searches = None, animation.current, SuccessiveSearches(progress)
-    for number in range(MOST):
+    for number in range(SEARCHES):
         reduced = projected.shot.with_tracks(tracks)
         of_step = replace(options, step=step) if chooses else options
         try:
@@ -118,7 +118,7 @@ def optimize_to_tolerance(
             result = best_so_far(result)
             break
         if not fine:
-            step = max(LAST, MARGIN * result.step_s * (allowed / accuracy.step_m) ** (1.0 / order_of(character)))
+            step = max(LAST, STEP_SAFETY * result.step_s * (allowed / accuracy.step_m) ** (1.0 / order_of(character)))
     assert result is not None
     if options.robust is not None and not result.interrupted:
         searches.ended()
@@ -203,7 +203,7 @@ def _searched(
     """One search; it continues with the idle motors if these would gain too much."""
     character = shot.character
     first = _search(shot, options, progress, checkpoint, stored, memory)
-    enough = ENOUGH * tolerance_of(character, options.tolerance)
+    enough = JOINING_GAIN * tolerance_of(character, options.tolerance)
     if first.interrupted or first.idle_gain_m is None or first.idle_gain_m <= enough or options.motors == OFF:
         return first
     progress.ended()

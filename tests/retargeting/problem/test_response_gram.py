@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from calmotion.retargeting.problem import response_gram as module
 from calmotion.retargeting.problem.response_gram import (
-    LARGE,
-    LEAST,
+    LEAST_PRODUCTS,
+    MANY_UNKNOWNS,
     dense_responses,
     products_worth,
     response_bands,
@@ -69,11 +69,13 @@ def test_a_sharpened_preconditioner_solves_the_system_at_once(problem):
 
 def test_many_unknowns_begin_with_the_matrix_unless_it_costs_more_than_it_saves(problem):
     robots, space = problem.sweeps.robots, problem.space
-    many, most, too_many = (replace(space, motors=np.arange(n // space.basis.count + 1)) for n in (LARGE, 1400, 3000))
-    assert products_worth(robots, space, first=True) == products_worth(robots, space) == LEAST
+    many, most, too_many = (
+        replace(space, motors=np.arange(n // space.basis.count + 1)) for n in (MANY_UNKNOWNS, 1400, 3000)
+    )
+    assert products_worth(robots, space, first=True) == products_worth(robots, space) == LEAST_PRODUCTS
     assert products_worth(robots, many, first=True) == products_worth(robots, most, first=True) == 0
-    assert products_worth(robots, many) == LEAST
-    assert products_worth(robots, too_many, first=True) == products_worth(robots, too_many) > LEAST
+    assert products_worth(robots, many) == LEAST_PRODUCTS
+    assert products_worth(robots, too_many, first=True) == products_worth(robots, too_many) > LEAST_PRODUCTS
 
 
 def test_no_matrix_where_responses_cannot_be_worked_out_together(arm, bodies, animation):
@@ -115,7 +117,7 @@ def test_cut_responses_have_few_bands_and_a_matrix_that_is_as_definite(problem, 
 
 def test_a_search_with_too_many_unknowns_for_the_whole_matrix_takes_the_bands(problem, monkeypatch):
     before = products(problem)
-    monkeypatch.setattr(module, "_LARGEST", problem.space.size - 1)
+    monkeypatch.setattr(module, "DENSE_UNKNOWNS", problem.space.size - 1)
     monkeypatch.setattr(module, "LASTING", 0.45 * problem.rigid.grid.end)
     assert problem.patience(None) == 0
     sharpened = problem.sharpened()

@@ -56,7 +56,7 @@ def test_a_motor_of_the_head_is_not_optimised_and_the_loss_is_small(shot, bodies
 
 
 def test_the_search_continues_on_finer_knots_where_they_promise_a_gain(shot, bodies, monkeypatch):
-    monkeypatch.setattr(to_tolerance, "ENOUGH", -1.0)
+    monkeypatch.setattr(to_tolerance, "JOINING_GAIN", -1.0)
     result = optimize_to_tolerance(compile_shot(_marked(shot), shot.animation, bodies), FAST, ignore_progress)
     assert result.idle_gain_m is None
     assert not any("Nod" in row.what and "moves no target" in row.why for row in result.left_out)

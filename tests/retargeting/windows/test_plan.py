@@ -8,7 +8,14 @@ from calmotion.errors import ShotError
 from calmotion.model.budget import SEARCH_SHARE
 from calmotion.model.robust.settings import RobustSettings
 from calmotion.model.run import LONG_SHOT, WINDOW, RunSettings
-from calmotion.retargeting.windows.plan import EXACT, FEWEST, least_gain, overlap_time, plan_windows, window_length
+from calmotion.retargeting.windows.plan import (
+    EXACT,
+    FEWEST_FRAMES,
+    least_gain,
+    overlap_time,
+    plan_windows,
+    window_length,
+)
 
 
 @pytest.mark.parametrize("seconds", [3.0, 61.0, 62.5, 75.0, 600.0])
@@ -20,7 +27,7 @@ def test_windows_cover_the_shot_once_and_overlap(seconds, overlap):
     for one, two in zip(windows[:-1], windows[1:], strict=True):
         assert one.kept == two.first and one.first < one.kept < one.last <= len(times) - 1
         assert times[one.last] - times[one.kept] >= overlap - 1e-9 or one.last == len(times) - 1
-    assert all(window.last - window.first >= min(FEWEST, len(times) - 1) for window in windows)
+    assert all(window.last - window.first >= min(FEWEST_FRAMES, len(times) - 1) for window in windows)
     assert abs(len(windows) - seconds / 20.0) <= 1.0
 
 

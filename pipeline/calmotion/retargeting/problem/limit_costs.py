@@ -9,8 +9,8 @@ from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.retargeting.problem.problem import Evaluation
 from calmotion.retargeting.solver.limited_step import limited_step
 
-MOST = 4  # number of limits whose cost is estimated, largest multipliers first
-PRODUCTS, SHARE = 30, 0.05  # most products of a step, and share of the decrease that it may leave
+ESTIMATED_LIMITS = 4  # number of limits whose cost is estimated, largest multipliers first
+STEP_PRODUCTS, STEP_SHARE = 30, 0.05  # most products of a step, and share of the decrease that it may leave
 
 
 def limit_costs(at: Evaluation, fixed: BoolArray) -> dict[tuple[int, str], float]:
@@ -33,8 +33,8 @@ def limit_costs(at: Evaluation, fixed: BoolArray) -> dict[tuple[int, str], float
     if not weights:
         return {}
     costs = {}
-    for motor, name in sorted(weights, key=lambda key: -weights[key])[:MOST]:
+    for motor, name in sorted(weights, key=lambda key: -weights[key])[:ESTIMATED_LIMITS]:
         without = at.with_limits(limits.without(motor, name))
-        step = limited_step(without.linearized(), fixed, SHARE, 0.0, PRODUCTS)
+        step = limited_step(without.linearized(), fixed, STEP_SHARE, 0.0, STEP_PRODUCTS)
         costs[motor, name] = max(0.0, at.gain(step.eased, at.objective_value))
     return costs

@@ -24,16 +24,16 @@ from calmotion.retargeting.problem.robot import LinearRobot
 from calmotion.retargeting.solver.dense_preconditioner import DensePreconditioner
 from calmotion.retargeting.solver.preconditioner import Preconditioner, banded_preconditioner
 
-COST = 1 / 64  # of a response, in products: half of the instants, at a sixteenth of the time of a sweep
+RESPONSE_COST = 1 / 64  # of a response, in products: half of the instants, at a sixteenth of the time of a sweep
 OF_PART = 1 / 22  # the same of one that is followed for a part of the shot, over that part
 LASTING = 8.0  # for which responses of long shots are followed [s]: over 40 s, 14 products; with 4 s more than 60
-LEAST = 24  # products: the matrix is not made for less; few robots need its kernels, which take seconds to compile
-LARGE = 800  # unknowns from which the kernels are worth their compiling; of all samples, first systems need 15 or more
+LEAST_PRODUCTS = 24  # the matrix is not made for less; few robots need its kernels, which take seconds to compile
+MANY_UNKNOWNS = 800  # from which the kernels are worth their compiling; of all samples, first systems need 15 or more
 _BLOCK = 64  # responses at once
 _TOGETHER = 8  # blocks that are worked out before their products
-_LARGEST = 6000  # unknowns up to which responses are followed to the end: the factor takes seconds
+DENSE_UNKNOWNS = 6000  # unknowns up to which responses are followed to the end: the factor takes seconds
 _OPERATIONS = 7e10  # of the factor of a matrix with bands: as many as with the most unknowns without
-_SHARE = 0.5  # of the memory for a linearisation
+SHARE_OF_MEMORY = 0.5  # of the memory for a linearisation
 
 
 def products_worth(robots: Sequence[LinearRobot], space: OffsetSpace, first: bool = False) -> int | None:
@@ -46,15 +46,16 @@ def products_worth(robots: Sequence[LinearRobot], space: OffsetSpace, first: boo
     if not all(robot.linear.can_be_blocked() for robot in robots):
         return None
     if is_whole(robots, space):
-        cost = COST * space.size
-        return 0 if first and space.size >= LARGE and cost <= LEAST else max(LEAST, round(cost))
+        cost = RESPONSE_COST * space.size
+        at_once = first and space.size >= MANY_UNKNOWNS and cost <= LEAST_PRODUCTS
+        return 0 if at_once else max(LEAST_PRODUCTS, round(cost))
     instants, lasting = len(robots[0].at.errors), _lasting(robots[0])
     bands = _bandwidth(space, lasting)
     slow = space.size * bands**2 > _OPERATIONS
-    if 2 * lasting > instants or slow or 24.0 * space.size * bands > _SHARE * spare_memory():
+    if 2 * lasting > instants or slow or 24.0 * space.size * bands > SHARE_OF_MEMORY * spare_memory():
         return None
     # without it each system of a long shot takes as many products as it may
-    return 0 if first else max(LEAST, round(OF_PART * space.size * lasting / instants))
+    return 0 if first else max(LEAST_PRODUCTS, round(OF_PART * space.size * lasting / instants))
 
 
 def response_preconditioner(robots: Sequence[LinearRobot], space: OffsetSpace) -> Preconditioner:
@@ -69,7 +70,8 @@ def is_whole(robots: Sequence[LinearRobot], space: OffsetSpace) -> bool:
     """Whether the matrix may hold the entries of all unknowns with all others."""
     # robots follow one after the other: the responses of one are in memory at a time
     rows = len(robots[0].at.errors) * np.count_nonzero(_varying(robots[0]))
-    return space.size <= _LARGEST and bool(8.0 * space.size * (rows + 3 * space.size) <= _SHARE * spare_memory())
+    size = 8.0 * space.size * (rows + 3 * space.size)
+    return space.size <= DENSE_UNKNOWNS and bool(size <= SHARE_OF_MEMORY * spare_memory())
 
 
 def response_gram(robots: Sequence[LinearRobot], space: OffsetSpace) -> Array:

@@ -20,7 +20,7 @@ from calmotion.retargeting.robust.worst_case import beyond_simulation, largest_w
 from calmotion.simulation.compiled_shot import CompiledShot
 
 REACH = 3.0  # standard deviations of the farthest robots of a worst case: one of 370 is farther along a direction
-LEAST = 0.05  # weight of the nominal robot in a mean, where the rule would give it less
+LEAST_NOMINAL_WEIGHT = 0.05  # weight of the nominal robot in a mean, where the rule would give it less
 
 
 def chosen_scenarios(
@@ -53,7 +53,7 @@ def chosen_scenarios(
         nodes, shares = _equal(number) if kind == WORST else _gauss(number)
         points += [node * direction for node in nodes]
         weights += shares.tolist()
-    weights[0] = 1.0 if kind == WORST else max(1.0 - sum(weights[1:]), LEAST)
+    weights[0] = 1.0 if kind == WORST else max(1.0 - sum(weights[1:]), LEAST_NOMINAL_WEIGHT)
     given = np.array(weights)
     return tuple(
         scenario_at(parameters, x, float(weight)) for x, weight in zip(points, given / given.sum(), strict=True)

@@ -14,8 +14,8 @@ from calmotion.retargeting.problem.linear_problem import LinearProblem
 from calmotion.retargeting.problem.problem import Evaluation
 from calmotion.simulation.inputs.gearing import coupling_of
 
-STEPS = 2  # of conjugate gradients
-ENOUGH = 0.05  # share of the tolerance: idle motors with a larger gain join the search
+CG_STEPS = 2  # of conjugate gradients
+JOINING_GAIN = 0.05  # share of the tolerance: idle motors with a larger gain join the search
 
 
 def idle_motors(character: Character) -> IntArray:
@@ -37,7 +37,7 @@ def idle_gain(at: Evaluation, linear: LinearProblem, character: Character) -> fl
     residual = -other.gradient
     direction, square = residual, float(residual @ residual)
     decrease = 0.0
-    for _ in range(STEPS):
+    for _ in range(CG_STEPS):
         product = other.product(direction)
         curvature = float(direction @ product)
         if not (square > 0.0 and curvature > 0.0):

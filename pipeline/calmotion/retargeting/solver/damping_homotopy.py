@@ -15,10 +15,10 @@ from calmotion.multibody.failure import SimulationFailure
 from calmotion.retargeting.problem.problem import Evaluation
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 
-FAR = 0.1  # error over the largest lever arm of a motor [rad] from which the homotopy is used
-DAMPING = (0.2, 0.05)  # damping ratios of the lowest mode
-GAIN = 1e-3  # predicted gain that ends a stage, relative to the error at its start
-STEPS = 5  # most iterations of a stage
+LARGE_ANGLE = 0.1  # error over the largest lever arm of a motor [rad] from which the homotopy is used
+DAMPING_RATIOS = (0.2, 0.05)  # damping ratios of the lowest mode
+STAGE_GAIN = 1e-3  # predicted gain that ends a stage, relative to the error at its start
+STAGE_ITERATIONS = 5  # most iterations of a stage
 
 
 def damping_homotopy(start: Evaluation, fixed: BoolArray, frequency: float) -> Search:
@@ -31,13 +31,14 @@ def damping_homotopy(start: Evaluation, fixed: BoolArray, frequency: float) -> S
     """
     problem, best = start.problem, start
     evaluations = gradients = products = 0
-    if start.error > FAR * problem.lever() and frequency > 0.0:
-        for ratio in DAMPING:
+    if start.error > LARGE_ANGLE * problem.lever() and frequency > 0.0:
+        for ratio in DAMPING_RATIOS:
             damped = problem.damped(ratio, frequency)
             evaluations += 1
             with suppress(SimulationFailure):
                 there = damped.at(best.x)
-                stage = minimize(damped, Search.start(best.x, there), fixed, GAIN * there.error, max_iterations=STEPS)
+                begin, gain = Search.start(best.x, there), STAGE_GAIN * there.error
+                stage = minimize(damped, begin, fixed, gain, max_iterations=STAGE_ITERATIONS)
                 best = stage.at
                 evaluations, gradients = evaluations + stage.evaluations, gradients + stage.gradients
                 products += stage.products

@@ -16,9 +16,9 @@ from scipy.sparse.linalg import splu
 
 from calmotion.arrays import Array
 
-MOST = 100  # iterations
-NEAR = 0.995  # share of the way to the boundary that a step takes
-CLOSE = 1e-14  # complementarity at the end, relative to rho
+ITERATIONS = 100  # iterations
+FRACTION_TO_BOUNDARY = 0.995  # share of the way to the boundary that a step takes
+COMPLEMENTARITY = 1e-14  # complementarity at the end, relative to rho
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +48,12 @@ def elastic_minimum(H: csr_matrix, c: Array, G: csr_matrix, b: Array, rho: float
     gap = G @ x - b
     multipliers = np.full(len(b), 0.5 * rho)
     below, above = np.maximum(-gap, 0.0) + 1.0, np.maximum(gap, 0.0) + 1.0
-    for _ in range(MOST):
+    for _ in range(ITERATIONS):
         other = rho - multipliers
         measure = float(below @ multipliers + above @ other) / (2 * count)
         dual = H @ x + c + Gt @ multipliers
         primal = G @ x + below - above - b
-        if measure <= CLOSE * rho and np.max(np.abs(primal), initial=0.0) <= 1e-9:
+        if measure <= COMPLEMENTARITY * rho and np.max(np.abs(primal), initial=0.0) <= 1e-9:
             break
         goal = 0.1 * measure
         weight = 1.0 / (below / multipliers + above / other)
@@ -78,4 +78,4 @@ def elastic_minimum(H: csr_matrix, c: Array, G: csr_matrix, b: Array, rho: float
 def _longest(values: Array, change: Array) -> float:
     """Share of a change, at most 1, that keeps positive values positive."""
     falling = change < 0.0
-    return min(1.0, NEAR * float(np.min(-values[falling] / change[falling], initial=np.inf)))
+    return min(1.0, FRACTION_TO_BOUNDARY * float(np.min(-values[falling] / change[falling], initial=np.inf)))

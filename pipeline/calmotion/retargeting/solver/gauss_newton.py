@@ -15,11 +15,11 @@ from calmotion.retargeting.solver.preconditioner import Sharpened
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.retargeting.solver.truncated_cg import Path, conjugate_gradients
 
-PAIRS = 24  # directions that are kept for the next system
-TRIES = 10  # most reductions of a step in one iteration
-SHARE = 0.01  # share of the decrease of an iteration at which conjugate gradients end
-LEFT = 0.1  # share of the gain that ends a search, which systems may leave: what they leave is not predicted
-ACCEPTED = 0.05  # smallest share of the predicted decrease for a step to be accepted
+RECYCLED_PAIRS = 24  # directions that are kept for the next system
+STEP_REDUCTIONS = 10  # most reductions of a step in one iteration
+FORCING_TERM = 0.01  # share of the decrease of an iteration at which conjugate gradients end
+UNPREDICTED_SHARE = 0.1  # of the gain that ends a search: systems may leave as much, which is not predicted then
+ACCEPTED_RATIO = 0.05  # smallest share of the predicted decrease for a step to be accepted
 
 
 class Linear(LinearLimited, Protocol):
@@ -208,16 +208,16 @@ def minimize(
         linear = at.linearized()
         gradient = calls.gradient(linear)
         norm = float(np.linalg.norm(gradient))
-        enough = LEFT * at.merit_of_gain(gain)
+        enough = UNPREDICTED_SHARE * at.merit_of_gain(gain)
         if at.limits_act:
             if (patience := linear.patience(sharpened)) is not None and _last_products(history) > patience:
                 sharpened = linear.sharpened()
-            limited = limited_step(linear, fixed, SHARE, enough, max_products, sharpened)
+            limited = limited_step(linear, fixed, FORCING_TERM, enough, max_products, sharpened)
             calls.products += limited.products
             at, predicted = at.with_limits(limited.limits), limited.predicted(1.0)
         else:
             path, sharpened = _path(linear, calls, gradient, (recycled, sharpened), radius, enough, max_products, eager)
-            recycled = recycled.followed_by(path.p, path.Hp, PAIRS)
+            recycled = recycled.followed_by(path.p, path.Hp, RECYCLED_PAIRS)
             _, predicted, _ = path.within(radius)
         expected = at.gain(predicted, at.merit)
         history.append(Iterate(at.merit, norm, expected, calls.evaluations, calls.products))
@@ -264,7 +264,7 @@ def _path(
         sharpened, patience = linear.sharpened(), None
     for limit in (max_products if patience is None else min(patience, max_products), max_products):
         inverse = recycled.inverse(linear.precondition(calls.fixed, sharpened))
-        path = conjugate_gradients(calls.product(linear), gradient, inverse, radius, SHARE, enough, limit)
+        path = conjugate_gradients(calls.product(linear), gradient, inverse, radius, FORCING_TERM, enough, limit)
         if len(path.p) < limit or limit == max_products:
             break
         sharpened = linear.sharpened()
@@ -274,9 +274,9 @@ def _path(
 def _limited_step(calls: _Counter, at: Any, limited: LimitedStep) -> tuple[Any, float] | None:
     """The point after a step under limits, which is shortened until the simulation agrees with the model."""
     t = 1.0
-    for _ in range(TRIES):
+    for _ in range(STEP_REDUCTIONS):
         there, predicted = calls.at(at.problem, at.x + t * limited.step, at), limited.predicted(t)
-        if there is not None and predicted > 0.0 and at.merit - there.merit > ACCEPTED * predicted:
+        if there is not None and predicted > 0.0 and at.merit - there.merit > ACCEPTED_RATIO * predicted:
             return there, np.inf
         t *= 0.3
     return None
@@ -285,13 +285,13 @@ def _limited_step(calls: _Counter, at: Any, limited: LimitedStep) -> tuple[Any, 
 def _step(calls: _Counter, at: Any, path: Path, radius: float) -> tuple[Any, float] | None:
     """The point after a step in the trust region, and the next radius; None if no step is accepted."""
     size = radius
-    for _ in range(TRIES):
+    for _ in range(STEP_REDUCTIONS):
         step, predicted, length = path.within(size)
         if not predicted > 0.0:
             return None
         there = calls.at(at.problem, at.x + step, at)
         share = -np.inf if there is None else (at.merit - there.merit) / predicted
-        if share > ACCEPTED:
+        if share > ACCEPTED_RATIO:
             if share < 0.25:
                 return there, 0.5 * length
             grown = length >= 0.99 * size and share > 0.7

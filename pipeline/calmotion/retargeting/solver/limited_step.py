@@ -22,9 +22,9 @@ from calmotion.retargeting.solver.truncated_cg import conjugate_gradients
 
 Values = dict[str, Array]
 
-INNER = 20  # most Newton iterations
-MOST = 8  # most products of all iterations, over those of one
-FAR = 4.0  # longest step of a line search, over the Newton step
+NEWTON_ITERATIONS = 20  # most Newton iterations
+PRODUCTS_OVER_ONE_SYSTEM = 8  # most products of all iterations, over those of one
+LONGEST_STEP = 4.0  # longest step of a line search, over the Newton step
 
 
 @dataclass(eq=False)
@@ -182,7 +182,7 @@ def limited_step(
     model = LimitedModel(linear)
     start = point = model.start
     gained, products = 0.0, 0
-    for _ in range(INNER):
+    for _ in range(NEWTON_ITERATIONS):
         gradient = np.where(fixed, 0.0, model.gradient(point))
         direction, used = _newton_direction(model, point, gradient, fixed, (share, enough, max_products), sharpened)
         products += used
@@ -191,7 +191,7 @@ def limited_step(
         point = point.moved(direction, t)
         decrease = before - model.merit(point)
         gained += decrease
-        if products > MOST * max_products:
+        if products > PRODUCTS_OVER_ONE_SYSTEM * max_products:
             break
         if decrease <= max(enough, share * gained):
             if (updated := model.limits.updated(point.values)) is None:
@@ -247,7 +247,7 @@ def _line_search(model: LimitedModel, point: ModelPoint, direction: ModelPoint) 
         return model.slope(point.moved(direction, t), direction)
 
     low, high = 0.0, 1.0
-    while slope(high) < 0.0 and high < FAR:
+    while slope(high) < 0.0 and high < LONGEST_STEP:
         low, high = high, 2.0 * high
     for _ in range(30):
         middle = 0.5 * (low + high)

@@ -14,12 +14,12 @@ from calmotion.multibody.model.system import State
 from calmotion.simulation.forward import ForwardRun, followed
 from calmotion.simulation.simulator import LinearRun, Simulator
 
-FEWEST = 4  # instants that BDF2 needs to go on exactly: two for the step, and two for the memory of the one before
+BDF2_INSTANTS = 4  # that it needs to go on exactly: two for the step, and two for the memory of the one before
 
 
 def needed_instants(model: Model, h: float) -> int:
     """How many instants before the first frame of a window must be known: commands act late."""
-    return FEWEST + int(np.ceil(max(model.delays, default=0.0) / h))
+    return BDF2_INSTANTS + int(np.ceil(max(model.delays, default=0.0) / h))
 
 
 @dataclass(frozen=True, eq=False)

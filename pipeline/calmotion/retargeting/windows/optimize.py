@@ -20,7 +20,7 @@ from calmotion.retargeting.problem.posing import knot_spacing
 from calmotion.retargeting.windows.assembly import Done, result_of
 from calmotion.retargeting.windows.continued import Beginning, needed_instants
 from calmotion.retargeting.windows.parts import Part, Piece, offsets_in, part_of, performed, piece_of
-from calmotion.retargeting.windows.plan import FEWEST, Window, overlap_time, plan_windows
+from calmotion.retargeting.windows.plan import FEWEST_FRAMES, Window, overlap_time, plan_windows
 from calmotion.retargeting.windows.search import Found, Setting, search_window
 from calmotion.retargeting.windows.store import WindowStore, window_keys
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -147,7 +147,7 @@ class _Windows:
         count, window = len(self.windows), self.windows[k]
         times = self.whole.grid.frame_times
         spacing = knot_spacing(self.whole.character, self.setting.options) or FIRST
-        long = times[window.last] - times[window.kept] >= max(FEWEST * times[1], TAIL * spacing)
+        long = times[window.last] - times[window.kept] >= max(FEWEST_FRAMES * times[1], TAIL * spacing)
         ends = bool(long) and not window.is_last and not self.store.done[k + 1]
         part = part_of(self.whole, window.first, window.last, known, ends)
         kept = float(times[window.kept - window.first])

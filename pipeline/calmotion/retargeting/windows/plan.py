@@ -21,9 +21,9 @@ from calmotion.model.character import contact_joints
 from calmotion.model.run import LONG_SHOT, WINDOW, WINDOW_OVERLAP, RunSettings
 
 FALL = 10.0  # factor by which the slowest mode falls in an overlap
-LEAST = 1.0  # overlap, but not above half a window [s]
+LEAST_OVERLAP = 1.0  # overlap, but not above half a window [s]
 SUFFICIENT = 1.5  # overlap that is not shortened to a quarter of a window, but to half of one [s]
-FEWEST = 12  # frames of a window
+FEWEST_FRAMES = 12  # frames of a window
 EXACT = 0.0001  # of the tolerance: the least gain of a window at which it agrees with one search within a tenth of it
 
 
@@ -86,10 +86,10 @@ def window_length(character: Character, animation: Animation, options: RunSettin
             found=f"{wanted:g} s", remedy="Use --window 0: one search for the whole shot",
         )  # fmt: skip
     frame = float(animation.frame_times[1] - animation.frame_times[0])
-    if wanted < FEWEST * frame:
+    if wanted < FEWEST_FRAMES * frame:
         raise ShotError(
             "the windows are too short", path=character.path, attribute="--window", found=f"{wanted:g} s",
-            remedy=f"Use {FEWEST * frame:.3g} s or more: {FEWEST} frames",
+            remedy=f"Use {FEWEST_FRAMES * frame:.3g} s or more: {FEWEST_FRAMES} frames",
         )  # fmt: skip
     return wanted if wanted < length else None
 
@@ -118,8 +118,8 @@ def overlap_time(frequencies: Array, damping: Array, length: float) -> float:
     """
     rates = 2.0 * np.pi * np.asarray(frequencies) * np.asarray(damping)  # amplitudes fall like exp(-rate t)
     slowest = float(np.min(rates[rates > 0.0], initial=math.inf))
-    falling = math.log(FALL) / slowest if math.isfinite(slowest) else LEAST
-    return min(max(LEAST, falling), max(WINDOW_OVERLAP * length, min(SUFFICIENT, 0.5 * length)))
+    falling = math.log(FALL) / slowest if math.isfinite(slowest) else LEAST_OVERLAP
+    return min(max(LEAST_OVERLAP, falling), max(WINDOW_OVERLAP * length, min(SUFFICIENT, 0.5 * length)))
 
 
 def plan_windows(frame_times: Array, length: float, overlap: float) -> tuple[Window, ...]:
@@ -131,13 +131,13 @@ def plan_windows(frame_times: Array, length: float, overlap: float) -> tuple[Win
         overlap: [s].
     """
     frames, frame = len(frame_times), float(frame_times[1] - frame_times[0])
-    stride, more = max(FEWEST, round(length / frame)), max(FEWEST // 2, math.ceil(overlap / frame - 1e-9))
+    stride, more = max(FEWEST_FRAMES, round(length / frame)), max(FEWEST_FRAMES // 2, math.ceil(overlap / frame - 1e-9))
     starts = list(range(0, frames - 1, stride))
     while len(starts) > 1 and frames - 1 - starts[-1] < max(more, stride // 2):
         starts.pop()
     windows = []
     for first, following in zip(starts, [*starts[1:], frames - 1], strict=True):
         # a tail that would leave a few frames for nobody reaches the end
-        last = frames - 1 if following + more + FEWEST // 2 >= frames - 1 else following + more
+        last = frames - 1 if following + more + FEWEST_FRAMES // 2 >= frames - 1 else following + more
         windows.append(Window(first, following, last, frames))
     return tuple(windows)
