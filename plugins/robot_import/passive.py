@@ -44,7 +44,10 @@ def author_springs(stage: Usd.Stage, units: StageUnits) -> list[str]:
     radians = any(prim.GetAttribute("mjc:compiler:angle").Get() == "radian" for prim in prims_of(stage))
     joints = list(joint_prims(stage))
     free = {axis.prim for axis in free_axes([axis for prim in joints for axis in axes_of(prim)])}
-    made, damped, driven, others = [], [], [], []
+    made: list[str] = []
+    damped: list[str] = []
+    driven: list[str] = []
+    others: list[str] = []
     for prim in joints:
         spring, damping = (_number(prim, name) for name in ("mjc:stiffness", "newton:damping"))
         held = bool(axes_of(prim)) and is_driven(axes_of(prim)[0])

@@ -21,8 +21,9 @@ def actuators_beside(stage: Usd.Stage, path: str, joint: JointPrim) -> tuple[Usd
 
 
 def _acts_on(actuator: Usd.Prim, joint: JointPrim) -> bool:
-    relationship = actuator.GetRelationship("mjc:target") if actuator.GetTypeName() == "MjcActuator" else None
-    return bool(relationship) and joint.prim.GetPath() in relationship.GetTargets()
+    relationship = actuator.GetRelationship("mjc:target")
+    known = actuator.GetTypeName() == "MjcActuator" and bool(relationship)
+    return known and joint.prim.GetPath() in relationship.GetTargets()
 
 
 def numbers_of(prim: Usd.Prim, name: str) -> list[float]:
