@@ -6,6 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from calmotion.arrays import Array
+from calmotion.errors import ShotError
 from calmotion.model import Animation, Character
 from calmotion.model.character import with_ideal_motors
 from calmotion.model.limits.base import CurveLimit
@@ -54,7 +55,7 @@ def exceeded_limits(character: Character, animation: Animation, options: RunSett
         run = run_forward(model, workspace, curves.angles, curves.rates, grid.h, world, steady=steady)
         values = limited_values(model, bounds, curves, run)
         efforts = _efforts(prepared, run, values["effort"], curves) if "effort" in values and steady is None else None
-    except SimulationFailure:
+    except (SimulationFailure, ShotError):  # `simulate` says what is wrong
         efforts = None
         kinds = {name: kind for name, kind in kinds_of_limits().items() if isinstance(kind, CurveLimit)}
         values = {name: curves.derivatives[kinds[name].order] for name in bounds if name in kinds}
