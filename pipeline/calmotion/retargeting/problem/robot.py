@@ -106,9 +106,11 @@ class RobotRun:
         robot, run = self.robot, self.run
         linear, errors = robot.simulator.linearize(run, first), TargetErrors(robot.objective).slopes(run)
         errors = ErrorSlopes(robot.objective, np.sqrt(robot.weight) * errors.jacobian)
+        at = RobotRun(robot, run)  # not this one: large arrays that refer to each other would stay in memory for long
+        at.__dict__["parts"] = self.parts
         self._linear.clear()
         self._linear[first] = LinearRobot(
-            self, linear, errors, tuple(residual.slopes(run) for residual in robot.residuals),
+            at, linear, errors, tuple(residual.slopes(run) for residual in robot.residuals),
             {name: quantity.slopes(run) for name, quantity in robot.limited.items()},
         )  # fmt: skip
         return self._linear[first]
