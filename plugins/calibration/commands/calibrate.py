@@ -139,7 +139,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
             progress=display, on_operator=display.done,
         )  # fmt: skip
     conclude(made.report(), (), output, None if args.quiet else _print)
-    return 0
+    return 130 if made.calibration.interrupted else 0
 
 
 def _performed(args: argparse.Namespace) -> list[tuple[str, tuple[str, ...]]]:

@@ -124,7 +124,7 @@ def calibrate_shots(
     return Calibration(
         estimates, covariance, {r.file: r.sha256 for r in all_recordings}, fits, curves,
         found.solution.converged, found.iterations, told.count, step_of(found.problem), found.shift,
-        time.perf_counter() - begin, notes, factors,
+        time.perf_counter() - begin, notes, factors, found.interrupted,
     )  # fmt: skip
 
 
@@ -238,6 +238,8 @@ def _notes(
     notes = []
     if not found.solution.converged:
         notes.append("the search did not converge: the estimates may be far from the best ones")
+    if found.interrupted:
+        notes.append("interrupted while the step was halved: the estimates are those of the last step that converged")
     if settings.halvings and found.shift > 1.0:
         notes.append("the estimates still depend on the time step: give a smaller one with --step")
     for take in found.problem.takes:

@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.arrays import Array, BoolArray
 from calmotion.errors import ShotError
 from calmotion.multibody import SimulationFailure, in_parallel
+from calmotion.support import answer
 
 from ..model.estimates import DAMPING
 from .disagreement import widened
@@ -45,6 +46,7 @@ class Found:
         shift: Largest change by the last halving of the step, over its standard deviation.
         disagrees: Entries of z that pieces of the recordings tell differently, by more than the rest of the covariance,
             shape [n].
+        interrupted: Whether the step was not halved as far as it should.
     """
 
     z: Array
@@ -54,6 +56,7 @@ class Found:
     iterations: int
     shift: float
     disagrees: BoolArray
+    interrupted: bool = False
 
 
 def search(problem: Calibrated, tell: Callable[[float, str], None], halvings: int = HALVINGS) -> Found:
@@ -103,28 +106,35 @@ def _converged(problem: Calibrated, solution: Solution, iterations: int, halving
     Derivatives are those of the first step: a minimum with another step is near, and its residuals alone decide where.
     """
     deviations, of_model = _deviations(problem, solution)
-    earlier, limit, shift, extrapolated = solution.z, solution.z, 0.0, False
+    earlier, limit, shift, extrapolated, interrupted = solution.z, solution.z, 0.0, False, False
     for _ in range(halvings):
-        problem = problem.with_options(replace(problem.options, step=0.5 * step_of(problem)))
-        near = chord(problem, solution)
-        solution, iterations = near or solution, iterations + 1
+        finer = problem.with_options(replace(problem.options, step=0.5 * step_of(problem)))
+        try:
+            near = chord(finer, solution)
+            other = near or minimize(finer, solution.z, finer.lower, FIRST_ITERATIONS)
+            if near is None:  # derivatives there are others
+                deviations, of_model = _deviations(finer, other)
+        except KeyboardInterrupt:  # what converged is not thrown away
+            answer()
+            interrupted = True
+            break
+        problem, solution, iterations = finer, other, iterations + (1 if near is not None else other.iterations)
+        if near is None:
+            earlier, limit, extrapolated = solution.z, solution.z, False
+            continue
         change = solution.z - earlier
         then = np.maximum(solution.z + change / (2**ORDER - 1), problem.lower)
         # the first extrapolation is compared with what it extrapolates, the next ones with the one before
         off = then - limit if extrapolated else change / (2**ORDER - 1)
         shift = float(np.max(np.abs(off) / deviations, initial=0.0))
-        if near is None:  # derivatives there are others
-            solution = minimize(problem, solution.z, problem.lower, FIRST_ITERATIONS)
-            deviations, of_model = _deviations(problem, solution)
-            earlier, limit, extrapolated, iterations = solution.z, solution.z, False, iterations + solution.iterations
-            continue
         earlier, limit, extrapolated = solution.z, then, True
         if shift <= SHIFT:
             break
     problem = problem.with_measurement(correlated(problem, solution.z))
     covariance = posterior(solution.jacobian, solution.residuals, problem.counts) + of_model
     wider = widened(problem, solution, covariance)
-    return Found(limit, problem, solution, wider[:, None] * covariance * wider, iterations, shift, wider > DISAGREES)
+    covariance = wider[:, None] * covariance * wider
+    return Found(limit, problem, solution, covariance, iterations, shift, wider > DISAGREES, interrupted)
 
 
 def step_of(problem: Calibrated) -> float:
@@ -142,7 +152,7 @@ def _deviations(problem: Calibrated, solution: Solution) -> tuple[Array, Array]:
     weights = weights_of(solution.residuals) / counts
     of_model = covariance_of_model(problem, solution.z, solution.jacobian, weights)
     covariance = posterior(solution.jacobian, solution.residuals, counts) + of_model
-    return np.sqrt(np.diag(covariance)) * widened(problem, solution, covariance), of_model
+    return np.sqrt(np.diag(covariance)), of_model
 
 
 def correlated(problem: Calibrated, z: Array) -> Measurement:

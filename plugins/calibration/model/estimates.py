@@ -140,6 +140,7 @@ class Calibration:
         step_shift: Largest change of an estimate by the last halving of the step, over its standard deviation.
         wall_s: Time it took [s].
         notes: What the user must know, as sentences.
+        interrupted: Whether the step was not halved as far as it should, since the user stopped the search.
         gain_factors: Motors whose position gains differ from shot to shot; the estimate is that of the first shot.
     """
 
@@ -156,6 +157,7 @@ class Calibration:
     wall_s: float
     notes: tuple[str, ...] = ()
     gain_factors: tuple[str, ...] = ()
+    interrupted: bool = False
 
     @property
     def correlations(self) -> Array:

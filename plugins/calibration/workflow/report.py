@@ -56,6 +56,7 @@ def calibration_report(
             "validation_rms": {fit.name: _known(fit.validation_rms) for fit in calibration.channels},
             "recordings": [{"file": file, "sha256": digest} for file, digest in calibration.recordings.items()],
             "converged": calibration.converged,
+            "interrupted": calibration.interrupted,
             "iterations": calibration.iterations,
             "simulations": calibration.simulations,
             "step_s": calibration.step_s,

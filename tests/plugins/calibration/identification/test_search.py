@@ -84,3 +84,13 @@ def test_a_minimum_of_a_coarse_step_that_is_far_is_searched_anew(recorded_shot, 
     found = search._converged(problem, begun, 4, 2)
     assert len(made) == 2 and np.array_equal(made[0][1], begun.z)
     assert found.iterations > 6 and search.step_of(found.problem) == search.step_of(problem) / 4.0
+
+
+def test_what_converged_is_kept_where_halving_the_step_is_interrupted(recorded_shot, recordings, monkeypatch):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(search, "chord", stopped)
+    problem = problem_of(recorded_shot, only(recordings, MARKER))
+    found = search.search(problem, quiet, halvings=2)
+    assert found.interrupted and found.solution.converged and np.all(np.isfinite(found.covariance))
