@@ -47,6 +47,21 @@ def test_a_larger_mesh_error_decides_the_verdict(simulated, arm):
         assert (verdict.kept, verdict.short) == (kept, "" if kept else MESH)
 
 
+@pytest.mark.parametrize(
+    "requested, error, counted", [(None, 0.03, False), (None, 0.05, True), (TOLERANCE, 0.03, True)]
+)
+def test_a_mesh_that_is_finer_than_the_modulus_is_known_counts_only_where_a_tolerance_is_asked_for(
+    simulated, arm, requested, error, counted
+):
+    known = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, tolerance=None))
+    modes = tuple(dataclasses.replace(table, mesh_error=error) for table in simulated.modes)
+    accuracy = dataclasses.replace(simulated.accuracy, mesh_m=1.0)
+    result = with_budget(dataclasses.replace(simulated, accuracy=accuracy, modes=modes), known, requested)
+    assert verdict_on(result.budget, 1.0).kept != counted
+    told = [row for row in result.left_out if "modulus is known to 10%" in row.why]
+    assert len(told) == (requested is None)
+
+
 def test_a_given_step_is_estimated_and_falls_short_where_it_is_too_long(arm, animation, bodies):
     options = RunSettings(tolerance=1e-4, step=1 / 120)
     result = with_budget(simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet), arm, 1e-4)

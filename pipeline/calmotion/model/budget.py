@@ -21,6 +21,8 @@ class BudgetEntry:
         estimated_m: What it is estimated to cost [m]; None where that is not known.
         choice: What was chosen.
         reason: Why.
+        counted: Whether the verdict on the tolerance counts it; that of meshes which are finer than what is known of a
+            modulus is told beside it, where nobody asked for a tolerance.
     """
 
     source: str
@@ -28,6 +30,7 @@ class BudgetEntry:
     estimated_m: float | None
     choice: str
     reason: str
+    counted: bool = True
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ def verdict_on(budget: Sequence[BudgetEntry], tolerance: float, measured: float 
     """
     if not budget and measured is None:
         return Verdict(False, None, "")
-    counted = [entry for entry in budget if entry.source != SEARCH]
+    counted = [entry for entry in budget if entry.source != SEARCH and entry.counted]
     error = sum(entry.estimated_m or 0.0 for entry in counted) if measured is None else measured
     if error <= tolerance:
         return Verdict(True, error, "")

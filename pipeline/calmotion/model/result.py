@@ -148,13 +148,16 @@ class OptimizerStep:
 
 @dataclass(frozen=True, eq=False)
 class ModeTable:
-    """Frequencies of one flexible body [Hz], clamped at its parent side, and the size of its mesh."""
+    """Frequencies of a flexible body [Hz], clamped at its parent side, the size of its mesh, and the relative error of
+    its stiffness by the mesh (None: not known).
+    """
 
     body: int
     frequencies: Array
     nodes: int
     elements: int
     mass: float
+    mesh_error: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

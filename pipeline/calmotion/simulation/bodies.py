@@ -218,7 +218,7 @@ def with_elasticity(character: Character, law: str) -> Character:
 def mode_tables(bodies: Sequence[ReducedBody]) -> tuple[ModeTable, ...]:
     """Frequencies of the flexible bodies."""
     return tuple(
-        ModeTable(index, body.frequencies, body.nodes, body.elements, body.invariants.mass)
+        ModeTable(index, body.frequencies, body.nodes, body.elements, body.invariants.mass, body.mesh_error)
         for index, body in enumerate(bodies)
         if len(body.stiffness)
     )

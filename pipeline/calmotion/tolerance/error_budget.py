@@ -23,8 +23,9 @@ def with_budget(
         least_gain: As of `RunSettings`.
     """
     tolerance = tolerance_of(character, requested)
+    fine = all(mesh_budget.finer_than_known(character, own.body, own.mesh_error, requested) for own in result.modes)
     told = (*result.left_out, *_unknown(result, character, requested))
-    return replace(result, left_out=told, tolerance_m=tolerance, budget=_budget(result, tolerance, least_gain))
+    return replace(result, left_out=told, tolerance_m=tolerance, budget=_budget(result, tolerance, least_gain, fine))
 
 
 def _unknown(result: Result, character: Character, requested: float | None) -> tuple[Simplification, ...]:
@@ -38,7 +39,7 @@ def _unknown(result: Result, character: Character, requested: float | None) -> t
     return (Simplification(what, why, result.accuracy.mesh_m if result.accuracy else None, MESH),)
 
 
-def _budget(result: Result, tolerance: float, least_gain: float) -> tuple[BudgetEntry, ...]:
+def _budget(result: Result, tolerance: float, least_gain: float, fine: bool) -> tuple[BudgetEntry, ...]:
     accuracy = result.accuracy
     if accuracy is None:
         return ()
@@ -62,7 +63,7 @@ def _budget(result: Result, tolerance: float, least_gain: float) -> tuple[Budget
     if result.modes:
         rest = tolerance - sum(other.estimated_m or 0.0 for other in entries)
         left = max(rest, mesh_budget.SHARE * tolerance)  # other entries may be beyond their shares
-        entries.append(_mesh_entry(result, accuracy.mesh_m, left))
+        entries.append(replace(_mesh_entry(result, accuracy.mesh_m, left), counted=not fine))
     if result.after is not None:
         ended = result.stopped == "converged"
         why = "a smaller gain is not pursued" if ended else f"the search ended before: {result.stopped}"

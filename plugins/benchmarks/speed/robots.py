@@ -88,7 +88,8 @@ def measure(file: str, links: int, patience: float) -> RobotRow:
         except subprocess.TimeoutExpired:
             return RobotRow(name, told, verdict=f"not ended after {patience:g} s")
         except (json.JSONDecodeError, KeyError):
-            return RobotRow(name, told, verdict=done.stderr.strip().rpartition("\n")[2])
+            lines = [line for line in done.stderr.splitlines() if not line.startswith(("note:", "  "))]
+            return RobotRow(name, told, verdict=f"exit status {done.returncode}: {' '.join(lines[-3:])}")
 
 
 def _row(name: str, links: str, found: dict[str, Any]) -> RobotRow:
@@ -144,7 +145,7 @@ def compose(file: str, out: Path, links: int) -> list[str]:
     _make_flexible(stage, chosen)
     for path, _ in joints:
         _animate(stage.GetPrimAtPath(path))
-    stage.GetPrimAtPath(joints[-1][1]).ApplyAPI("CalmTargetAPI")
+    stage.GetPrimAtPath(_farthest(robot, [body for _, body in joints])).ApplyAPI("CalmTargetAPI")
     layer.Save()
     return chosen
 
@@ -165,16 +166,43 @@ def _make_flexible(stage: Any, bodies: Sequence[str]) -> None:
 
 
 def _driven(stage: Any) -> Iterator[tuple[str, str]]:
-    """Revolute and prismatic joints of a stage that are part of no closed chain, and the body that each carries."""
+    """Revolute and prismatic joints that actuators or drives turn, else all, and the body that each carries."""
+    from calmotion.usd import actuated_joints
     from pxr import UsdPhysics
 
+    driven = set(actuated_joints(stage)) or {
+        str(prim.GetPath()) for prim in stage.Traverse() if any("DriveAPI" in api for api in prim.GetAppliedSchemas())
+    }
     for prim in stage.Traverse():
+        if driven and str(prim.GetPath()) not in driven:
+            continue
         if prim.GetTypeName() not in ("PhysicsRevoluteJoint", "PhysicsPrismaticJoint"):
             continue
         joint = UsdPhysics.Joint(prim)
         bodies = joint.GetBody1Rel().GetTargets()
         if bodies and not joint.GetExcludeFromArticulationAttr().Get():
             yield str(prim.GetPath()), str(bodies[0])
+
+
+def _farthest(stage: Any, bodies: Sequence[str]) -> str:
+    """The body with the most joints between it and the world."""
+    from pxr import UsdPhysics
+
+    carriers = {}
+    for prim in stage.Traverse():
+        if prim.IsA(UsdPhysics.Joint):
+            joint = UsdPhysics.Joint(prim)
+            inner, outer = (relation.GetTargets() for relation in (joint.GetBody0Rel(), joint.GetBody1Rel()))
+            if inner and outer:
+                carriers.setdefault(str(outer[0]), str(inner[0]))
+
+    def depth(body: str) -> int:
+        count = 0
+        while body in carriers and count < len(carriers):
+            body, count = carriers[body], count + 1
+        return count
+
+    return max(bodies, key=depth)
 
 
 def _length(stage: Any, body: str) -> float:

@@ -105,6 +105,16 @@ def unknown_stiffness(character: Character, index: int, requested: float | None)
     return character.retarget.uncertainty.of_modulus(flexible.material.path)
 
 
+def finer_than_known(character: Character, index: int, error: float | None, requested: float | None) -> bool:
+    """Whether a mesh is so fine that its error is small beside what is not known of the stiffness of a body.
+
+    Args:
+        character, index, requested: As of `unknown_stiffness`.
+        error: Relative error of the stiffness by the mesh; None: not known.
+    """
+    return error is not None and error <= _WORTH * OF_UNCERTAINTY * unknown_stiffness(character, index, requested)
+
+
 def uncertainty_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float:
     """How far targets move with bodies that are softer by what is not known of their stiffness [m]."""
     unknown = [unknown_stiffness(shot.character, b, options.tolerance) for b in range(len(shot.bodies))]
