@@ -188,7 +188,7 @@ def _farthest(stage: Any, bodies: Sequence[str]) -> str:
     """The body with the most joints between it and the world."""
     from pxr import UsdPhysics
 
-    carriers = {}
+    carriers: dict[str, str] = {}
     for prim in stage.Traverse():
         if prim.IsA(UsdPhysics.Joint):
             joint = UsdPhysics.Joint(prim)
