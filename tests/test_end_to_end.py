@@ -53,7 +53,10 @@ def test_report_has_the_keys_of_the_contract(run):
         total_wall_s simulate_wall_s steps step_s dof modes parameters layer left_out tolerance_m tolerance_kept
         error_budget""".split()
     assert not [key for key in keys if key not in run[1]]
-    assert all(set(row) == {"source", "allowed_m", "estimated_m", "choice", "reason"} for row in run[1]["error_budget"])
+    assert all(
+        set(row) == {"source", "allowed_m", "estimated_m", "choice", "reason", "counted"}
+        for row in run[1]["error_budget"]
+    )
     assert all(set(row) == {"what", "why", "estimated_error_m", "skipped"} for row in run[1]["left_out"])
 
 

@@ -47,7 +47,8 @@ def test_the_command_writes_a_layer_with_the_parameters_of_the_robot(calmotion, 
     modulus, damping = found[f"modulus {PLASTIC}"], found[f"damping {PLASTIC}"]
     assert modulus["value"] == pytest.approx(TRUTH["youngsModulus"], rel=0.01) and modulus["identifiable"]
     assert damping["value"] == pytest.approx(TRUTH["damping"], rel=0.1)
-    assert modulus["prior"]["value"] == pytest.approx(1e8) and modulus["standard_deviation"] < 0.01 * modulus["value"]
+    # most of the width is what the mesh is claimed to be off by
+    assert modulus["prior"]["value"] == pytest.approx(1e8) and modulus["standard_deviation"] < 0.03 * modulus["value"]
     channel = f"marker {HAND}"
     assert report["residual_rms"][channel] == pytest.approx(1e-4, rel=0.2)
     assert report["validation_rms"][channel] == pytest.approx(1e-4, rel=0.4)

@@ -74,8 +74,11 @@ def test_a_motor_that_is_still_everywhere_needs_limits(plan_file):
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
-        (lambda text: text.replace("23: 5.0, 24: 5.0", "23: 5.0, 24: 9.0"), "does not end at rest"),
-        (lambda text: text.replace("0: -20.0, 1: -20.0", "0: -25.0, 1: -20.0"), "does not begin at rest"),
+        (lambda text: text.replace("22: 5.0, 23: 5.0, 24: 5.0", "22: 6.0, 23: 7.0, 24: 8.0"), "does not end at rest"),
+        (
+            lambda text: text.replace("0: -20.0, 1: -20.0, 2: -20.0", "0: -23.0, 1: -22.0, 2: -21.0"),
+            "does not begin at rest",
+        ),
         (lambda text: text.replace('"Robot"', '"Other"').replace("/Robot", "/Other"), "different robots"),
     ],
 )
