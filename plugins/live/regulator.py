@@ -19,7 +19,6 @@ class Window:
 
     def __init__(self, ticks: int, limits: MotorLimits, forces: VelocityForces):
         self._tick, self._forces, self._ticks = limits.tick, forces, ticks
-        self._at_rest = forces.at
 
     def begin(self, position: Array) -> None:
         """Rest at a pose."""
@@ -56,8 +55,6 @@ class Regulator:
         deviating: The latter, shape [m].
         limits: Of all motors.
     """
-
-    SETTLED = 1e-14  # of a deviation [rad or m], with no impulse in the window: at rest
 
     def __init__(self, coupling: Array, deviating: IntArray, limits: MotorLimits):
         self._coupling, self._deviating, self._limits = coupling, deviating, limits

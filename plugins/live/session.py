@@ -39,6 +39,7 @@ class LiveSettings:
     """
 
     ACCELERATION = 100.0  # of a motor without a limit, which is worth the tolerance [rad/s^2 or m/s^2]
+    PENALTY = 1.0  # of a deviating acceleration at its limit, in tolerances
     HIGHEST = 1 / 3  # frequency of a mode that commands can act on, of the rate
     RENEWAL_S = 0.04  # between two renewals without a thread
 
@@ -255,12 +256,10 @@ class Live:
             self.tick_s,
             self._window_ticks,
             np.sqrt(np.repeat(weights, 3, axis=1)),
-            self.PENALTY * worth / (largest * self.tick_s),
+            LiveSettings.PENALTY * worth / (largest * self.tick_s),
             worth,
             spread,
         )
-
-    PENALTY = 1.0  # an acceleration at its limit, as a deviation of the intended one, in tolerances
 
     def _gains(self, position: Array) -> Gains:
         pose = pose_model(self._model, position, self._world, LiveSettings.HIGHEST * self.settings.rate)

@@ -46,6 +46,7 @@ class Stream:
         self.position, self.speed = np.array(position, float), np.zeros(len(position))
         self._wanted = self.position
         self._samples.clear()
+        self.events.clear()
         self._start, self._ticks, self._locked, self._ended = None, 0, True, False
 
     def end(self) -> None:
