@@ -1,7 +1,7 @@
 """Hashes of sources: they change with every module that is imported, directly or not."""
 
 import pytest
-from calmotion.support.caching.sources import digest_of, with_imports
+from calmotion.support.caching.sources import PACKAGE, digest_of, source_digest, with_imports
 
 
 @pytest.fixture
@@ -27,3 +27,17 @@ def test_a_hash_changes_with_content_and_name(package):
     assert one != digest_of([package / "d.py"])
     (package / "c.py").write_text("X = 2\n")
     assert one != digest_of([package / "c.py"])
+
+
+def test_the_digest_of_a_room_is_that_of_its_sources():
+    """A digest of nothing would let caches outlive the code that made them."""
+    from pathlib import Path
+
+    import calmotion
+
+    package = Path(calmotion.__file__).parent
+    assert PACKAGE == package
+    room = sorted((package / "reduction").rglob("*.py"))
+    assert len(room) > 10 and source_digest("reduction") == digest_of(room)
+    solver = package / "multibody" / "integrators" / "newton.py"
+    assert package / "multibody" / "kernels" / "assembly.py" in with_imports([solver])

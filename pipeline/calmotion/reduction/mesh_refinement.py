@@ -84,7 +84,7 @@ class MeshController:
     ) -> FEMesh:  # fmt: skip
         """The mesh, or a finer one, with the stiffness of ever finer ones; its quality holds the error.
 
-        Results are stored in the cache of reductions.
+        Results are stored in the cache of reductions, but for those that another time more memory would make finer.
 
         Args:
             mesh: Of the body; a factor of its stiffness that is already known is found anew.
@@ -99,7 +99,10 @@ class MeshController:
         """
         own = replace(mesh, quality=replace(mesh.quality, stiffness_factor=1.0))
         key = ("refined", self, own, replace(body, surfaces=()), attachments, root, loads)  # skins do not matter
-        return cached_reduction(key, lambda: self._refined(own, body, attachments, root, loads, full))
+        try:
+            return cached_reduction(key, lambda: self._refined(own, body, attachments, root, loads, full))
+        except _NotFiner as kept:
+            return kept.mesh
 
     def _refined(
         self, mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], root: int | None,
@@ -112,8 +115,8 @@ class MeshController:
         finer = bisected_to(mesh, coarse.indicators, nodes, self.marked)
         try:
             fine = response(finer, body, attachments, root, loads, self.modes, judged=False)
-        except FactorsTooLarge:
-            return _with_error(mesh, 1.0, self.safety * self.recovered * coarse.error)
+        except FactorsTooLarge as error:
+            raise _NotFiner(_with_error(mesh, 1.0, self.safety * self.recovered * coarse.error)) from error
         change, left = self.extrapolated(coarse, fine)
         whole = fine.compliances / coarse.compliances * (1.0 + change) - 1.0
         if self.keeps == "given":
@@ -134,6 +137,18 @@ class MeshController:
         change = difference / ((fine.nodes / coarse.nodes) ** self.order - 1.0)
         # a finer mesh that is stiffer tells nothing about ever finer ones
         return np.maximum(change, 0.0), self.safety * self.left * float(np.abs(change).max())
+
+
+class _NotFiner(Exception):
+    """There is not enough memory for a finer mesh.
+
+    Attributes:
+        mesh: The given one, with its error.
+    """
+
+    def __init__(self, mesh: FEMesh):
+        super().__init__("there is not enough memory for a finer mesh")
+        self.mesh = mesh
 
 
 def response(

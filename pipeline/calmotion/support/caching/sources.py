@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
-PACKAGE = Path(__file__).parents[1]
+PACKAGE = Path(__file__).parents[2]
 _IMPORT = re.compile(
     rb"^[ \t]*(?:from (calmotion[\w.]*) import (\([^)]*\)|[^\n]*)|import (calmotion[\w.]*))", re.MULTILINE
 )
