@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 from scipy.interpolate import CubicSpline
 
@@ -51,18 +53,22 @@ def exceeded_limits(character: Character, animation: Animation, options: RunSett
     model, grid, world = prepared.model, prepared.grid, prepared.world
     curves, workspace = sample_curves(animation.tracks, grid), Workspace.for_system(model.system)
     steady = SteadyState(model, world, grid.h, workspace) if grid.cyclic else None
+    run: ForwardRun | None
     try:
         run = run_forward(model, workspace, curves.angles, curves.rates, grid.h, world, steady=steady)
         values = limited_values(model, bounds, curves, run)
-        efforts = _efforts(prepared, run, values["effort"], curves) if "effort" in values and steady is None else None
     except (SimulationFailure, ShotError):  # `simulate` says what is wrong
-        efforts = None
+        run = None
         kinds = {name: kind for name, kind in kinds_of_limits().items() if isinstance(kind, CurveLimit)}
         values = {name: curves.derivatives[kinds[name].order] for name in bounds if name in kinds}
         bounds = {name: bounds[name] for name in values}
     found = excesses(bounds, values, grid.judged)
     uses = tuple(use for use in limit_uses(found, found, grid) if is_exceeded(use))
     slower = [use for use in uses if use.quantity != "position"]
+    efforts = None
+    if slower and "effort" in values and run is not None and steady is None:
+        with contextlib.suppress(SimulationFailure):
+            efforts = _efforts(prepared, run, values["effort"], curves)
     known = efforts is not None or all(use.quantity != "effort" for use in slower)
     if not slower or not known:
         return ExceededLimits(uses)
@@ -70,8 +76,6 @@ def exceeded_limits(character: Character, animation: Animation, options: RunSett
         name: bounds[name].upper if name in bounds else np.full(len(character.motors), np.inf) for name in _NAMES
     }
     judged = grid.judged
-    if efforts is not None:
-        efforts = MotorEfforts(*(part[judged] for part in (efforts.at_rest, efforts.by_square, efforts.by_change)))
     return ExceededLimits(
         uses, needed_tempo(grid.times[judged], curves.angles[judged], TempoLimits(**largest), efforts)
     )
@@ -81,7 +85,8 @@ _NAMES = ("velocity", "acceleration", "jerk", "effort")
 
 
 def _efforts(prepared: Prepared, run: ForwardRun, efforts: Array, curves: Curves) -> MotorEfforts:
-    """What the motors of the rigid robot have to do: at rest, by the square of the tempo, and by its change.
+    """What the motors of the rigid robot have to do in the judged time: at rest, by the square of the tempo, and by its
+    change.
 
     Raises:
         SimulationFailure: A pose in which the robot finds no rest, or its system is singular.
@@ -98,4 +103,5 @@ def _efforts(prepared: Prepared, run: ForwardRun, efforts: Array, curves: Curves
         model, states.c[few], states.q[few], run.joint_angles[few], motors, prepared.world[few], grid.times[few]
     )
     change = CubicSpline(grid.times[few], np.einsum("tmk,tk->tm", inertia, curves.rates[few]))(grid.times)
-    return MotorEfforts(weight, efforts - weight, change)
+    judged = grid.judged
+    return MotorEfforts(weight[judged], (efforts - weight)[judged], change[judged])
