@@ -16,7 +16,7 @@ from calmotion.host import Settings
 from calmotion.model import Animation, Character, Provenance, Result, RunSettings, Source, tolerance_of
 from calmotion.simulation import CompiledShot
 from calmotion.support import temporary_folder
-from calmotion.tolerance import ConvergedReduction, compiled_in
+from calmotion.tolerance import compiled_in
 from calmotion.version import __version__
 from calmotion.workflow import (
     Given,
@@ -27,6 +27,7 @@ from calmotion.workflow import (
     Shot,
     SimulationResult,
     carry_out,
+    compiled_run,
     no_input,
     read_settings,
     refuse_layers,
@@ -199,7 +200,11 @@ def export(
     exporter = _Exporter(outcome, result, given, chosen, hooks, highest=cls.highest_rate)
     # what is wrong with the format's settings is refused here, before the first mesh
     written = exporter.written(given.rate, target)
-    compiled = outcome if result is not None else _compiled(opened, given, chosen, hooks)
+    compiled = (
+        outcome
+        if result is not None
+        else compiled_run(opened, Source("", "", RunSettings(tolerance=given.tolerance)), chosen, hooks)
+    )
     made = exporter.measured(written, compiled, search)
     return replace(made, total_wall_s=time.perf_counter() - begin)
 
@@ -314,14 +319,3 @@ class _Exporter:
     def _tell(self, fraction: float, message: str) -> None:
         if self._hooks.progress:
             self._hooks.progress(Progress("Play the commands", fraction, message))
-
-
-def _compiled(shot: Shot, given: GivenExport, settings: Settings, hooks: Hooks) -> Outcome:
-    """A run that compiles a shot as `simulate` does."""
-    source = Source("", "", RunSettings(tolerance=given.tolerance))
-    outcome = carry_out(
-        shot, "simulate", wanted=(*_READ, CompiledShot), optional=(ConvergedReduction,), source=source,
-        settings=settings, hooks=hooks,
-    )  # fmt: skip
-    outcome.require(CompiledShot)
-    return outcome

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
-from typing import Any
 
 from calmotion.host import Settings, quantity_of
-from calmotion.model import Animation, Character, Provenance, RunSettings, Source
+from calmotion.model import RunSettings, Source
 from calmotion.simulation import CompiledShot
-from calmotion.tolerance import ConvergedReduction, compiled_in
-from calmotion.workflow import Hooks, Shot, carry_out
+from calmotion.tolerance import compiled_in
+from calmotion.workflow import Hooks, Shot, compiled_run
 
 from .session import Live, LiveSettings
 
@@ -44,20 +43,10 @@ def live(
     return Live(compiled(shot if isinstance(shot, Shot) else Shot(shot), operators, hooks), chosen)
 
 
-def compiled(shot: Shot, operators: Settings | None = None, hooks: Hooks | None = None) -> Any:
-    """The compiled robot of a shot, a `CompiledShot`.
+def compiled(shot: Shot, operators: Settings | None = None, hooks: Hooks | None = None) -> CompiledShot:
+    """The compiled robot of a shot.
 
     Raises:
         ShotError: It cannot be made.
     """
-    outcome = carry_out(
-        shot,
-        "simulate",
-        wanted=(Character, Animation, Provenance, CompiledShot),
-        optional=(ConvergedReduction,),
-        source=Source("", "", RunSettings()),
-        settings=operators,
-        hooks=hooks,
-    )
-    outcome.require(CompiledShot)
-    return compiled_in(outcome.run.get)
+    return compiled_in(compiled_run(shot, Source("", "", RunSettings()), operators, hooks).run.get)

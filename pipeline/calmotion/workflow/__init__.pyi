@@ -19,6 +19,7 @@ from calmotion.workflow.run import Outcome as Outcome
 from calmotion.workflow.run import Progress as Progress
 from calmotion.workflow.run import again as again
 from calmotion.workflow.run import carry_out as carry_out
+from calmotion.workflow.run import compiled_run as compiled_run
 from calmotion.workflow.run import no_input as no_input
 from calmotion.workflow.running.workers import LOCAL as LOCAL
 from calmotion.workflow.running.workers import executor_on as executor_on

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from calmotion.errors import ShotError
 from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, merge, nearest
-from calmotion.model import Character, Provenance
+from calmotion.model import Animation, Character, Provenance
 from calmotion.model.run import INTEGRATORS, SHAPERS, OutputPaths, Source
 from calmotion.support import interrupts
 from calmotion.support.foreign_files import remedy_for
@@ -169,6 +169,26 @@ def carry_out(
         shot.keep(run.data)
     problems = [Problem(ShotError("interrupted"))] if interrupted else problems_of(run, kinds)
     return Outcome(shot, run, tuple(problems), interrupted, cancelled, time.perf_counter() - start, given)
+
+
+def compiled_run(shot: Shot, source: Source, settings: Settings | None = None, hooks: Hooks | None = None) -> Outcome:
+    """A run that compiles a shot as `simulate` does, with reductions that do for it; `tolerance.compiled_in` has it.
+
+    Args:
+        source, settings, hooks: As of `carry_out`.
+
+    Raises:
+        RunError: It cannot be compiled.
+    """
+    from calmotion.simulation.compiled_shot import CompiledShot
+    from calmotion.tolerance.reduced_bodies import ConvergedReduction
+
+    outcome = carry_out(
+        shot, "simulate", wanted=(Character, Animation, Provenance, CompiledShot), optional=(ConvergedReduction,),
+        source=source, settings=settings, hooks=hooks,
+    )  # fmt: skip
+    outcome.require(CompiledShot)
+    return outcome
 
 
 def _listener(hooks: Hooks, raised: list[BaseException]) -> Callable[[str, float, str], None]:

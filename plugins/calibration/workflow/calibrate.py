@@ -13,8 +13,19 @@ from calmotion.model import Animation, Character, OutputPaths, Provenance, RunSe
 from calmotion.multibody import IMPLICIT
 from calmotion.recordings import SensorRecording, measured_prims, read_recordings
 from calmotion.simulation import CompiledShot
-from calmotion.tolerance import ConvergedReduction, compiled_in
-from calmotion.workflow import Given, Hooks, Outcome, Path, Progress, Shot, again, carry_out, read_settings
+from calmotion.tolerance import compiled_in
+from calmotion.workflow import (
+    Given,
+    Hooks,
+    Outcome,
+    Path,
+    Progress,
+    Shot,
+    again,
+    carry_out,
+    compiled_run,
+    read_settings,
+)
 
 from ..identification.calibrate import CalibrationSettings, calibrate_shots
 from ..identification.measurement import refuse_unknown_channels
@@ -236,12 +247,7 @@ def compiled_with_sensors(
         from calmotion.usd import refuse_inputs
 
         refuse_inputs(first.require(Provenance), layer)
-    outcome = carry_out(
-        opened, "simulate", wanted=(*_READ, CompiledShot), optional=(ConvergedReduction,), source=source,
-        settings=settings, hooks=hooks,
-    )  # fmt: skip
-    outcome.require(CompiledShot)
-    return outcome
+    return compiled_run(opened, source, settings, hooks)
 
 
 def with_sensors(shot: Shot | Path) -> Shot:
