@@ -68,8 +68,7 @@ def elastic_modes(model: Model) -> tuple[Array, list[Array]]:
     angles = model.rest_angles
     found = matrices_at(system, rigid_state(model, angles), angles, Workspace.for_system(system))
     K, M, allowed = found.stiffness, found.mass, found.allowed
-    ends = np.cumsum(6 + system.elastic)
-    parts = [slice(end - r, end) for end, r in zip(ends, system.elastic, strict=True)]
+    parts = [slice(end - r, end) for end, r in zip(system.starts[1:], system.elastic, strict=True)]
     size = allowed.shape[1]
     if not size:
         return np.zeros(0), [np.zeros((int(r), 0)) for r in system.elastic]
@@ -131,7 +130,7 @@ def matrices_at(system: System, state: State, joint_angles: Array, workspace: Wo
     """The equations of small motions about a state; what the motors do is left in the blocks of the workspace."""
     linearize(system, state, joint_angles, workspace)
     blocks = workspace.blocks
-    offset = np.concatenate([[0], np.cumsum(6 + system.elastic)])
+    offset = system.starts
     total = int(offset[-1])
     (K, M, C), H = np.zeros((3, total, total)), np.zeros((6 * len(system.rows), total))
     for b, r in enumerate(system.elastic):

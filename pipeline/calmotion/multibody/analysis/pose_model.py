@@ -91,8 +91,7 @@ def pose_model(model: Model, values: Array, world: Array | None = None, highest:
 
 def _by_inputs(model: Model, system: System, found: Matrices, workspace: Workspace) -> tuple[Array, Array]:
     """How the equilibrium moves with the motors' inputs, and the forces of their rates, shape [N, M] each."""
-    blocks, sizes = workspace.blocks, 6 + system.elastic
-    start = np.concatenate([[0], np.cumsum(sizes)])
+    blocks, sizes, start = workspace.blocks, 6 + system.elastic, system.starts
     joints, total = len(system.rows), int(start[-1])
     imposed = np.zeros((JOINT_ROWS * joints, joints))
     on_value, on_rate = np.zeros((total, joints)), np.zeros((total, joints))
@@ -115,8 +114,7 @@ def _by_inputs(model: Model, system: System, found: Matrices, workspace: Workspa
 
 def _in_all_coordinates(model: Model, J: Array) -> Array:
     """The targets' Jacobian, shape [K, 6, N], from that by each one's own component."""
-    sizes = 6 + model.system.elastic
-    start = np.concatenate([[0], np.cumsum(sizes)])
+    sizes, start = 6 + model.system.elastic, model.system.starts
     out = np.zeros((len(J), 6, int(start[-1])))
     for k, component in enumerate(model.targets.component):
         out[k, :, start[component] : start[component + 1]] = J[k, :, : sizes[component]]

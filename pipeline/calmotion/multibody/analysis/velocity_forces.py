@@ -9,23 +9,9 @@ from calmotion.multibody.analysis.kinematics import rigid_poses, set_rotors
 from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.assembly import assemble
-from calmotion.multibody.kernels.so3 import logarithm, matrix_of
+from calmotion.multibody.kernels.so3 import turns_between
 from calmotion.multibody.model.model import Model, moves_freely
 from calmotion.multibody.model.system import BACK_EMF, VELOCITY_GAIN, State, allocate_state
-from calmotion.support.compilation import allocating_kernel
-
-
-@allocating_kernel
-def _turns(before: Array, now: Array, out: Array) -> None:
-    """Rotation vectors from one set of quaternions to another, in the axes of the first, shape [B, 3]."""
-    A, B, E = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    for b in range(len(before)):
-        matrix_of(before[b], A)
-        matrix_of(now[b], B)
-        for i in range(3):
-            for j in range(3):
-                E[i, j] = A[0, i] * B[0, j] + A[1, i] * B[1, j] + A[2, i] * B[2, j]
-        logarithm(E, out[b])
 
 
 class VelocityForces:
@@ -68,8 +54,8 @@ class VelocityForces:
         set_rotors(model.system, state, joints[1])
         rest = self._residual(state, np.zeros_like(state.V), joints[1], np.zeros_like(speeds))
         back, ahead = np.zeros((2, len(c[1]), 3))
-        _turns(q[1], q[0], back)
-        _turns(q[1], q[2], ahead)
+        turns_between(q[1], q[0], back)
+        turns_between(q[1], q[2], ahead)
         accelerations = np.zeros_like(state.V)
         state.V[:, :3], state.V[:, 3:6] = (c[2] - c[0]) / (2.0 * h), (ahead - back) / (2.0 * h)
         accelerations[:, :3], accelerations[:, 3:6] = (c[2] - 2.0 * c[1] + c[0]) / h**2, (ahead + back) / h**2

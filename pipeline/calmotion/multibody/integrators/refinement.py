@@ -15,7 +15,7 @@ from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.multibody.integrators.predictor import MISSED
 from calmotion.multibody.integrators.trajectory import Inputs, Record
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.kernels.so3 import logarithm, matrix_of
+from calmotion.multibody.kernels.so3 import turns_between
 from calmotion.multibody.model.moving_markers import between
 from calmotion.multibody.model.system import Instants, State, System, allocate_state
 from calmotion.multibody.statics.consistent_start import instant_before
@@ -31,11 +31,7 @@ def _copy(source: State, out: State) -> None:
 def _turn_between(first: State, last: State) -> Array:
     """Rotation vectors from one state to another, body axes [rad], shape [B, 3]."""
     vectors = np.zeros_like(first.turn)
-    A, B = np.zeros((3, 3)), np.zeros((3, 3))
-    for b in range(len(vectors)):
-        matrix_of(first.q[b], A)
-        matrix_of(last.q[b], B)
-        logarithm(A.T @ B, vectors[b])
+    turns_between(first.q, last.q, vectors)
     return vectors
 
 

@@ -176,6 +176,19 @@ def logarithm(R: Array, out: Array) -> None:
         out[i] = k * q[i + 1]
 
 
+@allocating_kernel
+def turns_between(first: Array, last: Array, out: Array) -> None:
+    """Rotation vectors from quaternions to others, in the axes of the first, shape [B, 3], into out."""
+    A, B, E = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    for b in range(len(first)):
+        matrix_of(first[b], A)
+        matrix_of(last[b], B)
+        for i in range(3):
+            for j in range(3):
+                E[i, j] = A[0, i] * B[0, j] + A[1, i] * B[1, j] + A[2, i] * B[2, j]
+        logarithm(E, out[b])
+
+
 @kernel
 def quaternion_of(R: Array, out: Array) -> None:
     """Unit quaternion (w, x, y, z), w >= 0, of the rotation matrix R into out."""

@@ -117,6 +117,12 @@ class System(NamedTuple):
         size: int = 6 + self.M3.shape[1]
         return size
 
+    @property
+    def starts(self) -> IntArray:
+        """Where the coordinates of each component begin among those of all, and where they end, shape [B + 1]."""
+        starts: IntArray = np.concatenate([[0], np.cumsum(6 + self.elastic)])
+        return starts
+
 
 class Integrator(NamedTuple):
     """Coefficients of an implicit integrator, or of the static equations.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.multibody.kernels.so3 import logarithm, matrix_of, turn
+from calmotion.multibody.kernels.so3 import turn, turns_between
 from calmotion.multibody.model.system import State, System
 from calmotion.multibody.sensitivity.adjoint import sweep_adjoint
 from calmotion.multibody.sensitivity.linearization import Linearization
@@ -106,11 +106,8 @@ def adjoint_from(
 
 def end_difference(system: System, states: State) -> Perturbation:
     """Difference of the last two instants of a trajectory and its first two."""
-    R0, R1, rotation = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((len(system.parent), 3))
-    for b in range(len(system.parent)):
-        matrix_of(states.q[1, b], R0)
-        matrix_of(states.q[-1, b], R1)
-        logarithm(R0.T @ R1, rotation[b])
+    rotation = np.zeros((len(system.parent), 3))
+    turns_between(states.q[1], states.q[-1], rotation)
     return Perturbation(
         states.c[-2:] - states.c[:2], rotation, states.u[-2:] - states.u[:2], states.V[-2:] - states.V[:2],
         states.turn[-1] - states.turn[1],
