@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.views.raster import rasterize
+from calmotion.views.raster import barycentric, rasterize
 
 
 def test_the_renderer_shows_the_nearer_triangle_and_not_the_back_of_one():
@@ -18,7 +18,7 @@ def test_the_renderer_shows_the_nearer_triangle_and_not_the_back_of_one():
     np.testing.assert_allclose(hits.depth[hits.triangle == 1], 2.0)
     assert np.all(np.isinf(hits.depth[hits.triangle < 0]))
     rows, columns = np.nonzero(hits.triangle == 1)
-    shares = hits.shares[rows, columns].astype(float)
+    shares = np.array([barycentric(hits.corners[1], x + 0.5, y + 0.5) for x, y in zip(columns, rows, strict=True)])
     shares = np.column_stack([shares, 1.0 - shares.sum(axis=1)])
     middle = shares @ np.array([(1.0, 1.0), (1.0, 15.0), (15.0, 15.0)])
     np.testing.assert_allclose(middle, np.column_stack([columns, rows]) + 0.5, atol=1e-5)

@@ -38,14 +38,6 @@ class Hits:
         with np.errstate(divide="ignore"):
             return np.asarray(1.0 / self.nearness.astype(float))
 
-    @property
-    def shares(self) -> Array:
-        """Barycentric coordinates on the picture, shape [height, width, 2]; the third is one minus both."""
-        found = np.zeros((*self.triangle.shape, 2))
-        for row, column in zip(*np.nonzero(self.filled), strict=True):
-            found[row, column] = barycentric(self.corners[self.triangle[row, column]], column + 0.5, row + 0.5)
-        return found
-
 
 def rasterize(
     corners: Array, width: int, height: int, *, both_sides: bool = False, before: Hits | None = None
