@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.arrays import Array
+from calmotion.mesh.mass import mass_of_tets
 from calmotion.mesh.parts.makeup import makeup_of
-from calmotion.mesh.parts.mesh_mass import mass_of_tets
 from calmotion.model import Animation, Character, FEMeshes
 from calmotion.model.character import with_ideal_motors
 from calmotion.multibody.analysis import kinematics

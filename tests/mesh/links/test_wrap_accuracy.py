@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from calmotion.mesh.mass import mass_of_solid
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
-from calmotion.mesh.solid import mass_of_solid
 from calmotion.mesh.sources import choice
 from calmotion.model import Frame
 from calmotion.reduction.mesh_refinement import response

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from calmotion.mesh.mass import mass_of_tets
 from calmotion.mesh.parts.makeup import makeup_of
-from calmotion.mesh.parts.mesh_mass import mass_of_tets
 from calmotion.mesh.parts.print_core import skin_share
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.model.character import ElasticMaterial

@@ -59,12 +59,12 @@ def test_bodies_that_are_forced_to_be_rigid_have_the_mass_of_their_geometry():
     assert len(_rows(choices, "bodies")) == 2 and all(row.forced for row in _rows(choices, "bodies"))
 
 
-def test_a_body_whose_mass_only_the_mesh_gives_stays_flexible():
+def test_a_body_whose_mass_is_not_known_stays_flexible():
     shot = mixed_arm()
     bodies = tuple(replace(body, tets=None) for body in shot.character.bodies)
     bare = replace(shot, character=replace(shot.character, bodies=bodies))
     forced = _analyse(bare, {"bodies": OFF})
-    assert forced.character.bodies[0].simulated_flexible and "mesh" in _rows(forced, "bodies")[0].why
+    assert forced.character.bodies[0].simulated_flexible and "no geometry" in _rows(forced, "bodies")[0].why
 
 
 def test_everything_can_be_forced_off_and_on():

@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
+from calmotion.mesh.mass import joined_surfaces
 from calmotion.mesh.repair.closed_solid import Solid
-from calmotion.mesh.solid import joined_surfaces
 from calmotion.mesh.surfaces.congruence import Isometry, isometries, near_isometries
 from calmotion.model import Body, FEMesh, FlexibleSettings, Frame
 from calmotion.model.meshes import CutPatch

@@ -12,8 +12,8 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.mesh.element_sizes import MAX_NODES, element_size, shape_of
 from calmotion.mesh.grids.contacts import without_contacts
+from calmotion.mesh.mass import mass_of_solid
 from calmotion.mesh.mesh_file import read_mesh_file
-from calmotion.mesh.solid import mass_of_solid
 from calmotion.mesh.sources.beam import equivalent_beam
 from calmotion.mesh.sources.choice import solid_of
 from calmotion.mesh.sources.hollow import hollowed

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from calmotion.mesh.solid import solid_of
+from calmotion.errors import ShotError
+from calmotion.mesh.mass import joined_surfaces, mass_of_solid, mass_of_tets
 from calmotion.model import Animation, Body, Character, MassProperties, ModelChoice
 from calmotion.model.character import contact_joints
 from calmotion.model.model_choice import AUTO, OFF, ON
@@ -44,9 +45,8 @@ def decide(
     poses_matter = changes or bool(tree.closing)
     if not poses_matter and choice("bodies") == AUTO:
         return character, []
-    known = _masses_of_solids(character)
-    rough = replace(character, bodies=tuple(_with_mass(k, body, known) for k, body in enumerate(character.bodies)))
-    character, rows = _bodies(character, known, choice("bodies"))
+    rough = with_rough_masses(character)
+    character, rows = _bodies(character, choice("bodies"))
     if not poses_matter:
         return character, rows
     rigid = [rigid_body(body, own) for body, own in zip(rough.bodies, body_anchors(rough, tree), strict=True)]
@@ -60,53 +60,75 @@ def decide(
 
 
 def with_rough_masses(character: Character) -> Character:
-    """A character whose bodies can all be simulated as rigid: flexible ones without a stated mass have that of their
-    closed surface, or of half of the box around it."""
-    known = _masses_of_solids(character)
-    return replace(character, bodies=tuple(_with_mass(k, body, known) for k, body in enumerate(character.bodies)))
+    """A character whose bodies can all be simulated as rigid: enough for motions that motors determine."""
+    bodies = character.bodies
+    return replace(
+        character, bodies=tuple(body if body.mass else replace(body, mass=_rough_mass(body)) for body in bodies)
+    )
 
 
-def _masses_of_solids(character: Character) -> dict[int, MassProperties | None]:
-    """Of the flexible bodies, by index; None where nothing is closed."""
-    solids = {k: solid_of(body) for k, body in enumerate(character.bodies) if body.flexible is not None}
-    return {k: None if solid is None else solid.mass for k, solid in solids.items()}
-
-
-def _with_mass(index: int, body: Body, known: Mapping[int, MassProperties | None]) -> Body:
-    """A body that can be simulated as rigid."""
-    if index not in known:
-        return body
-    return replace(body, mass=known[index] or _guessed_mass(body))
-
-
-def _guessed_mass(body: Body) -> MassProperties:
-    """That of the box around a body, half full: enough for motions that motors determine."""
-    assert body.flexible is not None
-    points = [surface.points for surface in body.surfaces] or [np.zeros((1, 3))]
-    corners = np.concatenate(points)
+def _rough_mass(body: Body) -> MassProperties | None:
+    """Of a flexible body: that of its tetrahedra or of what its visible surfaces wind around, or of half the box around
+    it where that is nothing; None of other bodies."""
+    if body.flexible is None:
+        return None
+    density = body.flexible.material.density
+    surfaces = [surface for surface in body.surfaces if surface.visible and len(surface.triangles)]
+    joined = None if body.tets is not None or not surfaces else joined_surfaces(surfaces)
+    found = None
+    if body.tets is not None:
+        found = mass_of_tets(body.tets.points, body.tets.tets, density)
+    elif joined is not None:
+        found = mass_of_solid(*joined, density)
+    if found is not None and found.mass > 0.0 and np.linalg.eigvalsh(found.inertia)[0] > 0.0:
+        return found
+    corners = np.concatenate([np.zeros((1, 3))] if joined is None else [joined[0]])
     size = np.maximum(np.ptp(corners, axis=0), 1e-3)
-    mass = 0.5 * body.flexible.material.density * float(np.prod(size))
+    mass = 0.5 * density * float(np.prod(size))
     across = mass / 12.0 * (float(size @ size) - size**2)
     return MassProperties(mass, 0.5 * (corners.min(axis=0) + corners.max(axis=0)), np.diag(across))
 
 
-def _bodies(
-    character: Character, masses: Mapping[int, MassProperties | None], choice: str
-) -> tuple[Character, list[ModelChoice]]:
+def _bodies(character: Character, choice: str) -> tuple[Character, list[ModelChoice]]:
     """Flexible bodies that the user forces to be rigid or flexible; the others keep their finite elements."""
     if choice == AUTO:
         return character, []
     bodies, rows = list(character.bodies), []
-    for k, mass in masses.items():
-        body, why = bodies[k], "forced by the user"
-        rigid = choice == OFF and mass is not None
-        if rigid:
+    for k, body in enumerate(character.bodies):
+        if body.flexible is None:
+            continue
+        why, mass = "forced by the user", None
+        if choice == OFF:
+            try:
+                mass = _exact_mass(character, k)
+            except ShotError as error:
+                why = f"its mass is not known: {error.problem}"
+        if mass is not None:
             bodies[k] = replace(body, stiff=True, mass=mass)
-        elif choice == OFF:
-            why = "only the mesh gives its mass"
-        model = "rigid" if rigid else "flexible"
-        rows.append(ModelChoice("bodies", f"{body.path}: {model}", not rigid, why, None, True))
+        model = "flexible" if mass is None else "rigid"
+        rows.append(ModelChoice("bodies", f"{body.path}: {model}", mass is None, why, None, True))
     return replace(character, bodies=tuple(bodies)), rows
+
+
+def _exact_mass(character: Character, index: int) -> MassProperties:
+    """That of the solid of a flexible body.
+
+    Raises:
+        ShotError: It has none, or its density is not the same everywhere.
+    """
+    from calmotion.tolerance.meshes.accurate_mesh import frames_of
+    from calmotion.tolerance.meshes.body_mesh import geometry_of
+    from calmotion.tolerance.meshes.options import MeshOptions, Volume
+
+    body = character.bodies[index]
+    assert body.flexible is not None
+    material, stated = body.flexible.material, None if body.mass is None else body.mass.mass
+    if material.core is not None or material.parts:
+        raise ShotError("only the mesh of a body of several materials has it", path=body.path)
+    geometry = geometry_of(index, body, MeshOptions(), frames_of(character, index))
+    if isinstance(geometry, Volume):
+        return mass_of_solid(geometry.solid.points, geometry.solid.triangles, material.density, stated)
+    return mass_of_tets(geometry.points, geometry.tets, material.density, stated)
 
 
 def _motors(character: Character, rigid: RigidPoses, choice: str) -> tuple[Character, list[ModelChoice]]:
