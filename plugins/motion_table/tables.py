@@ -17,9 +17,12 @@ from calmotion.support import (
     available_memory,
     counters,
     exact_times,
+    instants,
     names_times,
+    number_of,
     refuse_lfs_pointers,
     refuse_special,
+    separator_of,
     time_column,
     too_large,
 )
@@ -31,6 +34,11 @@ _REMEDY = (
     "'# units: angle deg') or m"
 )
 _DEGREES = re.compile(r"(angle|units?)\W+deg", re.IGNORECASE)
+_BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(](?P<unit>[^\[\]()]+)[\])]")
+_SCALES = {
+    "rad": 1.0, "radian": 1.0, "radians": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3,
+    **dict.fromkeys(("deg", "degree", "degrees", "\u00b0"), float(np.radians(1.0))),
+}  # fmt: skip
 _LONGEST = 1e5  # of a motion [s]: a day
 _UNITS = {"ms": "milliseconds (0.001 s)", "us": "microseconds (1e-6 s)", "ns": "nanoseconds (1e-9 s)"}
 _EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
@@ -72,7 +80,7 @@ def read_motion(path: str, *, angles: str, times: str, rate: float, names: Seque
     own, notes = _times(columns), []
     for name in counters(columns):
         if own is None or name not in own.names:
-            notes.append(f"{path}: the column {name or 'without a name'} numbers the rows, and is no joint")
+            notes.append(f"{path}: the column {name or 'without a name'} numbers rows, and is no joint")
             columns.pop(name)
     if own is None:
         if not rate > 0.0:
@@ -105,6 +113,9 @@ def _times(columns: dict[str, Array]) -> TimeColumn | None:
 def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array], bool]:
     """Columns by name, and whether angles are in degrees.
 
+    Cells are separated by commas, semicolons, tabs or spaces; where it is not by commas, numbers may have a decimal
+    comma.
+
     Args:
         timed: Whether a column of times counts where other names are given for all columns.
     """
@@ -115,18 +126,15 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
     lines = [(n, line) for n, line in lines if not line.startswith("#")]
     if not lines:
         raise ShotError("the motion is empty", path=path, remedy=_REMEDY)
-    if comments and _is_number(lines[0][1].split(",")[0]) and comments[-1].count(",") == lines[0][1].count(",") > 0:
-        lines.insert(0, (lines[0][0], comments[-1].lstrip("# ")))  # the head is a comment, as NumPy writes it
+    between = separator_of(lines[0][1])
+    if comments and _is_number(lines[0][1].split(between)[0]):
+        if comments[-1].count(between) == lines[0][1].count(between) > 0:
+            lines.insert(0, (lines[0][0], comments[-1].lstrip("# ")))  # the head is a comment, as NumPy writes it
     try:
-        rows = [next(csv.reader([line], strict=True)) for _, line in lines]  # no row goes on in the next line
+        rows = [_cells(line, between) for _, line in lines]
     except csv.Error as error:
         raise ShotError("this is no table", path=path, found=error, remedy=_REMEDY) from None
     head = [cell.strip() for cell in rows[0]]
-    if len(head) == 1 and any(sign in head[0] for sign in ";\t"):
-        raise ShotError(
-            "the columns are not separated by commas", path=path, attribute=f"line {lines[0][0]}", found=head[0][:60],
-            remedy="Save the table with commas between columns, and points in numbers",
-        )  # fmt: skip
     if _is_number(head[0]):
         if not names:
             raise ShotError(
@@ -135,8 +143,10 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
             )  # fmt: skip
         head = list(names)
     else:
-        if len(names) == len(head) and TIME not in head:  # names of other columns, as the remedy says
-            kept = [timed and new == "-" and names_times(old) for old, new in zip(head, names, strict=True)]
+        if len(names) == len(head):  # names of other columns, as the remedy says
+            kept = [
+                timed and new == "-" and (old == TIME or names_times(old)) for old, new in zip(head, names, strict=True)
+            ]
             head = [old if own else new for old, new, own in zip(head, names, kept, strict=True)]
         rows, lines = rows[1:], lines[1:]
     if any(name.endswith(_OUTPUTS) for name in head):
@@ -144,17 +154,55 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
             "this is a table that --csv wrote", path=path, found=head[1] if len(head) > 1 else head[0],
             remedy="It is a result, for plots and spreadsheets; name a table of joint angles",
         )  # fmt: skip
+    wrong = next((k for k, row in enumerate(rows) if len(row) != len(head)), None)
+    if wrong is not None:
+        raise _wrong_row(path, lines[wrong], len(head), "Correct the row")
+    if "" in head and not any(row[head.index("")].strip() for row in rows):  # a comma at the end of each line
+        head[head.index("")] = "-"
     _refuse_repeated(path, head)
-    values = np.zeros((len(rows), len(head)))
-    for k, ((number, line), row) in enumerate(zip(lines, rows, strict=True)):
+    columns: dict[str, Array] = {}
+    for k, name in enumerate(head):
+        if name != "-":
+            own, scale = _named_unit(name)
+            columns[own] = scale * _column(path, lines, [row[k] for row in rows], name, head, between)
+    return columns, degrees
+
+
+def _cells(line: str, between: str) -> list[str]:
+    """The cells of a row; no row goes on in the next line."""
+    return line.split() if between == " " else next(csv.reader([line], delimiter=between, strict=True))
+
+
+def _column(
+    path: str, lines: Sequence[tuple[int, str]], cells: Sequence[str], name: str, head: Sequence[str], between: str
+) -> Array:
+    """The numbers of a column, or its times of a day or dates in seconds."""
+    values = np.zeros(len(cells))
+    for k, cell in enumerate(cells):
         try:
-            values[k] = [float(cell) for cell in row]
+            values[k] = number_of(cell, between)
         except ValueError:
-            raise ShotError(
-                f"a row that does not hold {len(head)} numbers", path=path, attribute=f"line {number}", found=line[:60],
-                remedy="Correct the row",
-            ) from None  # fmt: skip
-    return {name: values[:, k] for k, name in enumerate(head) if name != "-"}, degrees
+            found = instants(cells) if names_times(name) else None
+            if found is not None:
+                return found
+            left = ",".join("-" if other == name else other for other in head)
+            remedy = f"Correct the row, or leave the column out with --set motion.read.joints={left}"
+            raise _wrong_row(path, lines[k], len(head), remedy) from None
+    return values
+
+
+def _wrong_row(path: str, line: tuple[int, str], count: int, remedy: str) -> ShotError:
+    return ShotError(
+        f"a row that does not hold {count} numbers", path=path, attribute=f"line {line[0]}", found=line[1][:60],
+        remedy=remedy,
+    )  # fmt: skip
+
+
+def _named_unit(name: str) -> tuple[str, float]:
+    """A name without the unit in brackets behind it, and that unit in rad or m; a column of times keeps its own."""
+    match = _BRACKETS.fullmatch(name)
+    scale = None if match is None or names_times(name) else _SCALES.get(match["unit"].strip().lower())
+    return (name, 1.0) if match is None or scale is None else (match["name"].strip(), scale)
 
 
 def _npz(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.support import nearest, read_text
+from calmotion.support import nearest, number_of, read_text, separator_of
 
 MISSING = ("", "nan", "na", "null", "none", "-")
 UNITS: Mapping[str, float] = {
@@ -43,7 +43,7 @@ def read_columns(file: str) -> tuple[dict[str, Array], bool]:
     rows = [(n, line) for n, line in numbered if not line.startswith("#")]
     if not rows:
         raise ShotError("the recording is empty", path=file, remedy="Record the performance again")
-    separator = max(",;\t", key=rows[0][1].count)
+    separator = separator_of(rows[0][1])
     head, body = rows[0][1], rows[1:]
     if _is_number(head.split(separator)[0]):
         comments = [line for n, line in numbered if line.startswith("#") and n < rows[0][0]]
@@ -130,10 +130,7 @@ def unit_of(name: str, alike: tuple[str, ...], file: str, attribute: str) -> flo
 
 
 def _number(cell: str, separator: str) -> float:
-    text = cell.strip()
-    if text.lower() in MISSING:
-        return np.nan
-    return float(text.replace(",", ".") if separator != "," and text.count(",") == 1 and "." not in text else text)
+    return np.nan if cell.strip().lower() in MISSING else number_of(cell, separator)
 
 
 def _is_number(text: str) -> bool:

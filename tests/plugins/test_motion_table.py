@@ -65,6 +65,17 @@ def table(head="time_s,pan,lift", times=TIMES, scale=1.0):
         ("a.npz", {"timestamps": 1e9 * TIMES, "pan": PAN, "lift": LIFT}, {}),
         ("a.csv", table("pan,lift", None), {"rate": 2.0}),
         ("a.csv", table(None, None), {"rate": 2.0, "joints": "pan, lift"}),
+        ("a.csv", table().replace(",", ";"), {}),
+        ("a.csv", table().replace(",", ";").replace(".", ","), {}),
+        ("a.csv", table().replace(",", "\t"), {}),
+        ("a.csv", table().replace(",", "  "), {}),
+        ("a.csv", "time_s,pan [deg],lift (rad)\n0,0,1\n.5,5.729577951,.5\n1,17.188733854,.2\n", {}),
+        ("a.csv", "date,pan,lift\n2024-05-17T10:00:02Z,0,1\n2024-05-17T10:00:02.5Z,.1,.5\n"
+         "2024-05-17T10:00:03Z,.3,.2\n", {}),
+        ("a.csv", "time;pan;lift\n10:00:59,5;0;1\n10:01:00,0;0,1;0,5\n10:01:00,5;0,3;0,2\n", {}),
+        ("a.csv", "time_s,pan,lift,state\n0,0,1,go\n.5,.1,.5,go\n1,.3,.2,on\n", {"joints": "time_s,pan,lift,-"}),
+        ("a.csv", "time_s,pan,lift,\n0,0,1,\n.5,.1,.5,\n1,.3,.2,\n", {}),
+        ("a.csv", "timestamp,frame_index,episode_index,pan,lift\n0,0,4,0,1\n.5,1,4,.1,.5\n1,2,4,.3,.2\n", {}),
         ("a.npz", {"time_s": TIMES, "pan": PAN, "lift": LIFT}, {}),
         ("a.npz", {"fps": 2.0, "joint_names": ["pan", "lift"], "positions": np.stack([PAN, LIFT], axis=1)}, {}),
         ("a.npz", {"fps": 2.0, "joint_names": [b"pan", b"lift"], "positions": np.stack([PAN, LIFT], axis=1)}, {}),
@@ -114,8 +125,7 @@ REFUSED = {
     "times that go back": (table(times=TIMES[::-1]), "times must increase"),
     "one row": ("time_s,pan\n0,1\n", "two rows"),
     "a column twice": (table("time_s,pan,pan"), "same name"),
-    "semicolons": ("time_s;pan\n0;1\n1;2\n", "not separated by commas"),
-    "tabulators": ("time_s\tpan\n0\t1\n", "not separated by commas"),
+    "a column of texts": (table("time_s,pan,lift").replace("0.3", "off"), "line 4"),
     "a cell without end": ("time_s,pan\n0," + "1" * 200_000 + "\n1,0\n", "no table"),
     "a quotation mark without end": ('time_s,"pan\n0,1\n1,2\n', "no table"),
     "a table of results": (table("time_s,/R/j.input,/R/j.output"), "--csv wrote"),
@@ -128,6 +138,14 @@ def test_what_is_no_motion_is_refused(read, name):
     with pytest.raises(ShotError) as refused:
         read("a.csv", content)
     assert problem in refused.value.message() and "a.csv" in refused.value.message() and refused.value.remedy
+
+
+def test_a_column_of_texts_is_left_out_as_the_error_says(read):
+    content = "time_s,pan,state\n0,0,go\n.5,.1,go\n1,.3,on\n"
+    with pytest.raises(ShotError, match="line 2") as refused:
+        read("a.csv", content)
+    joints = refused.value.remedy.partition("motion.read.joints=")[2]
+    assert list(read("a.csv", content, joints=joints).values) == ["pan"]
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.support import TIME_UNITS, counters, exact_step, exact_times, time_column
+from calmotion.support import TIME_UNITS, counters, exact_step, exact_times, instants, time_column
 
 SECONDS = np.array([0.0, 0.01, 0.02, 0.03])
 JOINTS = {"shoulder_pan": np.zeros(4), "time_belt": np.ones(4), "wrist": np.zeros(4)}
@@ -63,9 +63,28 @@ def test_columns_that_number_the_rows():
         "frame": 3 + np.arange(4.0),
         "index": SECONDS,
         "seq": np.array([1.0, 1, 2, 3]),
+        "episode_index": np.full(4, 7.0),
+        "task_index": np.arange(4.0),
         **JOINTS,
     }
-    assert counters(columns) == ["", "frame"]
+    assert counters(columns) == ["", "frame", "episode_index"]
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        ["2024-05-17T23:59:59.500", "2024-05-18T00:00:00.250Z"], ["2024-05-17 12:00:00,5", "2024-05-17 12:00:01,25"],
+        ["17.05.2024 09:00:00", "17.05.2024 09:00:00.75"], ["5/17/2024 9:00:59.5", "5/17/2024 9:01:00.25"],
+        ["2024/12/31 23:59:59.5", "2025/01/01 00:00:00.25"], ["08:59:59.25", "09:00:00"],
+    ],
+)  # fmt: skip
+def test_dates_and_times_of_a_day_are_seconds(cells):
+    assert np.diff(instants(cells)) == pytest.approx([0.75])
+
+
+@pytest.mark.parametrize("cells", [["17.05.2024 23:59:59", "18.05.2024 00:00:01"], ["12:00:00", "soon"], ["12:00"]])
+def test_what_may_be_another_time_is_none(cells):
+    assert instants(cells) is None
 
 
 @pytest.mark.parametrize(

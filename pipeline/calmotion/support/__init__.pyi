@@ -27,7 +27,10 @@ from calmotion.support.time_columns import TimeColumn as TimeColumn
 from calmotion.support.time_columns import counters as counters
 from calmotion.support.time_columns import exact_step as exact_step
 from calmotion.support.time_columns import exact_times as exact_times
+from calmotion.support.time_columns import instants as instants
 from calmotion.support.time_columns import names_times as names_times
+from calmotion.support.time_columns import number_of as number_of
+from calmotion.support.time_columns import separator_of as separator_of
 from calmotion.support.time_columns import time_column as time_column
 from calmotion.support.worker_processes import Fault as Fault
 from calmotion.support.worker_processes import results_of as results_of

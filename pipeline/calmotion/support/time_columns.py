@@ -1,10 +1,11 @@
-"""Which columns of a table are its times, by their names: `time_s`, `Time (ms)`, `header.stamp.secs`, ..."""
+"""Tables of text: their cells, and which columns are times, by names: `time_s`, `Time (ms)`, `header.stamp.secs`."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
 import numpy as np
 
@@ -17,10 +18,14 @@ _WORDS = {
     "ns": "ns nsec nsecs nanos nanosec nanosecs nanosecond nanoseconds",
 }  # fmt: skip
 _UNIT_OF = {word: unit for unit, words in _WORDS.items() for word in words.split()}
-_TIMES = set("t time times ts timestamp timestamps stamp stamps clock elapsed timecode".split())
+_TIMES = set("t time times ts timestamp timestamps stamp stamps clock elapsed timecode date datetime".split())
 _BESIDE = set("header field ros rosbag bag sim simulation wall system log since start epoch unix data msg in of the "
               "robot relative rel absolute abs measured elapsed gps utc host device recording".split())  # fmt: skip
 _COUNTERS = set("frame frames index idx step row sample seq sequence tick count no nr id unnamed field header".split())
+_PARTS = set("episode task chunk subtask".split())  # of a data set, which number a whole recording (LeRobot)
+_CLOCK_TIME = re.compile(
+    r"(?:(?P<day>\S+)(?:T| +))?(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2}(?:[.,]\d+)?)(?: ?(?P<zone>Z|[+-][\d:]+))?"
+)
 _WORD = re.compile(r"[A-Z]?[a-z\u00b5\u03bc]+|[A-Z]+(?![a-z])")
 _CLOCK = 1e-6  # rounding of stamps since 1970 as floating-point numbers [s]
 # Units by the least time since 1970, of recordings after 1973, and by the least step between rows that no motion has in
@@ -43,6 +48,46 @@ class TimeColumn:
     values: Array
     unit: str
     named: bool
+
+
+def separator_of(head: str) -> str:
+    """What is between the cells of a table, by the line with their names: a comma, a semicolon, a tab, or spaces."""
+    found = max(",;\t", key=head.count)
+    return found if found in head or " " not in head.strip() else " "
+
+
+def number_of(cell: str, separator: str) -> float:
+    """The number in a cell, which may have a decimal comma where no commas are between cells.
+
+    Raises:
+        ValueError: It is none.
+    """
+    text = cell.strip()
+    return float(text.replace(",", ".") if separator != "," and text.count(",") == 1 and "." not in text else text)
+
+
+def instants(cells: Sequence[str]) -> Array | None:
+    """Times that are written as dates or times of a day [s]; None where a cell is neither.
+
+    Those of one day count from its midnight, in whatever order its date is written, others from 1970.
+    """
+    found = [_CLOCK_TIME.fullmatch(cell.strip()) for cell in cells]
+    matches = [match for match in found if match is not None]
+    if not matches or len(matches) < len(found):
+        return None
+    seconds = [3600.0 * int(m["h"]) + 60.0 * int(m["m"]) + float(m["s"].replace(",", ".")) for m in matches]
+    days: dict[str, float] = {}
+    for match in matches:
+        if match["day"] not in days:
+            try:
+                day = datetime.fromisoformat((match["day"] or "").replace("/", "-")).replace(tzinfo=UTC)
+            except ValueError:
+                day = None
+            days[match["day"]] = np.nan if day is None else day.timestamp()
+    if len(days) == 1:
+        return np.array(seconds)
+    told = np.array([days[match["day"]] for match in matches])
+    return None if np.isnan(told).any() else told + np.array(seconds)
 
 
 def time_column(columns: Mapping[str, Array]) -> TimeColumn | None:
@@ -69,12 +114,15 @@ def names_times(name: str) -> bool:
 
 
 def counters(columns: Mapping[str, Array]) -> list[str]:
-    """Columns that number the rows: named so, or not at all, and one more in each row."""
-    return [
-        name
-        for name, values in columns.items()
-        if set(_words(name)) <= _COUNTERS and len(values) > 1 and np.all(np.diff(values) == 1.0)
-    ]
+    """Columns that number the rows: named so, or not at all, and one more in each row; and those that number a
+    recording, the same in all rows."""
+    return [name for name, values in columns.items() if len(values) > 1 and _numbers(name, np.diff(values))]
+
+
+def _numbers(name: str, steps: Array) -> bool:
+    words = set(_words(name))
+    part = bool(words & _PARTS) and words <= _PARTS | _COUNTERS
+    return bool(np.all(steps == 0.0)) if part else words <= _COUNTERS and bool(np.all(steps == 1.0))
 
 
 def _words(name: str) -> list[str]:

@@ -64,11 +64,20 @@ def test_lengths_in_smaller_units_are_told_with_their_factor(arm, factor, name):
         (3.0 * SWING, (-0.1, 0.1), np.inf),  # beyond it by less than half a turn
         (20.0 * np.pi * TIMES, FREE, 40.0),  # a wheel
         (20.0 * SWING, FREE, 8.0),  # too fast, by less than ten times
-        (1e6 * SWING, (-3.1, 3.1), np.inf),  # too far in any unit
     ],
 )
-def test_an_animation_that_no_unit_makes_right_is_not_told(arm, values, limits, speed):
+def test_an_animation_that_may_be_meant_is_not_told(arm, values, limits, speed):
     assert doubts(arm, values, limits, speed) == ()
+
+
+@pytest.mark.parametrize(
+    "values",
+    [1e6 * SWING, 4096 / np.pi * SWING, 2048.0 + 100.0 * SWING, np.where(TIMES == 0.5, -999.0, SWING)],
+    ids=["far", "hundredths of degrees", "ticks of an encoder", "a number for a missing row"],
+)
+def test_an_animation_that_no_unit_brings_within_its_limits_is_told(arm, values):
+    (note,) = doubts(arm, values, (-3.1, 3.1))
+    assert "its limit is" in note and "in no usual unit would that be within" in note
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ SECONDS = ((1e-3, "milliseconds", "ms"), (1e-6, "microseconds", "us"), (1e-9, "n
 
 
 def motion_doubts(character: Character, tracks: Sequence[Track]) -> tuple[str, ...]:
-    """Sentences about animations that are far beyond limits, or almost stand still, and would not in other units.
+    """Sentences about animations that are far beyond limits, or almost stand still and would not in other units.
 
     Args:
         tracks: One for each motor [rad or m].
@@ -36,6 +36,9 @@ def motion_doubts(character: Character, tracks: Sequence[Track]) -> tuple[str, .
     notes = []
     for (factor, name), texts in found.items():
         more = f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""
+        if not name:
+            notes.append(f"{texts[0]}{more}: in no usual unit would that be within; is it a track of another joint?")
+            continue
         notes.append(f"{texts[0]}{more}; {factor:.4g} times that would be within: {name}? {_remedy(name)}")
     return (*notes, *_almost_still(led))
 
@@ -79,7 +82,8 @@ def _remedy(name: str) -> str:
 
 
 def _far_beyond(motor: Motor, joint: Joint, track: Track) -> list[tuple[tuple[float, str], str]]:
-    """The unit in which an animation would fit the limits that it is far beyond, and by what it is; else nothing."""
+    """The unit in which an animation would fit the limits that it is far beyond, without a name where none is known,
+    and by what it is; nothing of one that is not far beyond."""
     low, high = float(track.values.min()), float(track.values.max())
     span = joint.upper - joint.lower
     beyond = max(joint.lower - low, high - joint.upper)
@@ -104,7 +108,7 @@ def _far_beyond(motor: Motor, joint: Joint, track: Track) -> list[tuple[tuple[fl
         fits = joint.lower <= factor * low + 1e-3 and factor * high <= joint.upper + 1e-3
         if fits and not (fast and factor * speed > min(limit, _FASTEST)):
             return [((factor, name), text)]
-    return []
+    return [((1.0, ""), text)]
 
 
 def _almost_still(led: Sequence[tuple[Motor, Track]]) -> list[str]:
