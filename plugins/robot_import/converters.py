@@ -27,6 +27,7 @@ _READY = "ready"
 _SCRIPT = Path(__file__).with_name("mujoco_values.py")
 LONGEST = 1800.0  # time of a conversion [s]
 _BROKEN_OBJ = re.compile(r'Failed to convert mesh(?: "[^"]*" from|:) (.+?\.obj)(?=:|$)', re.IGNORECASE)
+_ADDED = re.compile("Unsupported transmission type '.*JOINTINPARENT'|Actuator '.*' is not converted")  # see `joints`
 _BAD_WORDS = ("Failed to", "Cannot", "not found")  # of warnings after which a part of the robot is missing
 
 
@@ -114,6 +115,7 @@ def convert(description: Description, output: str, python: str) -> tuple[str, tu
             remedy=f"Correct the file; `{module}` of the converters' environment shows the whole message",
         )  # fmt: skip
     warnings = [line.partition("] ")[2].partition("] ")[2] or line for line in lines if "Warning" in line]
+    warnings = [line for line in warnings if not _ADDED.search(line)]
     lost = [line for line in warnings if line.startswith(_BAD_WORDS)]
     if lost:
         broken = [match.group(1) for line in lost if (match := _BROKEN_OBJ.match(line))]

@@ -10,6 +10,7 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.model import Character
 from calmotion.usd import StageUnits, body_on, is_applied, is_rigid_body, joint_prims, prims_of
 
+from .joints import author, author_actuators
 from .options import RobotOptions, carried_by, geoms_of
 from .robot_motors import named
 
@@ -85,14 +86,7 @@ def _author_values(
             _author_mass(prim, body, units)
         for joint in body["joints"]:
             _author_joint(joints[prim.GetPath()], joint)
-    for prim in prims_of(stage):
-        if prim.GetTypeName() != "MjcActuator":
-            continue
-        name = str(prim.GetDisplayName() or prim.GetName())
-        if name in values["off"]:
-            prim.SetActive(False)
-        for attribute, value in values["actuators"].get(name, {}).items():
-            _author(prim, attribute, value)
+    author_actuators(stage, values, [joints.get(prim.GetPath()) for prim in bodies])
 
 
 def _author_mass(prim: Usd.Prim, body: Mapping[str, Any], units: StageUnits) -> None:
@@ -109,21 +103,9 @@ def _author_mass(prim: Usd.Prim, body: Mapping[str, Any], units: StageUnits) -> 
 def _author_joint(prim: Usd.Prim, joint: Mapping[str, Any]) -> None:
     """A damper of Newton's attribute counts degrees."""
     damping = joint["newton:damping"] * (np.radians(1.0) if joint["angle"] else 1.0)
-    _author(prim, "newton:damping", float(damping))
+    author(prim, "newton:damping", float(damping))
     for name in ("mjc:stiffness", "mjc:actuatorfrclimited"):
-        _author(prim, name, joint[name])
-
-
-def _author(prim: Usd.Prim, name: str, value: Any) -> None:
-    """Author an attribute of a schema that usd-core does not have; what is not there and 0 stays as it is."""
-    from pxr import Sdf
-
-    attribute = prim.GetAttribute(name)
-    if not attribute.IsDefined() and value:
-        kinds = {float: Sdf.ValueTypeNames.Double, str: Sdf.ValueTypeNames.Token}
-        attribute = prim.CreateAttribute(name, kinds.get(type(value), Sdf.ValueTypeNames.DoubleArray))
-    if attribute.IsDefined():
-        attribute.Set(value)
+        author(prim, name, joint[name])
 
 
 class _Author:

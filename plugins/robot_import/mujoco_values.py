@@ -12,6 +12,10 @@ from typing import Any
 
 import mujoco
 
+_GAINS = {mujoco.mjtGain.mjGAIN_FIXED: "fixed", mujoco.mjtGain.mjGAIN_AFFINE: "affine"}
+_BIASES = {mujoco.mjtBias.mjBIAS_NONE: "none", mujoco.mjtBias.mjBIAS_AFFINE: "affine"}
+_DYNAMICS = {mujoco.mjtDyn.mjDYN_NONE: "none", mujoco.mjtDyn.mjDYN_INTEGRATOR: "integrator"}
+_OTHER = "user"
 LEAST = 1e-12  # of masses and inertias of frames that move, which a flexible link or a fixed one may still have
 
 
@@ -75,14 +79,35 @@ def _joint(model: Any, joint: int) -> dict[str, Any]:
 
 
 def _actuator(model: Any, index: int) -> dict[str, Any]:
+    """The body whose joint an actuator acts on, and its attributes; only what is fixed and affine has gains."""
+    kinds = mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT  # the same for hinges and slides
+    on_joint = int(model.actuator_trntype[index]) in map(int, kinds)
     low, high = model.actuator_ctrlrange[index].tolist()
-    return {
-        "mjc:gainPrm": model.actuator_gainprm[index].tolist(),
-        "mjc:biasPrm": model.actuator_biasprm[index].tolist(),
+    least, most = model.actuator_forcerange[index].tolist()
+    first, last = model.actuator_actrange[index].tolist()
+    gain, bias = model.actuator_gainprm[index], model.actuator_biasprm[index]
+    gain_type = _GAINS.get(mujoco.mjtGain(model.actuator_gaintype[index]), _OTHER)
+    bias_type = _BIASES.get(mujoco.mjtBias(model.actuator_biastype[index]), _OTHER)
+    attributes = {
+        "mjc:gainType": gain_type,
+        "mjc:gainPrm": (gain * (gain_type != _OTHER)).tolist(),
+        "mjc:biasType": bias_type,
+        "mjc:biasPrm": (bias * (bias_type == "affine")).tolist(),
+        "mjc:dynType": _DYNAMICS.get(mujoco.mjtDyn(model.actuator_dyntype[index]), _OTHER),
+        "mjc:gear": model.actuator_gear[index].tolist(),
         "mjc:forceLimited": "true" if model.actuator_forcelimited[index] else "false",
+        "mjc:forceRange:min": least,
+        "mjc:forceRange:max": most,
         "mjc:ctrlLimited": "true" if model.actuator_ctrllimited[index] else "false",
         "mjc:ctrlRange:min": low,
         "mjc:ctrlRange:max": high,
+        "mjc:actLimited": "true" if model.actuator_actlimited[index] else "false",
+        "mjc:actRange:min": first,
+        "mjc:actRange:max": last,
+    }
+    return {
+        "body": int(model.jnt_bodyid[model.actuator_trnid[index, 0]]) - 1 if on_joint else None,
+        "attributes": attributes,
     }
 
 

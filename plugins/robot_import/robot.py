@@ -25,7 +25,6 @@ from .descriptions import MJCF, USD, Description, read_description, repaired
 from .masses import too_heavy
 from .options import FlexibleLinks, RobotOptions
 from .robot_layer import robot_layer
-from .robot_motors import immovable_joints
 
 FRAMES_PER_SECOND = 60.0
 _UNIFORM = (10.0, 240.0)  # rates of motions that become the rate of the frames [Hz]
@@ -282,6 +281,17 @@ class _Import:
 def _doubts(character: Character) -> tuple[str, ...]:
     """What can hardly be meant, as sentences for the user."""
     return (*too_heavy(character), *immovable_joints(character))
+
+
+def immovable_joints(character: Character) -> tuple[str, ...]:
+    """A sentence for the user about motors that cannot move: a URDF joint whose limit has no range has that from 0 to
+    0."""
+    joints = (character.joints[motor.joint] for motor in character.motors)
+    held = [joint.path for joint in joints if joint.lower == joint.upper]
+    if not held:
+        return ()
+    which = f"{held[0]} and {len(held) - 1} more joints" if len(held) > 1 else held[0]
+    return (f"{which} cannot move: lower and upper limit are the same; a joint without limits is `continuous` in URDF",)
 
 
 def _folder(parent: str, name: str) -> str:

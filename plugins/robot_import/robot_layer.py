@@ -11,10 +11,10 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.support import nearest
 from calmotion.usd import StageUnits, author_material, is_rigid_body, open_stage, prims_of, quiet, units_of
 
+from .joints import author_locks, author_springs, passive_joints, shift_limits
 from .masses import MUJOCO_DENSITY, author_masses
 from .options import RobotOptions, carried_by, geoms_of, is_named
-from .passive import author_locks, author_springs, passive_joints
-from .robot_motors import author_motors, named, narrow_limits, shift_limits
+from .robot_motors import author_motors, named, narrow_limits
 
 if TYPE_CHECKING:
     from pxr import Sdf, Usd

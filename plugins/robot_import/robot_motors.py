@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.errors import ShotError, raise_all
-from calmotion.model import Character, MotorTracks
+from calmotion.model import MotorTracks
 from calmotion.support import nearest
 from calmotion.usd import (
     COUPLED,
@@ -26,14 +26,13 @@ from calmotion.usd import (
     is_applied,
     joint_prims,
     limits_of,
-    prims_of,
 )
 
 if TYPE_CHECKING:
     from pxr import Usd
 
 ALL = "all"
-_LIMITS = ("physics:lowerLimit", "physics:upperLimit")
+LIMITS = ("physics:lowerLimit", "physics:upperLimit")
 _DRIVES = {"PhysicsRevoluteJoint": "angular", "PhysicsPrismaticJoint": "linear"}
 
 
@@ -91,25 +90,6 @@ def axes_of(prim: Usd.Prim) -> list[Axis]:
     return [] if drive is None else [Axis(prim, drive)]
 
 
-def shift_limits(stage: Usd.Stage) -> None:
-    """Count limits and springs of MuJoCo joints from the pose of the file, where their value is `ref` and becomes 0."""
-    radians = any(prim.GetAttribute("mjc:compiler:angle").Get() == "radian" for prim in prims_of(stage))
-    for prim in joint_prims(stage):
-        attribute = prim.GetAttribute("mjc:ref")
-        ref = attribute.Get() if attribute else None
-        if not ref or prim.GetTypeName() not in _DRIVES:
-            continue
-        shift = np.degrees(ref) if radians and prim.GetTypeName() == "PhysicsRevoluteJoint" else ref
-        for name in _LIMITS:
-            limit = prim.GetAttribute(name)
-            if limit and limit.HasAuthoredValue():
-                limit.Set(float(limit.Get() - shift))
-        spring = prim.GetAttribute("mjc:springref")
-        if spring:
-            spring.Set(float((spring.Get() or 0.0) - ref))
-        attribute.Set(0.0)
-
-
 def narrow_limits(stage: Usd.Stage, units: StageUnits, soft: Mapping[str, tuple[float, float]]) -> list[str]:
     """Make limits of joints narrower where safety controllers keep narrower ones.
 
@@ -126,7 +106,7 @@ def narrow_limits(stage: Usd.Stage, units: StageUnits, soft: Mapping[str, tuple[
         if named(prim) not in soft or prim.GetTypeName() not in _DRIVES:
             continue
         scale = 1.0 / units.length(1.0) if prim.GetTypeName() == "PhysicsPrismaticJoint" else np.degrees(1.0)
-        low, high = (prim.GetAttribute(name) for name in _LIMITS)
+        low, high = (prim.GetAttribute(name) for name in LIMITS)
         hard = [
             end.Get() if end.HasAuthoredValue() else unlimited for end, unlimited in ((low, -np.inf), (high, np.inf))
         ]
@@ -175,17 +155,6 @@ def author_motors(
         _author(axis, moved.get(axis.path), units, frames_per_second, efforts.get(named(axis.prim)))
 
 
-def immovable_joints(character: Character) -> tuple[str, ...]:
-    """A sentence for the user about motors that cannot move: a URDF joint whose limit has no range has that from 0 to
-    0."""
-    joints = (character.joints[motor.joint] for motor in character.motors)
-    held = [joint.path for joint in joints if joint.lower == joint.upper]
-    if not held:
-        return ()
-    which = f"{held[0]} and {len(held) - 1} more joints" if len(held) > 1 else held[0]
-    return (f"{which} cannot move: lower and upper limit are the same; a joint without limits is `continuous` in URDF",)
-
-
 def _author(
     axis: Axis, track: MotorTracks | None, units: StageUnits, frames_per_second: float, effort: float | None
 ) -> None:  # fmt: skip
@@ -208,7 +177,7 @@ def _rest(axis: Axis) -> float:
     """The value nearest to 0 within the limits of a joint."""
     names = limits_of(axis.drive)
     if axis.prim.GetTypeName() != GENERIC_JOINT:
-        names = _LIMITS
+        names = LIMITS
     low, high = (attribute.Get() if (attribute := axis.prim.GetAttribute(name)) else None for name in names)
     low, high = (-np.inf if low is None else low), (np.inf if high is None else high)
     return float(min(max(0.0, low), high)) if low <= high else 0.0

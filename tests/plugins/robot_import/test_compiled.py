@@ -138,6 +138,55 @@ def test_gains_are_those_of_the_compiled_actuator(tmp_path, name):
     assert (motor.position_gain, motor.velocity_gain) == pytest.approx((stiffness, damping), rel=1e-6)
 
 
+GENERAL = '<actuator><general joint="lift" biastype="affine" {}/></actuator>'
+COMMANDS = {  # head and joint, actuator, limits of the joint that its commands leave [rad], what is told of it
+    "ctrlrange": ("", "", POSITION.format('ctrlrange="-0.2 0.3"'), (-0.2, 0.3), "its limits are those of the commands"),
+    "gear": ("", "", POSITION.format('gear="-10" ctrlrange="-2 3"'), (-0.3, 0.2), "its limits are those"),
+    "not_limited": ("", "", POSITION.format('ctrlrange="-0.2 0.3" ctrllimited="false"'), (-np.inf, np.inf), ""),
+    "wider": ("", 'range="-10 10"', POSITION.format('ctrlrange="-2 3"'), (-np.pi / 18, np.pi / 18), ""),
+    "inherited": ("", 'range="-10 10"', POSITION.format('inheritrange="0.5"'), (-np.pi / 36, np.pi / 36), "-5 to 5"),
+    "ref": ('<compiler angle="radian"/>', 'ref="0.4" range="-1 1"', POSITION.format('ctrlrange="-0.8 0.5"'),
+            (-1.2, 0.1), "its command is 1 times the joint's value +0.4"),
+    "ref_in_degrees": ("", 'ref="20" range="-50 50"', POSITION.format('ctrlrange="-0.8 0.5"'),
+                       (-0.8 - np.pi / 9, 0.5 - np.pi / 9), "times the joint's value +0.349066"),
+    "scaled": ("", "", GENERAL.format('gainprm="100" biasprm="0 -200 -9" ctrlrange="-1 1"'), (-0.5, 0.5),
+               "its command is 2 times the joint's value"),
+    "constant": ("", "", GENERAL.format('gainprm="200" biasprm="30 -200 -9" ctrlrange="-1 1"'), (-0.85, 1.15),
+                 "its command is 1 times the joint's value -0.15"),
+    "affine": ("", "", GENERAL.format('gaintype="affine" gainprm="200 0 -3" biasprm="0 -200 -9"'), (-np.inf, np.inf),
+               "its gain depends on the pose, which is not read"),
+    "integrated": ("", "", '<actuator><intvelocity joint="lift" kp="50" actrange="-2 3" ctrlrange="-1 1"/></actuator>',
+                   (-2.0, 3.0), "its limits are those of the commands"),
+    "in_parent": ("", "", '<actuator><position jointinparent="lift" kp="50" ctrlrange="-0.2 0.3"/></actuator>',
+                  (-0.2, 0.3), "its limits are those of the commands"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_commands_limit_joints_and_are_told_where_they_are_not_its_values(tmp_path, name):
+    head, joint, tail, limits, told = COMMANDS[name]
+    made, _ = imported(tmp_path, robot(head=head, joint=joint, tail=tail))
+    (motor,) = made.character.motors
+    assert motor.position_gain > 0.0 and motor.max_torque == np.inf
+    own = made.character.joints[motor.joint]
+    assert (own.lower, own.upper) == pytest.approx(limits, rel=1e-5)
+    notes = [note for note in made.notes if "command" in note or "its gain" in note]
+    assert any(told in note for note in notes) if told else not notes
+
+
+def test_a_bias_that_is_of_no_kind_holds_nothing(tmp_path):
+    tail = '<actuator><general joint="lift" gainprm="20" biasprm="0 -40 -3"/></actuator>'
+    (motor,) = imported(tmp_path, robot(tail=tail))[0].character.motors
+    assert motor.position_gain == 0.0
+
+
+def test_an_actuator_that_the_converter_does_not_write_makes_its_joint_a_motor(tmp_path):
+    dc = '<dcmotor joint="grip" resistance="1" motorconst="1"/>'
+    made, _ = imported(tmp_path, robot(tail=f'<actuator><position joint="lift" kp="50"/>{dc}</actuator>'))
+    assert [motor.path.rsplit("/", 1)[-1] for motor in made.character.motors] == ["lift", "grip"]
+    assert any("only which joints they move is read: grip" in note for note in made.notes)
+
+
 MOTOR = '<actuator><motor joint="lift" {}/></actuator>'
 LIMITS = {
     "ctrlrange": (robot(tail=MOTOR.format('ctrlrange="-2 2" gear="30"')), 60.0),

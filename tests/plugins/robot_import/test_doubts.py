@@ -4,7 +4,7 @@ import dataclasses
 
 from calmotion.usd.reading.shot import read_shot
 from calmotion_plugins.robot_import.masses import too_heavy
-from calmotion_plugins.robot_import.robot_motors import immovable_joints
+from calmotion_plugins.robot_import.robot import immovable_joints
 from small_shots import FORE, write_arm
 
 

@@ -41,6 +41,7 @@ from calmotion.usd.reading.joints import (
     refuse_unsupported,
 )
 from calmotion.usd.reading.motors import driven_motors as motors
+from calmotion.usd.reading.motors.motor_limits import limits_of_commands
 from calmotion.usd.reading.motors.posed_motors import posed_joints
 from calmotion.usd.reading.motors.undriven_joints import tell_what_swings
 from calmotion.usd.reading.plausibility.bodies import warn_of_units
@@ -149,6 +150,8 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         lambda path: _body(reading, path, skeleton.poses[path], touching[path], path in fixed),
     )
     bodies = _with_parts_between(skeleton, real, reading.units.length(1.0))
+    drives = {drive.joint.path: drive.actuator for drive in skeleton.drives}
+    ranges = {j.path: limits_of_commands(reading, j, drives.get(j.path, "")) for j in skeleton.joints}
     joints = tuple(
         Joint(
             j.path,
@@ -157,8 +160,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
             body_index(j.body1, numbers),
             j.frame0,
             j.frame1,
-            j.lower,
-            j.upper,
+            *ranges[j.path],
             j.closes_chain,
             name=(j.prim.GetDisplayName() if j.prim else "") or j.path.rsplit("/", 1)[-1],
             contact=j.contact,

@@ -15,7 +15,7 @@ from calmotion.rigging.motor_types import MotorType
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dialects import GAINS, POSITION_ACTUATOR, Spelling, authored
-from calmotion.usd.reading.actuators.mujoco_actuators import numbers_of
+from calmotion.usd.reading.actuators.mujoco_actuators import affine_actuators
 from calmotion.usd.reading.actuators.named_types import TYPE
 from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
 from calmotion.usd.reading.joints import JointPrim
@@ -167,22 +167,15 @@ def _newton_gains(joint: JointPrim, newton: NewtonActuator | None, units: StageU
 
 
 def _actuator_gains(joint: JointPrim, actuators: Sequence[Usd.Prim], units: StageUnits) -> Gains | None:
-    """Gains of the actuators of a MuJoCo conversion that act on the joint itself; one at least holds positions. The
-    force of each is gain ctrl + b_0 + b_1 g q + b_2 g q' with the gear ratio g, in radians. A positive b_2 is a damping
-    ratio, of which MuJoCo's compiler makes a gain."""
-    stiffness = damping = 0.0
-    sources = []
-    for prim in actuators:
-        gain, bias, gear = (numbers_of(prim, name) for name in POSITION_ACTUATOR)
-        ratio = gear[0] if gear else 1.0
-        if not gain or not gain[0] or len(bias) < 3 or not (math.isfinite(bias[1] * bias[2]) and bias[1] <= 0.0):
-            continue
-        stiffness -= ratio**2 * bias[1]
-        damping += ratio**2 * max(0.0, -bias[2])
-        lost = f" without its damping ratio {bias[2]:g}" if bias[2] > 0.0 else ""
-        sources.append(f"{prim.GetPath()}{lost}")
-    if not stiffness > 0.0:
-        return None  # none holds positions
+    """Gains of the actuators of a MuJoCo conversion that act on the joint itself; one at least holds positions."""
+    acting = [actuator for actuator in affine_actuators(actuators) if actuator.slope or actuator.rate]
+    if not any(actuator.holds for actuator in acting):
+        return None
+    stiffness = -sum(actuator.ratio**2 * actuator.slope for actuator in acting)
+    damping = sum(actuator.ratio**2 * max(0.0, -actuator.rate) for actuator in acting)
+    sources = [
+        f"{a.prim.GetPath()}" + (f" without its damping ratio {a.rate:g}" if a.rate > 0.0 else "") for a in acting
+    ]
     to_si = _per_length(units) if joint.kind == "prismatic" else units.torque
     names = f"{POSITION_ACTUATOR[0]} and {POSITION_ACTUATOR[1]} of {' and '.join(sources)} (MuJoCo)"
     return Gains(to_si(stiffness), to_si(damping), names, ON_JOINT)

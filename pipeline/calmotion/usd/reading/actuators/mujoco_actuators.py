@@ -2,12 +2,71 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from calmotion.usd.dialects import POSITION_ACTUATOR, number_of
 from calmotion.usd.reading.joints import JointPrim
 
 if TYPE_CHECKING:
     from pxr import Usd
+
+_SAME = 1e-6  # of a gain: what a conversion rounds
+
+
+@dataclass(frozen=True)
+class AffineActuator:
+    """An actuator whose force on the joint is g (gain ctrl + b_0 + b_1 g q + b_2 g q'), in radians and stage units.
+
+    Attributes:
+        prim: Of it.
+        ratio: g, of its gear.
+        gain: Of its command.
+        varies: Whether the gain depends on the pose as well, which is not read.
+        offset, slope, rate: b_0, b_1 and b_2. A positive b_2 is a damping ratio, of which MuJoCo's compiler makes one.
+    """
+
+    prim: Usd.Prim
+    ratio: float
+    gain: float
+    varies: bool
+    offset: float
+    slope: float
+    rate: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether it pulls to a position."""
+        return self.slope < 0.0 and self.ratio != 0.0
+
+    def value_at(self, command: float) -> float:
+        """The value of the joint at which it pulls nowhere."""
+        return -(self.gain * command + self.offset) / (self.slope * self.ratio)
+
+    def values(self) -> tuple[float, float]:
+        """The values of the joint that its commands reach."""
+        integrates = token_of(self.prim, "mjc:dynType") == "integrator"
+        name = "mjc:act{}" if integrates else "mjc:ctrl{}"  # commands of such a one are speeds
+        low, high = (number_of(self.prim, name.format(f"Range:{end}")) or 0.0 for end in ("min", "max"))
+        if token_of(self.prim, name.format("Limited")) == "false" or not low < high:
+            return -math.inf, math.inf
+        first, last = sorted(map(self.value_at, (low, high)))
+        return first, last
+
+    def doubt(self) -> str:
+        """What of its commands is not as elsewhere, as words for the user; empty where the command is the joint's
+        value times its gear."""
+        words = []
+        scale = -self.slope / self.gain if self.gain else 1.0
+        if abs(scale - 1.0) > _SAME or self.offset:
+            words.append(f"its command is {self.ratio * scale:g} times the joint's value {-self.offset / self.gain:+g}")
+        if self.varies:
+            words.append("its gain depends on the pose, which is not read")
+        return ", and ".join(words)
 
 
 def actuators_beside(stage: Usd.Stage, path: str, joint: JointPrim) -> tuple[Usd.Prim, ...]:
@@ -20,10 +79,31 @@ def actuators_beside(stage: Usd.Stage, path: str, joint: JointPrim) -> tuple[Usd
     return tuple(other for other in prim.GetParent().GetChildren() if _acts_on(other, joint)) if prim else ()
 
 
-def _acts_on(actuator: Usd.Prim, joint: JointPrim) -> bool:
-    relationship = actuator.GetRelationship("mjc:target")
-    known = actuator.GetTypeName() == "MjcActuator" and bool(relationship)
-    return known and joint.prim.GetPath() in relationship.GetTargets()
+def affine_actuators(actuators: Sequence[Usd.Prim]) -> list[AffineActuator]:
+    """Those whose force depends on the joint's own position or speed."""
+    found = []
+    for prim in actuators:
+        gain, bias, gear = (numbers_of(prim, name) for name in POSITION_ACTUATOR)
+        unknown = token_of(prim, "mjc:biasType") == "none" or token_of(prim, "mjc:gainType") not in (
+            "", "fixed", "affine"
+        )  # fmt: skip
+        if unknown or not gain or not gain[0] or len(bias) < 3:
+            continue
+        if not np.all(np.isfinite([gain[0], *bias[:3]])) or bias[1] > 0.0:
+            continue
+        varies = token_of(prim, "mjc:gainType") == "affine" and any(gain[1:3])
+        found.append(AffineActuator(prim, gear[0] if gear else 1.0, gain[0], varies, *bias[:3]))
+    return found
+
+
+def reachable(joint: JointPrim, actuators: Sequence[Usd.Prim], meters: float) -> tuple[float, float]:
+    """The values of a joint that the commands of its actuator reach [rad or m]; where several hold it, all."""
+    holding = [actuator for actuator in affine_actuators(actuators) if actuator.holds]
+    if len(holding) != 1 or number_of(joint.prim, "mjc:ref"):
+        return -math.inf, math.inf
+    low, high = holding[0].values()
+    scale = meters if joint.kind == "prismatic" else 1.0
+    return scale * low, scale * high
 
 
 def numbers_of(prim: Usd.Prim, name: str) -> list[float]:
@@ -31,3 +111,15 @@ def numbers_of(prim: Usd.Prim, name: str) -> list[float]:
     attribute = prim.GetAttribute(name)
     value: Any = attribute.Get() if attribute else None
     return [] if value is None else [float(v) for v in value]
+
+
+def token_of(prim: Usd.Prim, name: str) -> str:
+    """The token of an attribute; empty where it is not there."""
+    attribute = prim.GetAttribute(name)
+    return str(attribute.Get() or "") if attribute else ""
+
+
+def _acts_on(actuator: Usd.Prim, joint: JointPrim) -> bool:
+    relationship = actuator.GetRelationship("mjc:target")
+    known = actuator.GetTypeName() == "MjcActuator" and bool(relationship)
+    return known and joint.prim.GetPath() in relationship.GetTargets()

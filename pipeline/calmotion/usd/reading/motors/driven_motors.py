@@ -16,7 +16,7 @@ from calmotion.usd import schemas
 from calmotion.usd.dialects import number_of
 from calmotion.usd.reading.actuators.laws import direct_current, gain_factor
 from calmotion.usd.reading.actuators.motor_models import motor_model, read_gains
-from calmotion.usd.reading.actuators.mujoco_actuators import actuators_beside
+from calmotion.usd.reading.actuators.mujoco_actuators import actuators_beside, affine_actuators
 from calmotion.usd.reading.actuators.named_types import named_type
 from calmotion.usd.reading.actuators.newton_actuators import ACTUATOR, TARGETS, newton_actuator
 from calmotion.usd.reading.actuators.rotors import read_backlash, read_delay, read_rotor
@@ -231,6 +231,9 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
     gear, model, kind = drive.gear, motor_model(prim), named_type(drive.joint)
     newton = newton_actuator(reading.stage, drive.actuator)
     mujoco = actuators_beside(reading.stage, drive.actuator, drive.joint) if drive.actuator and newton is None else ()
+    for actuator in affine_actuators(mujoco):
+        if actuator.holds and (doubt := actuator.doubt()):
+            reading.note(f"{drive.joint.path}: {doubt} ({actuator.prim.GetPath()})")
     current = direct_current(drive.joint, reading.units, kind) if model == SERVO else None
     gains = read_gains(drive.joint, mujoco, newton, reading.units, model, kind, current)
     limit = effort_limit(drive.joint, reading.units, reading.notes, kind, newton, mujoco)
@@ -310,7 +313,10 @@ def _drive(
     if stiffness:
         note = f"its drive has a stiffness but no target position and holds 0 {unit}"
         return Drive(joint, CONSTANT, constant=0.0, note=note)
-    reading.note(f"{joint.path}: its drive has neither a target position nor a stiffness, so the joint moves freely")
+    lost = ", without its damping" if prim.GetAttribute(f"drive:{drive}:physics:damping").Get() else ""
+    reading.note(
+        f"{joint.path}: its drive has neither a target position nor a stiffness, so the joint moves freely{lost}"
+    )
     return None
 
 

@@ -12,8 +12,9 @@ from calmotion.errors import ShotError
 from calmotion.rigging.motor_types import MotorType
 from calmotion.usd import schemas
 from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, authored, number_of
-from calmotion.usd.reading.actuators.mujoco_actuators import numbers_of
+from calmotion.usd.reading.actuators.mujoco_actuators import actuators_beside, numbers_of, reachable, token_of
 from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
+from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.units import StageUnits
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from pxr import Usd
 
 _SCHEMA = "CalmMotorAPI"
+_SAME = 1e-4  # of a range: what a conversion rounds
 
 
 def effort_limit(
@@ -99,7 +101,7 @@ def _limit_of(actuator: Usd.Prim) -> tuple[str, float]:
     is the force."""
     ratio = abs((numbers_of(actuator, "mjc:gear") or [1.0])[0])
     found = {"mjc:forceRange": ratio * _range(actuator, "mjc:forceRange")}
-    if all(_token(actuator, f"mjc:{what}Type") in ("", "fixed", "none") for what in ("gain", "bias", "dyn")):
+    if all(token_of(actuator, f"mjc:{what}Type") in ("", "fixed", "none") for what in ("gain", "bias", "dyn")):
         gain = abs((numbers_of(actuator, "mjc:gainPrm") or [1.0])[0])
         found["mjc:ctrlRange"] = ratio * gain * _range(actuator, "mjc:ctrlRange")
     name = min(found, key=found.__getitem__)
@@ -111,13 +113,32 @@ def _range(prim: Usd.Prim, name: str) -> float:
     high = number_of(prim, f"{name}:max") or 0.0
     low = number_of(prim, f"{name}:min")
     low = -high if low is None else low
-    limited = _token(prim, name.replace("range", "limited").replace("Range", "Limited")) != "false"
+    limited = token_of(prim, name.replace("range", "limited").replace("Range", "Limited")) != "false"
     return min(-low, high) if limited and min(-low, high) > 0.0 else math.inf
 
 
-def _token(prim: Usd.Prim, name: str) -> str:
-    attribute = prim.GetAttribute(name)
-    return str(attribute.Get() or "") if attribute else ""
+def limits_of_commands(reading: Reading, joint: JointPrim, actuator: str) -> tuple[float, float]:
+    """The limits of a joint [rad or m], narrowed to what the commands of its actuator of a MuJoCo conversion reach,
+    which is told.
+
+    Args:
+        actuator: Its path, or empty.
+    """
+    limits = joint.lower, joint.upper
+    if not actuator:
+        return limits
+    low, high = reachable(joint, actuators_beside(reading.stage, actuator, joint), reading.units.length(1.0))
+    if not np.isfinite(low) or np.allclose([low, high], limits, rtol=0.0, atol=_SAME * (high - low)):
+        return limits
+    low, high = max(low, joint.lower), min(high, joint.upper)
+    if not low < high or (low, high) == limits:
+        return limits
+    shown, unit = (1.0, "m") if joint.kind == "prismatic" else (float(np.degrees(1.0)), "deg")
+    reading.note(
+        f"{joint.path}: its limits are those of the commands of {actuator}, {shown * low:.4g} to "
+        f"{shown * high:.4g} {unit}"
+    )
+    return low, high
 
 
 def calmotion_limit(prim: Usd.Prim, name: str) -> float:

@@ -1,9 +1,10 @@
-"""Joints that no curve moves: springs of MuJoCo (`stiffness`, `springref`), those that an equality holds, free ones."""
+"""Joints of an imported robot beside their motors: actuators and limits as MuJoCo compiles them, springs (`stiffness`,
+`springref`), those that an equality holds, free ones."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from calmotion.errors import ShotError
@@ -19,13 +20,88 @@ from calmotion.usd import (
     prims_of,
 )
 
-from .robot_motors import Axis, axes_of, free_axes, is_driven, named
+from .robot_motors import LIMITS, Axis, axes_of, free_axes, is_driven, named
 
 if TYPE_CHECKING:
     from pxr import Usd
 
 _SLOW = 1e5  # time in which the spring beside a damper alone would pull a joint back [s]
-_KINDS = ("PhysicsRevoluteJoint", "PhysicsPrismaticJoint")
+_REVOLUTE = "PhysicsRevoluteJoint"
+_KINDS = (_REVOLUTE, "PhysicsPrismaticJoint")
+_ACTUATOR = "MjcActuator"
+
+
+def author_actuators(stage: Usd.Stage, values: Mapping[str, Any], joints: Sequence[Usd.Prim | None]) -> None:
+    """Author compiled gains and ranges of the actuators; those that are off go, and those that the converter has not
+    written, as it does not know their kind or how they act on their joint, are added.
+
+    Args:
+        stage: Where they are authored, over the conversion.
+        values: As `converters.compiled_values` gives them.
+        joints: Of each body, in the order of the values; None where it has none.
+    """
+    known = {str(p.GetDisplayName() or p.GetName()): p for p in prims_of(stage) if p.GetTypeName() == _ACTUATOR}
+    for number, (name, found) in enumerate(values["actuators"].items()):
+        prim, body = known.get(name), found["body"]
+        joint = None if body is None else joints[body]
+        if prim is None and joint is not None and name not in values["off"]:
+            prim = stage.DefinePrim(f"{stage.GetDefaultPrim().GetPath()}/Physics/CalmActuator_{number}", _ACTUATOR)
+            prim.SetDisplayName(name)
+        if prim is None:
+            continue
+        if joint is not None and not prim.GetRelationship("mjc:target"):
+            prim.CreateRelationship("mjc:target").SetTargets([joint.GetPath()])
+        if name in values["off"]:
+            prim.SetActive(False)
+        for attribute, value in found["attributes"].items():
+            author(prim, attribute, value)
+
+
+def author(prim: Usd.Prim, name: str, value: Any) -> None:
+    """Author an attribute of a schema that usd-core does not have; what is not there and 0 stays as it is."""
+    from pxr import Sdf
+
+    attribute = prim.GetAttribute(name)
+    if not attribute.IsDefined() and value:
+        kinds = {float: Sdf.ValueTypeNames.Double, str: Sdf.ValueTypeNames.Token}
+        attribute = prim.CreateAttribute(name, kinds.get(type(value), Sdf.ValueTypeNames.DoubleArray))
+    if attribute.IsDefined():
+        attribute.Set(value)
+
+
+def shift_limits(stage: Usd.Stage) -> None:
+    """Count limits, springs and commands of MuJoCo joints from the pose of the file, where their value is `ref` and
+    becomes 0."""
+    radians = any(prim.GetAttribute("mjc:compiler:angle").Get() == "radian" for prim in prims_of(stage))
+    for prim in joint_prims(stage):
+        attribute = prim.GetAttribute("mjc:ref")
+        ref = attribute.Get() if attribute else None
+        if not ref or prim.GetTypeName() not in _KINDS:
+            continue
+        shift = np.degrees(ref) if radians and prim.GetTypeName() == _REVOLUTE else ref
+        for name in LIMITS:
+            limit = prim.GetAttribute(name)
+            if limit and limit.HasAuthoredValue():
+                limit.Set(float(limit.Get() - shift))
+        spring = prim.GetAttribute("mjc:springref")
+        if spring:
+            spring.Set(float((spring.Get() or 0.0) - ref))
+        _shift_commands(stage, prim, np.radians(ref) if prim.GetTypeName() == _REVOLUTE and not radians else ref)
+        attribute.Set(0.0)
+
+
+def _shift_commands(stage: Usd.Stage, joint: Usd.Prim, ref: float) -> None:
+    """Count a joint from where its value is `ref` [rad or m] in the biases of its actuators: gain ctrl + b_0 +
+    b_1 g (q + ref)."""
+    for prim in prims_of(stage):
+        targets = prim.GetRelationship("mjc:target") if prim.GetTypeName() == _ACTUATOR else None
+        bias = prim.GetAttribute("mjc:biasPrm")
+        if not targets or joint.GetPath() not in targets.GetTargets() or not (bias and len(bias.Get() or ()) > 1):
+            continue
+        gear = prim.GetAttribute("mjc:gear")
+        ratio = gear.Get()[0] if gear and gear.Get() else 1.0
+        offset, slope, *others = bias.Get()
+        bias.Set([offset + slope * ratio * ref, slope, *others])
 
 
 def author_springs(stage: Usd.Stage, units: StageUnits) -> list[str]:
