@@ -104,7 +104,11 @@ def _link(character: Character, index: int, geometry: FEMesh | Volume) -> Link |
     if not isinstance(geometry, Volume):
         return None
     carried = any(joint.body1 == index for joint in character.joints)
-    return Link(character.bodies[index], geometry.solid, geometry.size, carried, frames_of(character, index))
+    solid = geometry.solid
+    return Link(
+        character.bodies[index], solid.points, solid.triangles, solid.source, geometry.size, carried,
+        frames_of(character, index),
+    )  # fmt: skip
 
 
 def _refuse_large_elements(body: Body, given: float) -> None:

@@ -105,17 +105,3 @@ def test_a_scaled_matrix_has_the_same_factors():
     solver = SparseSolver(K)
     np.testing.assert_allclose(solver.scaled(4.0).solve(b), SparseSolver(4.0 * K).solve(b), rtol=1e-12)
     np.testing.assert_array_equal(solver.scaled(4.0).scaled(0.25).solve(b), solver.solve(b))
-
-
-def test_a_turned_matrix_has_the_same_factors():
-    """Q K Q^T with one orthogonal matrix for each node, a reflection included."""
-    rng = np.random.default_rng(3)
-    dense = rng.standard_normal((12, 12))
-    K, b = csr_matrix(dense @ dense.T + 12.0 * np.eye(12)), rng.standard_normal((12, 2))
-    first, second = (np.linalg.qr(rng.standard_normal((3, 3)))[0] for _ in range(2))
-    solver, turns = SparseSolver(K), [np.kron(np.eye(4), turn) for turn in (first, second)]
-    once, twice = solver.turned(first), solver.turned(first).scaled(2.0).turned(second)
-    np.testing.assert_allclose(turns[0] @ K @ turns[0].T @ once.solve(b), b, atol=1e-12)
-    turn = turns[1] @ turns[0]
-    np.testing.assert_allclose(2.0 * turn @ K @ turn.T @ twice.solve(b[:, 0]), b[:, 0], atol=1e-12)
-    assert once.entries == 0 < solver.entries

@@ -38,7 +38,6 @@ class SparseSolver:
             (np.ones(matrix.nnz, dtype=np.int8), (row, matrix.indices // block)), shape=(n // block, n // block)
         )
         self._scale = 1.0
-        self._turn: Array | None = None
         self._factors = MultifrontalCholesky(matrix, graph, dissect(graph, points), block)
 
     def scaled(self, factor: float) -> SparseSolver:
@@ -47,35 +46,16 @@ class SparseSolver:
         other._scale = self._scale * factor
         return other
 
-    def turned(self, turn: Array) -> SparseSolver:
-        """The solver of the matrix of a turned or reflected body, with the same factors.
-
-        Args:
-            turn: Q of Q K Q^T, applied to the vector of each node; orthogonal, shape [3, 3].
-        """
-        other = copy(self)
-        other._turn = turn if self._turn is None else turn @ self._turn
-        return other
-
     @property
     def entries(self) -> int:
-        """Number of entries of the factor; 0 where they are those of another body."""
-        return self._factors.entries if self._turn is None else 0
+        """Number of entries of the factor."""
+        return self._factors.entries
 
     def solve(self, b: Array) -> Array:
         """x with matrix @ x = b, both of shape [n] or [n, k]."""
         interrupts.check()  # in a thread, where no signal arrives
         columns = b.reshape(len(b), -1)
         with one_blas_thread():
-            if self._turn is None:
-                found = self._factors.solve(columns)
-            else:
-                found = turned(self._factors.solve(turned(columns, self._turn.T)), self._turn)
+            found = self._factors.solve(columns)
         found = found.reshape(b.shape)
         return found if self._scale == 1.0 else found / self._scale
-
-
-def turned(vectors: Array, turn: Array) -> Array:
-    """Vectors of all nodes, shape [3n, k], each turned by an orthogonal matrix, shape [3, 3]."""
-    n, k = len(vectors) // 3, vectors.shape[1]
-    return np.asarray(turn @ vectors.reshape(n, 3, k)).reshape(3 * n, k)

@@ -2,6 +2,7 @@
 
 from calmotion.mesh.element_sizes import element_size as element_size
 from calmotion.mesh.element_sizes import shape_of as shape_of
+from calmotion.mesh.mass import joined_surfaces as joined_surfaces
 from calmotion.mesh.patches.contact_notes import contact_notes as contact_notes
 from calmotion.mesh.patches.contact_place import contact_place as contact_place
 from calmotion.mesh.patches.interface_patches import AttachmentFrame as AttachmentFrame

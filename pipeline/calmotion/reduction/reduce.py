@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, InterfacePatch, interface_patches
 from calmotion.mesh.quadratic import QuadraticMesh
@@ -17,7 +16,6 @@ from calmotion.model.character import DEFAULT_TOLERANCE, Body, ElasticMaterial, 
 from calmotion.model.meshes import FEMesh
 from calmotion.model.result import Simplification
 from calmotion.reduction.basis.craig_bampton import Basis, reduced_basis
-from calmotion.reduction.basis.fixed_interface import FixedInterface
 from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.damping import damped, ratio_of_parts
 from calmotion.reduction.elements.assembly import FEModel, assemble
@@ -140,12 +138,6 @@ class FullBody:
             self.radii,
             _embedded=self._embedded,
         )
-
-    def take(self, other: FullBody, turn: Array) -> None:
-        """Take the factors and normal modes of another body, which a turn makes this one; see `likeness`."""
-        own = self.support
-        like = other.support.fixed(other.model), turn
-        own.known(self.model, FixedInterface.of(self.model, own.root, own.patches, own.centers, like))
 
     def factorize(self) -> None:
         """Factorise its matrix now, not when it is needed."""

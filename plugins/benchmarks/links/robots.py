@@ -8,14 +8,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from calmotion.reduction import cache_key
 from calmotion.support import Fault, results_of
 
 from ..common.tables import say, write_rows
 from ..scenes.links import Link, frames_of
 from .survey import LinkRow, faulty_row, same_row, survey_link
 
-_SAME = 1e-7  # distance of points of links that are the same [m]
 _PATIENCE = 30.0  # of the time limit, that a link may take on a busy machine
 
 
@@ -54,23 +52,27 @@ def patience(time_limit: float) -> float:
 
 def first_of_its_kind(links: Sequence[Link]) -> list[int]:
     """For each link the index of the first one that has its mesh, as the mesher finds them, and its mass."""
-    from calmotion.mesh import Link, twin_of
+    from calmotion.mesh import twin_of
 
-    kinds: dict[str, int] = {}
-    shapes: list[Any] = []
     firsts: list[int] = []
+    shapes = [_shape(link) for link in links]
     for index, link in enumerate(links):
-        joints = frames_of(link)
-        shapes.append(Link(link.body, None, -1.0, link.carrier is not None, joints))
-        surfaces = [(np.round(s.points / _SAME) + 0.0, s.triangles, s.visible) for s in link.body.surfaces]
-        frames = [(np.round(f.position / _SAME) + 0.0, np.round(f.axis, 6) + 0.0) for f in joints]
-        first = kinds.setdefault(cache_key((surfaces, frames, _mass(link), link.body.tets)), index)
-        if first == index and link.body.tets is None:
-            earlier = [k for k in sorted(set(firsts)) if _mass(links[k]) == _mass(link) and links[k].body.tets is None]
-            twin = twin_of(shapes[index], [shapes[k] for k in earlier])
-            first = index if twin is None else earlier[twin[0]]
-        firsts.append(first if first == index else firsts[first])
+        earlier = [k for k in sorted(set(firsts)) if _mass(links[k]) == _mass(link)]
+        twin = twin_of(shapes[index], [shapes[k] for k in earlier])
+        firsts.append(index if twin is None else earlier[twin[0]])
     return firsts
+
+
+def _shape(link: Link) -> Any:
+    """What decides its mesh; None where its tetrahedra are given, or it has no visual surfaces."""
+    from calmotion.mesh import Link as Shape
+    from calmotion.mesh import joined_surfaces
+
+    visible = [surface for surface in link.body.surfaces if surface.visible and len(surface.triangles)]
+    joined = joined_surfaces(visible) if visible and link.body.tets is None else None
+    if joined is None or not np.isfinite(joined[0]).all():
+        return None
+    return Shape(link.body, *joined, "", -1.0, link.carrier is not None, frames_of(link))
 
 
 def _mass(link: Link) -> float | None:

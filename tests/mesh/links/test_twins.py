@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.mesh.repair import closed_solid
 from calmotion.mesh.sources import twins as twins_module
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.model import Frame
@@ -50,39 +49,28 @@ def test_the_mirror_image_of_a_link_is_meshed_once(host, monkeypatch):
     assert other.compliances == pytest.approx(one.compliances, rel=1e-6)
 
 
+def shape(body, frames=(ROOT,), size=-1.0):
+    (part,) = body.surfaces
+    return twins_module.Link(body, part.points, part.triangles, "visual surface", size, True, frames)
+
+
 def test_links_are_twins_only_with_their_joints_at_the_same_places():
-    twins, solids = twins_module, closed_solid
-    solid, image = (solids.closed_solid([bracket_surface(m)], "/Arm/link") for m in (False, True))
+    twin_of = twins_module.twin_of
     tip, tilted = Frame(np.array([0.04, 0.006, 0.03]), TURN), Frame(np.array([0.04, 0.006, 0.03]), np.eye(4)[1])
     mirrored_tip = Frame(MIRROR @ tip.position, TURN)
-    left = twins.Link(link(bracket_surface()), solid, -1.0, True, (ROOT, tip))
-    right = twins.Link(link(bracket_surface(True)), image, -1.0, True, (ROOT, mirrored_tip))
-    index, isometry = twins.twin_of(right, [left])
+    left = shape(link(bracket_surface()), (ROOT, tip))
+    right = shape(link(bracket_surface(True)), (ROOT, mirrored_tip))
+    index, isometry = twin_of(right, [left])
     assert index == 0 and isometry.mirrors
-    assert twins.twin_of(left, [left])[1].turn == pytest.approx(np.eye(3))
-    assert twins.twin_of(replace(right, frames=(ROOT, tip)), [left]) is None
-    assert twins.twin_of(replace(right, frames=(mirrored_tip, ROOT)), [left]) is None, "the first is the carrier"
-    assert (
-        twins.twin_of(replace(right, frames=(ROOT, replace(tilted, position=mirrored_tip.position))), [left])
-        is not None
-    )
+    assert twin_of(left, [left])[1].turn == pytest.approx(np.eye(3))
+    assert twin_of(replace(right, frames=(ROOT, tip)), [left]) is None
+    assert twin_of(replace(right, frames=(mirrored_tip, ROOT)), [left]) is None, "the first is the carrier"
+    turned = replace(tilted, position=mirrored_tip.position)
+    assert twin_of(replace(right, frames=(ROOT, turned)), [left]) is not None
     sideways = Frame(mirrored_tip.position, np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0]))
-    assert twins.twin_of(replace(right, frames=(ROOT, sideways)), [left]) is None, "another axis"
-    assert twins.twin_of(replace(right, size=0.01), [left]) is None
-
-
-def test_links_of_the_same_surfaces_are_twins_whatever_their_solids():
-    twins, solids = twins_module, closed_solid
-    left, right = link(bracket_surface()), link(bracket_surface(True))
-    solid, image = (solids.closed_solid(body.surfaces, "/Arm/link") for body in (left, right))
-    assert twins.twin_of(twins.Link(right, None, -1.0, True, (ROOT,)), [twins.Link(left, None, -1.0, True, (ROOT,))])
-    other = replace(image, points=image.points + [0.0, 0.0, 0.01 * np.sign(image.points[:, 2].mean())])
-    rough = replace(other, points=np.vstack([other.points, other.points[:1]]))  # of other points than its mirror image
-    one = twins.Link(left, replace(solid, source="wrapped visual surface"), -1.0, True, (ROOT,))
-    two = twins.Link(right, replace(rough, source="wrapped visual surface"), -1.0, True, (ROOT,))
-    assert twins.twin_of(two, [one])[1].mirrors
-    of_hulls = [replace(each, solid=replace(each.solid, source="collision shape")) for each in (one, two)]
-    assert twins.twin_of(of_hulls[1], of_hulls[:1]) is None
+    assert twin_of(replace(right, frames=(ROOT, sideways)), [left]) is None, "another axis"
+    assert twin_of(replace(right, size=0.01), [left]) is None
+    assert twin_of(replace(right, source="collision surface"), [left]) is None
 
 
 def test_links_with_other_triangles_are_twins_and_say_how_near(host):
@@ -92,8 +80,7 @@ def test_links_with_other_triangles_are_twins_and_say_how_near(host):
     points, triangles = divided(part.points, part.triangles)
     points[0] += 2e-5
     other = replace(body, path="/Arm/other", surfaces=(replace(part, points=points, triangles=triangles),))
-    links = [twins.Link(each, None, -1.0, True, (ROOT,)) for each in (body, other)]
-    index, isometry = twins.twin_of(links[1], links[:1])
+    index, isometry = twins.twin_of(shape(other), [shape(body)])
     assert index == 0 and 1e-6 < isometry.distance <= np.sqrt(3.0) * 2e-5
     (mesh,) = run(host, link(bracket_surface(), element_size=0.02))
     assert (

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
-from calmotion.mesh.mass import joined_surfaces
-from calmotion.mesh.repair.closed_solid import Solid
-from calmotion.mesh.surfaces.congruence import Isometry, isometries, near_isometries
+from calmotion.arrays import Array, Indices
+from calmotion.mesh.surfaces.congruence import Isometry, isometries
 from calmotion.model import Body, FEMesh, FlexibleSettings, Frame
 from calmotion.model.meshes import CutPatch
 
 _SAME, _ALONG = 1e-4, 1e-4  # distance of frames, of the size; 1 - cosine of axes that are the same
+_TOLD = 1e-7  # distance of surfaces that is told [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,40 +22,27 @@ class Link:
 
     Attributes:
         body: Its body.
-        solid: Its solid; None where it is not made yet.
+        points: Of its solid, or of its visual surfaces where that is not made yet [m], shape [n, 3].
+        triangles: Shape [m, 3].
+        source: What the solid is made of.
         size: Of its elements [m]; not positive: automatic.
         carried: Whether the first frame is that of the joint to its parent.
         frames: Of its joints, body frame, that of the joint to its parent first.
     """
 
     body: Body
-    solid: Solid | None
+    points: Array
+    triangles: Indices
+    source: str
     size: float
     carried: bool
     frames: tuple[Frame, ...]
-
-    @cached_property
-    def shape(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Points and triangles of the solid."""
-        return None if self.solid is None else (self.solid.points, self.solid.triangles)
-
-    @cached_property
-    def surface(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Those of the visual surfaces, where the solid is made of them; None where it is not, or may not be."""
-        visible = [part for part in self.body.surfaces if part.visible and len(part.triangles)]
-        settings = self.body.flexible
-        assert settings is not None
-        other = settings.mesh_file or settings.geometry == "beam" or (self.solid and "visual" not in self.solid.source)
-        joined = None if other or not visible else joined_surfaces(visible)
-        # the links of a survey are not checked yet
-        return joined if joined is not None and np.isfinite(joined[0]).all() else None
 
 
 def twin_of(link: Link | None, others: Sequence[Link | None]) -> tuple[int, Isometry] | None:
     """The first of other links that has the same shape, and the isometry that takes it to the link; None without one.
 
-    Their joints must be at the same places, their settings the same; their densities and masses may differ. The solids
-    of two links with the same surfaces may differ: a wrap depends on the order of parts. Surfaces with other triangles
+    Their joints must be at the same places, their settings the same; their densities and masses may differ. Surfaces
     are the same if they are as near to each other as a mesh is to its surface. Where the tetrahedra of a link are
     given, it is None, and like no other.
     """
@@ -65,13 +51,10 @@ def twin_of(link: Link | None, others: Sequence[Link | None]) -> tuple[int, Isom
             continue
         if _settings(link) != _settings(other) or len(link.frames) != len(other.frames):
             continue
-        shapes, surfaces = (other.shape, link.shape), (other.surface, link.surface)
-        for (given, shown), found in ((shapes, isometries), (surfaces, isometries), (surfaces, near_isometries)):
-            if given is None or shown is None:
-                continue
-            for isometry in found(*given, *shown):
-                if _joints_match(isometry, other, link, float(np.linalg.norm(np.ptp(shown[0], axis=0)))):
-                    return index, isometry
+        size = float(np.linalg.norm(np.ptp(link.points, axis=0)))
+        for isometry in isometries(other.points, other.triangles, link.points, link.triangles):
+            if _joints_match(isometry, other, link, size):
+                return index, isometry
     return None
 
 
@@ -85,7 +68,7 @@ def _settings(link: Link) -> tuple[object, ...]:
     core = None if material.core is None else (material.core.skin, material.core.infill, material.core.stiffness)
     return (
         material.poissons_ratio, core, settings.interface_radius, settings.geometry, settings.wall_thickness,
-        settings.section, link.size, link.solid and link.solid.source, link.carried, named,
+        settings.section, link.size, link.source, link.carried, named,
     )  # fmt: skip
 
 
@@ -122,7 +105,7 @@ def moved(mesh: FEMesh, isometry: Isometry, index: int, path: str) -> FEMesh:
         for patch in mesh.patches
     )
     note = f"meshed as {path}, {'mirrored' if isometry.mirrors else 'which has the same shape'}"
-    if isometry.distance > 0.0:
+    if isometry.distance > _TOLD:
         note += f" (within {1e3 * isometry.distance:.2g} mm)"
     quality = replace(mesh.quality, repairs=(note,))
     return FEMesh(index, isometry(mesh.points), np.ascontiguousarray(tets), quality, mesh.given, patches)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -10,13 +11,12 @@ import numpy as np
 from calmotion.arrays import Array, Indices
 from calmotion.mesh.tetrahedra import surface_area, surface_volume
 
-_SAME = 1e-5  # of the size: distance of points that are the same
-_EQUAL = 1e-5  # relative difference of areas and volumes that are the same
-_ROUND = 1e-3  # relative difference of principal moments below which their axes are not known
-# Surfaces that are alike, by another tessellation: largest relative difference of areas, volumes and moments; and
+# Surfaces that are alike, whatever their triangles: largest relative difference of areas, volumes and moments; and
 # distances, of the size, that no place and a tenth of the places exceed. Those of the arms of a Unitree G1 differ by
 # 1e-5, 5e-4 and 9e-5, and by 1.7e-3 and 1.6e-4 of the size.
 _ALIKE, _FAR, _MOSTLY, _PART = 1e-3, 2e-3, 2e-4, 0.9
+_ROUND = 1e-3  # relative difference of principal moments below which their axes are not known
+_PLACES = 20_000  # at which surfaces are compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +43,8 @@ class Isometry:
         return np.asarray(points @ self.turn.T + self.move)
 
 
-def isometries(points: Array, triangles: Indices, other: Array, others: Indices) -> list[Isometry]:
-    """The isometries that take a surface to another one, first the identity, then motions, then reflections.
+def isometries(points: Array, triangles: Indices, other: Array, others: Indices) -> Iterator[Isometry]:
+    """The isometries that take a surface to one that is alike, first the identity, then motions, then reflections.
 
     A surface with an axis of symmetry, or whose principal moments are nearly equal, is only found where it is not
     turned.
@@ -52,37 +52,25 @@ def isometries(points: Array, triangles: Indices, other: Array, others: Indices)
     Args:
         points: [m], shape [n, 3].
         triangles: Shape [m, 3].
-        other, others: The other surface; its points and triangles may have another order.
+        other, others: The other surface; it may have other points and triangles.
     """
-    from scipy.spatial import cKDTree
-
-    if points.shape != other.shape or triangles.shape != others.shape:
-        return []
     size = _size(points)
-    candidates = _candidates(points, triangles, other, others, _EQUAL)
-    tree = cKDTree(other)
-    return [found for found in candidates if tree.query(found(points))[0].max() <= _SAME * size]
-
-
-def near_isometries(points: Array, triangles: Indices, other: Array, others: Indices) -> list[Isometry]:
-    """Those that take a surface to one that is alike, but has other points; arguments and order as of `isometries`."""
-    size, found = _size(points), []
-    for isometry in _candidates(points, triangles, other, others, _ALIKE):
+    for isometry in _candidates(points, triangles, other, others):
         moved, most = isometry(points), _FAR * size
         apart = [
             _distances(_places(moved, triangles), other, others, most),
             _distances(_places(other, others), moved, triangles, most),
         ]
         if all(far.max() <= most and np.quantile(far, _PART) <= _MOSTLY * size for far in apart):
-            found.append(replace(isometry, distance=float(max(far.max() for far in apart))))
-    return found
+            yield replace(isometry, distance=float(max(far.max() for far in apart)))
 
 
 def _places(points: Array, triangles: Indices) -> Array:
-    """Points, and the middles of triangles and of edges."""
+    """Points, and the middles of triangles and of edges; some of many."""
     corners = points[triangles]
     middles = [corners.mean(axis=1), *(0.5 * (corners[:, i] + corners[:, j]) for i, j in ((0, 1), (1, 2), (2, 0)))]
-    return np.vstack([points, *middles])
+    places = np.vstack([points, *middles])
+    return places[:: 1 + len(places) // _PLACES]
 
 
 def _distances(places: Array, points: Array, triangles: Indices, reach: float) -> Array:
@@ -97,20 +85,20 @@ def _size(points: Array) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def _candidates(points: Array, triangles: Indices, other: Array, others: Indices, equal: float) -> list[Isometry]:
-    """What may be isometries by areas, volumes and principal moments that are equal up to a relative difference."""
+def _candidates(points: Array, triangles: Indices, other: Array, others: Indices) -> list[Isometry]:
+    """What may be isometries by areas, volumes and principal moments."""
     size = _size(points)
-    if not np.isclose(surface_area(points, triangles), surface_area(other, others), rtol=equal, atol=0.0):
+    if not np.isclose(surface_area(points, triangles), surface_area(other, others), rtol=_ALIKE, atol=0.0):
         return []
     (center, moments, axes), (end, last, ends) = _principal(points, triangles), _principal(other, others)
     # about the center, that of an open surface is the same too; the mirror image of one may be inside out
     enclosed, same = (abs(surface_volume(*each)) for each in ((points - center, triangles), (other - end, others)))
-    if not np.isclose(enclosed, same, rtol=equal, atol=_EQUAL * size**3):
+    if not np.isclose(enclosed, same, rtol=_ALIKE, atol=1e-5 * size**3):
         return []
-    if np.abs(moments - last).max() > 10.0 * equal * moments.max():
+    if np.abs(moments - last).max() > 10.0 * _ALIKE * moments.max():
         return []
     candidates = [Isometry(np.eye(3), end - center)]
-    if np.diff(moments).min() > max(_ROUND, 10.0 * equal) * moments.max():
+    if np.diff(moments).min() > _ROUND * moments.max():
         turns = [ends @ np.diag(signs) @ axes.T for signs in product((1.0, -1.0), repeat=3)]
         turns.sort(key=lambda turn: -np.linalg.det(turn))
         candidates += [

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.arrays import Array, Indices, IntArray
-from calmotion.linear_algebra.sparse_solver import SparseSolver, turned
+from calmotion.linear_algebra.sparse_solver import SparseSolver
 from calmotion.model.character import FlexibleSettings
 from calmotion.reduction.basis.natural_modes import lowest_modes, vector_mass
 from calmotion.reduction.basis.residual_flexibility import residual_vectors
@@ -49,24 +49,17 @@ class FixedInterface:
     mass: Any
     solver: SparseSolver
     constraint: Array
-    _like: Likeness | None = field(default=None, repr=False)
+    _softer: tuple[FixedInterface, float] | None = field(default=None, repr=False)  # see `scaled`
     _normal: dict[float, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
     _inertial: list[tuple[Array, Array]] = field(default_factory=list, init=False, repr=False)
-    # links that are alike are reduced in several threads
+    # links that are copies are reduced in several threads
     _lock: threading.RLock = field(default_factory=threading.RLock, init=False, repr=False)
 
     @classmethod
     def of(
-        cls, model: FEModel, root: IntArray, patches: Sequence[IntArray], centers: Sequence[Array],
-        like: tuple[FixedInterface, Array] | None = None,
-    ) -> FixedInterface:  # fmt: skip
-        """Factorise the interior and solve for the constraint modes.
-
-        Args:
-            model, root, patches, centers: As of `reduced_basis`.
-            like: A body with the same nodes, and the matrix that turns it to this one (see `SparseSolver.turned`): its
-                factors and modes are taken.
-        """
+        cls, model: FEModel, root: IntArray, patches: Sequence[IntArray], centers: Sequence[Array]
+    ) -> FixedInterface:
+        """Factorise the interior and solve for the constraint modes; arguments as of `reduced_basis`."""
         nodes = model.mesh.nodes
         n = len(nodes)
         free = np.ones(n, dtype=bool)
@@ -76,7 +69,7 @@ class FixedInterface:
         interior = np.flatnonzero(np.repeat(free, 3))
         mass = vector_mass(model.mass)
         K, M = model.stiffness[interior][:, interior], mass[interior][:, interior]
-        solver = SparseSolver(K, nodes[free]) if like is None else like[0].solver.turned(like[1])
+        solver = SparseSolver(K, nodes[free])
         constraint = np.zeros((n, 3, 6 * len(patches)))
         for k, (patch, center) in enumerate(zip(patches, centers, strict=True)):
             constraint[patch, :, 6 * k : 6 * k + 6] = rigid_patch(nodes[patch], center)
@@ -84,8 +77,7 @@ class FixedInterface:
         if len(patches):
             # static response of the interior to a motion of the patches; the interior rows of `flat` were zero
             flat[interior] = solver.solve(-(model.stiffness @ flat)[interior])
-        likeness = None if like is None else Likeness(*like)
-        return cls(model, patches, interior, K, M, mass, solver, flat, likeness)
+        return cls(model, patches, interior, K, M, mass, solver, flat)
 
     def scaled(self, model: FEModel, factor: float) -> FixedInterface:
         """The same with another stiffness, without a new factorisation.
@@ -94,8 +86,8 @@ class FixedInterface:
             model: The full model with its stiffness times the factor, and the same mass.
             factor: Positive.
         """
-        K, solver, like = factor * self.K, self.solver.scaled(factor), Likeness(self, factor=factor)
-        return FixedInterface(model, self.patches, self.interior, K, self.M, self.mass, solver, self.constraint, like)
+        K, solver, own = factor * self.K, self.solver.scaled(factor), (self, factor)
+        return FixedInterface(model, self.patches, self.interior, K, self.M, self.mass, solver, self.constraint, own)
 
     def lowest(self, count: int) -> Array:
         """Constraint modes and enough normal modes for `count` accurate modes of the body, shape [3n, 6p + k]."""
@@ -131,8 +123,10 @@ class FixedInterface:
 
     def _up_to(self, below: float) -> tuple[Array, Array]:
         """Normal modes up to a squared frequency [1/s^2] and one above, some at least; kept for other loads."""
-        if self._like is not None:
-            return self._like.modes(below)
+        if self._softer is not None:
+            other, factor = self._softer
+            values, vectors = other._up_to(below / factor)
+            return factor * values, vectors
         bound = _GRID ** np.ceil(np.log(below) / np.log(_GRID)) if below > 0.0 else 0.0
         least = min(_MOST, len(self.interior))
         with self._lock:
@@ -238,26 +232,6 @@ class FixedInterface:
         below = int(np.count_nonzero(values <= _FREQUENCY_RATIO**2 * first))
         count = max(below, _FEWEST, int(enough[0]) + 1 if len(enough) else len(values))
         return min(count, len(values))
-
-
-@dataclass(frozen=True, eq=False)
-class Likeness:
-    """That a body is another one, turned, or with another stiffness.
-
-    Attributes:
-        other: The other one.
-        turn: Orthogonal matrix that takes its displacements to those of the body, shape [3, 3]; None: they are equal.
-        factor: Of its stiffness.
-    """
-
-    other: FixedInterface
-    turn: Array | None = None
-    factor: float = 1.0
-
-    def modes(self, below: float) -> tuple[Array, Array]:
-        """As of the body, from those of the other one."""
-        values, vectors = self.other._up_to(below / self.factor)
-        return self.factor * values, vectors if self.turn is None else turned(vectors, self.turn)
 
 
 def frequency_limit(settings: FlexibleSettings, excited: float) -> float:
