@@ -217,6 +217,8 @@ def _body(reading: Reading, path: str, pose: Pose, joints: list[str], fixed: boo
         note_unread_shape(reading, shapes)
         flexible = replace(flexible, material=with_parts(reading, prim, flexible.material, shapes))
     believed = flexible is None or mass.states_mass(prim, shapes)
+    if not believed:
+        mass.note_unread_masses(reading, prim, shapes)
     properties = mass.mass_of(reading, prim, pose, shapes) if believed else None
     if properties is None and flexible is None:  # otherwise the mesh and the density of the material decide
         if not fixed:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calmotion.usd.reading import read_shot
 from pxr import Gf, UsdGeom, UsdPhysics, UsdShade
-from small_shots import BASE, FORE, LENGTH, UPPER, WIDTH, clear_mass, set_float, write_arm
+from small_shots import BASE, FORE, LENGTH, UPPER, WIDTH, clear_mass, make_flexible, set_float, write_arm
 
 VOLUME = LENGTH * WIDTH**2
 CUBE = f"{UPPER}/box"
@@ -148,6 +148,54 @@ def test_an_inertia_that_no_body_has_is_noted(tmp_path):
         UsdPhysics.MassAPI(stage.GetPrimAtPath(FORE)).GetDiagonalInertiaAttr().Set(Gf.Vec3f(1, 1, 5))
 
     assert any("physically impossible" in note for note in body(tmp_path, FORE, edit)[1])
+
+
+def weight(stage, path, mass=None, density=None):
+    api = UsdPhysics.MassAPI.Apply(stage.GetPrimAtPath(path))
+    if mass is not None:
+        api.CreateMassAttr(mass)
+    if density is not None:
+        api.CreateDensityAttr(density)
+
+
+def collider(stage, size=0.1):
+    UsdGeom.Cube.Define(stage, f"{FORE}/hull").CreateSizeAttr(size)
+    UsdPhysics.CollisionAPI.Apply(stage.GetPrimAtPath(f"{FORE}/hull"))
+
+
+def dense(stage, path):
+    material = UsdShade.Material.Define(stage, "/Arm/materials/Dense")
+    UsdPhysics.MaterialAPI.Apply(material.GetPrim()).CreateDensityAttr(500.0)
+    UsdShade.MaterialBindingAPI.Apply(stage.GetPrimAtPath(path)).Bind(material, materialPurpose="physics")
+
+
+STATED = {  # on the skin, a visible bar of 0.64 l, and a collider of 1 l
+    "on what is visible": (lambda s: weight(s, f"{FORE}/skin", 0.5), 0.5),
+    "density of what is visible": (lambda s: weight(s, f"{FORE}/skin", density=500.0), 0.32),
+    "beside a collider that states none": (lambda s: (weight(s, f"{FORE}/skin", 0.5), collider(s)), 0.5),
+    "beside a collider that does": (
+        lambda s: (weight(s, f"{FORE}/skin", 0.5), collider(s), weight(s, f"{FORE}/hull", 0.3)), 0.3
+    ),
+    "beside a density of the body": (
+        lambda s: (weight(s, f"{FORE}/skin", 0.5), collider(s), weight(s, FORE, density=200.0)), 0.2
+    ),
+    "of the material of a collider": (lambda s: (collider(s), dense(s, f"{FORE}/hull")), 0.5),
+    "of the material of what is visible": (lambda s: dense(s, f"{FORE}/skin"), 0.32),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("flexible", [False, True], ids=["rigid", "flexible"])
+@pytest.mark.parametrize("name", STATED)
+def test_a_stated_mass_counts_wherever_it_stands_also_of_a_flexible_body(tmp_path, name, flexible):
+    state, mass = STATED[name]
+
+    def edit(stage):
+        clear_mass(stage, FORE)
+        state(stage)
+        if flexible:
+            make_flexible(stage)
+
+    assert body(tmp_path, FORE, edit)[0].mass.mass == pytest.approx(mass, rel=1e-6)
 
 
 def test_masses_where_they_are_not_used_are_told(tmp_path):

@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import MassProperties
 from calmotion.usd import gf, schemas
+from calmotion.usd.reading.bodies.materials import ELASTIC
 from calmotion.usd.reading.bodies.moments import Moments, sum_of, surface_moments
 from calmotion.usd.reading.bodies.primitives import TYPES
 from calmotion.usd.reading.bodies.shapes import MESH, Shape
@@ -17,7 +18,7 @@ from calmotion.usd.schemas import is_applied
 from calmotion.usd.transforms import Pose, rotation_from_quaternion
 
 if TYPE_CHECKING:
-    from pxr import Sdf, Usd
+    from pxr import Usd
 
 _FOLLOWS = "Correct it, or remove the attribute so that it follows from the geometry"
 _DEFAULT_DENSITY = 1000.0  # kg/m^3: what UsdPhysics assumes for a collider without any density
@@ -26,10 +27,10 @@ _DEFAULT_DENSITY = 1000.0  # kg/m^3: what UsdPhysics assumes for a collider with
 def mass_of(reading: Reading, prim: Usd.Prim, pose: Pose, shapes: list[Shape]) -> MassProperties | None:
     """The mass properties of a body.
 
-    A mass on the body overrides everything below it. Otherwise each of its colliders (where it has none, each of
-    its visible solids) gives a mass: its own, or its volume times its own density, the body's, the material's, and
-    for a collider at last 1000 kg/m^3. Centre and inertia follow from the geometry, and what is authored of
-    them on the body overrides that.
+    A mass on the body overrides everything below it. Otherwise each of its colliders (where it has none, or only
+    visible solids state one, each of these) gives a mass: its own, or its volume times its own density, the body's, the
+    material's, and for a collider at last 1000 kg/m^3. Centre and inertia follow from the geometry, and what is
+    authored of them on the body overrides that.
 
     Args:
         reading: The stage.
@@ -67,14 +68,26 @@ def mass_of(reading: Reading, prim: Usd.Prim, pose: Pose, shapes: list[Shape]) -
 
 
 def states_mass(prim: Usd.Prim, shapes: list[Shape]) -> bool:
-    """Whether a mass or density is authored on a body or its solids, materials aside; refuses one that is negative."""
-    stating = (prim, *(shape.prim for shape in _solids(shapes)))
-    return any(_authored(p, f"physics:{what}", what) is not None for p in stating for what in ("mass", "density"))
+    """Whether a mass or density is authored on a body, its solids, or a material of these that is not elastic; refuses
+    one that is negative."""
+    solids = _solids(prim, shapes)
+    return any(map(_states, (prim, *(s.prim for s in solids)))) or any(
+        _material_density(s.prim, elastic=False) is not None for s in solids
+    )
 
 
-def _solids(shapes: list[Shape]) -> list[Shape]:
-    """The geometry that gives a body its mass: its colliders, else what is visible."""
-    return [s for s in shapes if s.collider] or [s for s in shapes if s.surface.visible]
+def _solids(prim: Usd.Prim, shapes: list[Shape]) -> list[Shape]:
+    """The geometry that gives a body its mass: its colliders, else what is visible. Visible geometry that states a mass
+    or density counts in place of colliders of which nothing does."""
+    colliders, visible = [s for s in shapes if s.collider], [s for s in shapes if s.surface.visible]
+    stating = [s for s in visible if _states(s.prim)]
+    if stating and not _states(prim) and not any(_states(s.prim) or _material_density(s.prim) for s in colliders):
+        return stating
+    return colliders or visible
+
+
+def _states(prim: Usd.Prim) -> bool:
+    return any(_authored(prim, f"physics:{what}", what) is not None for what in ("mass", "density"))
 
 
 def _authored(prim: Usd.Prim, name: str, what: str) -> float | None:
@@ -143,10 +156,11 @@ def _from_geometry(
 ) -> MassProperties | None:
     """Mass properties from geometry and densities, scaled to the authored mass of the body where there is one."""
     _note_unread_colliders(reading, prim)
-    _note_unread_masses(reading, prim, {shape.prim.GetPath() for shape in shapes})
+    solids = _solids(prim, shapes)
+    note_unread_masses(reading, prim, shapes)
     density = _authored(prim, "physics:density", "density")
     parts: list[MassProperties] = []
-    for shape in _solids(shapes):
+    for shape in solids:
         separate = shape.prim != prim  # a body may itself be its only geometry
         part_density = _authored(shape.prim, "physics:density", "density") if separate else None
         part_density = part_density or density or _material_density(shape.prim)
@@ -202,8 +216,9 @@ def _note_unread_colliders(reading: Reading, prim: Usd.Prim) -> None:
             )
 
 
-def _note_unread_masses(reading: Reading, prim: Usd.Prim, solids: set[Sdf.Path]) -> None:
+def note_unread_masses(reading: Reading, prim: Usd.Prim, shapes: list[Shape]) -> None:
     """Note what PhysicsMassAPI says below a body and is not used: that of a group, centre and inertia of a collider."""
+    solids = {shape.prim.GetPath() for shape in _solids(prim, shapes)}
     for below in prims_below(prim, is_rigid_body):
         if below == prim or not is_applied(below, "PhysicsMassAPI"):
             continue
@@ -231,11 +246,17 @@ def _hull_moments(reading: Reading, shape: Shape) -> Moments:
     return surface_moments(points, triangles)
 
 
-def _material_density(prim: Usd.Prim) -> float | None:
-    """The density of the physics material bound to a prim, the weakest opinion."""
+def _material_density(prim: Usd.Prim, elastic: bool = True) -> float | None:
+    """The density of the physics material bound to a prim, the weakest opinion.
+
+    Args:
+        elastic: Also that of an elastic one, which flexible bodies have from their mesh.
+    """
     from pxr import UsdShade
 
     material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
     if not material or not is_applied(material.GetPrim(), "PhysicsMaterialAPI"):
+        return None
+    if not elastic and is_applied(material.GetPrim(), ELASTIC):
         return None
     return _authored(material.GetPrim(), "physics:density", "density")

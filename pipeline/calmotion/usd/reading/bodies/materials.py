@@ -15,9 +15,9 @@ from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
 if TYPE_CHECKING:
     from pxr import Usd
 
-_SCHEMA = "PhysicsVolumeDeformableMaterialAPI"  # of the AOUSD proposal; usd-core does not define it
+ELASTIC = "PhysicsVolumeDeformableMaterialAPI"  # of the AOUSD proposal; usd-core does not define it
 _REMEDY = (
-    f"Bind a Material for the purpose `physics` (material:binding:physics) with {_SCHEMA} and its attributes "
+    f"Bind a Material for the purpose `physics` (material:binding:physics) with {ELASTIC} and its attributes "
     "physics:youngsModulus, physics:poissonsRatio and physics:density, or remove CalmFlexibleBodyAPI"
 )
 
@@ -62,7 +62,7 @@ def _bound(prim: Usd.Prim) -> Usd.Prim | None:
 
 
 def _is_elastic(material: Usd.Prim) -> bool:
-    return schemas.is_applied(material, _SCHEMA) or bool(material.GetAttribute("physics:youngsModulus"))
+    return schemas.is_applied(material, ELASTIC) or bool(material.GetAttribute("physics:youngsModulus"))
 
 
 def _material(reading: Reading, prim: Usd.Prim) -> ElasticMaterial:
