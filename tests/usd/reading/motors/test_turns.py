@@ -85,3 +85,11 @@ def test_degrees_that_were_taken_for_radians_are_told(tmp_path):
     given = MotorTracks("take.csv", TIMES, {"Hinge": wrapped(150 + 60 * TIMES)})
     _, notes = values_and_notes(shot_with(tmp_path), given)
     assert any("degrees taken for radians" in note and HINGE in note for note in notes)
+
+
+def test_a_spline_that_turns_back_between_two_keys_is_told(tmp_path):
+    ease = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, 11) / 10))
+    degrees = np.concatenate([np.linspace(0.0, 350.0, 100), 350.0 - 345.0 * ease, np.linspace(5.0, 100.0, 91)[1:]])
+    given = MotorTracks("take.csv", np.arange(200) / 240.0, {"Hinge": np.radians(degrees)})
+    values, (note,) = values_and_notes(shot_with(tmp_path), given)
+    assert values == pytest.approx(degrees, abs=1e-4) and "do its keys wrap?" in note and "within 0.0417 s" in note

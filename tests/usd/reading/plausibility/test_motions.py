@@ -80,6 +80,27 @@ def test_an_animation_that_no_unit_brings_within_its_limits_is_told(arm, values)
     assert "its limit is" in note and "in no usual unit would that be within" in note
 
 
+@pytest.mark.parametrize(("values", "limits"), [(2.0 * SWING, FREE), (-1.5 * SWING, (-1.6, 0.1)), (3.1 * SWING, FREE)])
+def test_radians_that_were_taken_for_degrees_are_told_with_their_factor(arm, values, limits):
+    (note,) = doubts(arm, np.radians(values), limits)
+    assert note.startswith(f"{SHOULDER}: all angles") and "radians taken for degrees? Samples times 57.3" in note
+    assert doubts(arm, values, limits) == ()
+
+
+@pytest.mark.parametrize(
+    ("values", "limits", "speed"),
+    [
+        (0.3 * SWING, FREE, np.inf),  # an idle robot that hardly moves
+        (4.0 * SWING, FREE, np.inf),  # more than half a turn in radians
+        (2.0 * SWING, (-0.1, 1.9), np.inf),  # beyond its limit in radians
+        (2.0 * SWING, FREE, 3.0),  # beyond its speed
+        (2.0 * np.sin(60.0 * TIMES), FREE, np.inf),  # a tremor
+    ],
+)
+def test_small_animations_are_not_told(arm, values, limits, speed):
+    assert doubts(arm, np.radians(values), limits, speed) == ()
+
+
 @pytest.mark.parametrize(
     ("factor", "found"),
     [(1e3, "16.67 s apart; milliseconds"), (1e6, "Scale the times by 1e-06"), (1e9, "motion.read.times=ns")],

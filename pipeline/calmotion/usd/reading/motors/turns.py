@@ -35,6 +35,7 @@ def unwrapped(track: Track, joint: JointPrim, reading: Reading) -> Track:
     turns = np.round(steps / TURN)
     jumps = _jumps(steps, np.diff(track.times), turns)
     if not jumps.any():
+        _note_fast_turns(track, steps, joint, reading)
         return track
     first = int(np.flatnonzero(jumps)[0])
     was, then = np.degrees(track.values[first : first + 2])
@@ -59,6 +60,22 @@ def unwrapped(track: Track, joint: JointPrim, reading: Reading) -> Track:
         )
     )  # fmt: skip
     return track
+
+
+def _note_fast_turns(track: Track, steps: Array, joint: JointPrim, reading: Reading) -> None:
+    """Note turns over several samples that are faster than any joint: keys of a spline between which it turns back."""
+    fast = np.sign(steps) * (np.abs(steps) > _FASTEST * np.diff(track.times))
+    ends = np.concatenate([[0], np.flatnonzero(np.diff(fast)) + 1, [len(fast)]])
+    for first, last in zip(ends[:-1], ends[1:], strict=True):
+        turned = float(steps[first:last].sum())
+        if fast[first] and last - first > 1 and abs(abs(turned) - TURN) < _NEAR:
+            was, then = np.degrees(track.values[[first, last]])
+            start, length = track.times[first], track.times[last] - track.times[first]
+            reading.note(
+                f"{joint.path}: its animation goes by a turn within {length:.3g} s, from {was:.4g} to {then:.4g} deg "
+                f"at {start:.4g} s: do its keys wrap? Key the joint beyond 180 degrees where it turns on"
+            )
+            return
 
 
 def _jumps(steps: Array, lengths: Array, turns: Array) -> Array:

@@ -14,6 +14,10 @@ _METRES = ((1e-2, "centimetres taken for metres"), (1e-3, "millimetres taken for
 _FASTEST = 100.0  # mean speed of a joint without a limit of its speed [rad/s or m/s]: 955 turns a minute
 _OVER_LIMIT = 10.0  # mean speed of a joint, of its limit, at which the animation cannot be meant
 _SLOWEST = 0.01  # peak speed of the fastest motor of a robot that moves [rad/s or m/s]
+_GENTLE, _LEAST_ANGLE = (
+    0.2,
+    0.5,
+)  # peak speed of angles that may be radians taken for degrees [rad/s]; least of them [deg]
 _SPARSE = 0.5  # time between samples of an animation [s]
 _MANY_TURNS = 30.0  # a limit of an angle beyond which it was rather written in degrees [rad]
 _TURN = 2.0 * np.pi + 0.01  # a limit within which it may have been written in radians [deg]
@@ -40,7 +44,8 @@ def motion_doubts(character: Character, tracks: Sequence[Track]) -> tuple[str, .
             notes.append(f"{texts[0]}{more}: in no usual unit would that be within; is it a track of another joint?")
             continue
         notes.append(f"{texts[0]}{more}; {factor:.4g} times that would be within: {name}? {_remedy(name)}")
-    return (*notes, *_almost_still(led))
+    still = _almost_still(led)
+    return (*notes, *still, *(_in_radians(character, led) if not still else ()))
 
 
 def limit_doubts(character: Character) -> tuple[str, ...]:
@@ -109,6 +114,28 @@ def _far_beyond(motor: Motor, joint: Joint, track: Track) -> list[tuple[tuple[fl
         if fits and not (fast and factor * speed > min(limit, _FASTEST)):
             return [((factor, name), text)]
     return [((1.0, ""), text)]
+
+
+def _in_radians(character: Character, led: Sequence[tuple[Motor, Track]]) -> list[str]:
+    """About angles that all are within half a turn in radians, slow, and within their limits times 57.3."""
+    hinges = [(character.joints[motor.joint], motor, track) for motor, track in led if not motor.linear]
+    moved = [(j, m, t) for j, m, t in hinges if np.ptp(t.values) > 0.0]
+    factor = 180.0 / np.pi
+    if not moved or len(hinges) < len(led):
+        return []
+    speeds = [float(np.abs(np.diff(t.values) / np.diff(t.times)).max()) for _, _, t in moved]
+    largest = max(float(np.abs(t.values).max()) for _, _, t in hinges)
+    fit = all(
+        j.lower <= factor * float(t.values.min()) + 1e-3 and factor * float(t.values.max()) <= j.upper + 1e-3
+        for j, _, t in hinges
+    ) and all(factor * speed <= m.max_velocity for speed, (_, m, _) in zip(speeds, moved, strict=True))
+    if not fit or not _LEAST_ANGLE <= factor * largest <= np.pi + 1e-3 or max(speeds) > _GENTLE:
+        return []
+    return [
+        f"{moved[int(np.argmax(speeds))][1].path}: all angles of the animation are within {factor * largest:.3g} deg, "
+        f"at {factor * max(speeds):.3g} deg/s at most; radians taken for degrees? Samples times {factor:.4g} would be "
+        "within their limits"
+    ]
 
 
 def _almost_still(led: Sequence[tuple[Motor, Track]]) -> list[str]:
