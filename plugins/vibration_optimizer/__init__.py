@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from calmotion.errors import ShotError
@@ -144,7 +143,7 @@ class OptimizeShot(Operator):
             minimum=0.0,
             maximum=1.0,
             description="A smaller predicted gain ends the search: a part of the tolerance, by root mean squares; "
-            "auto: a tenth, but less where the shot is searched in windows",
+            "auto: a tenth",
         ),
         Property(
             "knot_spacing",
@@ -182,15 +181,6 @@ class OptimizeShot(Operator):
             minimum=1,
             maximum=999,
             description="Number of these robots; with 1 + 2 n for n uncertain parameters they have their covariance",
-        ),
-        Property(
-            "window",
-            float,
-            None,
-            unit="s",
-            minimum=0.0,
-            description="Length of the windows in which a long shot is searched; auto: 10 s where it is longer than "
-            "30 s; 0: one search",
         ),
         Property(
             "avoid_reversals",
@@ -236,23 +226,19 @@ class OptimizeShot(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retargeting import (
             checkpoint_path,
-            least_gain,
             optimize_to_tolerance,
             remove_checkpoint,
-            windows_path,
         )
 
         options = self._search_options(context)
         paths = context.get(OutputPaths)
         layer = paths.layer if paths is not None else None
-        kept, stored = (checkpoint_path(layer), windows_path(layer)) if layer else (None, None)
+        kept = checkpoint_path(layer) if layer else None
         converged = context.get(ConvergedReduction)
         known, memory = (None, None) if converged is None else (converged.known, converged.memory)
         shot = compiled_in(context.get)
-        if not context.properties.least_gain:
-            options = replace(options, least_gain=least_gain(shot.character, shot.animation, options))
         try:
-            result = optimize_to_tolerance(shot, options, context.progress, kept, known, stored, memory)
+            result = optimize_to_tolerance(shot, options, context.progress, kept, known, memory)
         except ShotError:
             if kept:  # the same command would resume only to be refused again
                 remove_checkpoint(kept)
@@ -285,7 +271,6 @@ class OptimizeShot(Operator):
             smoothness=values.smoothness,
             adjoint=values.adjoint,
             avoid_reversals=values.avoid_reversals,
-            window=values.window,
             robust=None
             if values.robust == "off"
             else RobustSettings(values.robust, values.scenarios, values.draws, values.nominal_error, values.tradeoff),

@@ -120,7 +120,6 @@ def test_settings_read_the_tables_for_which_they_are_told(calmotion, tmp_path, n
 
 # What is refused, and the options that its remedy names in their place; $1 is what it prints.
 REFUSED = {
-    "a window that is too short": (("--window", "0.01"), r"Use ([.\d]+) s or more", ("--window", "$1")),
     "a scheme of no search": (("--integrator", "rk4"), "Remove the option", ()),
     "too much time": (
         ("--set", "accuracy.analyse.max_hours=1e-7"), r"--set (accuracy\S+=\d+)", ("--set", "$1"),

@@ -118,8 +118,6 @@ CASES: dict[str, Case] = {
     "a set of robots that is no set": optimized("-o out.usda --robust best", "--robust", statuses=USAGE),
     "robots without a robust search": optimized("-o out.usda --scenarios 3", "--robust", statuses=FAIL),
     "a negative weight of reversals": optimized("-o out.usda --avoid-reversals=-1", "--avoid-reversals", statuses=FAIL),
-    "no windows": optimized("-o out.usda --window 0s", statuses=DONE),
-    "a window of a frame": optimized("-o out.usda --window 1ms", "--window", make=SOFT, statuses=(0, 1, 2)),
     # outputs that contradict
     "the shot as its own output": simulated("-o shot.usda", "shot.usda"),
     "the shot as its own manifest": simulated("--manifest shot.usda", "shot.usda"),

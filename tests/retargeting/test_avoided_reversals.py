@@ -10,7 +10,6 @@ from calmotion.model import Animation, Track
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.avoided_reversals import refuse_without_play
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.retargeting.windows.plan import window_length
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.motors.backlash import with_lost_motion
 from posed import ignore_progress
@@ -61,8 +60,3 @@ def test_what_cannot_be_done_is_refused():
     refuse_without_play(character, options)
     with pytest.raises(ShotError, match="continuous adjoint"):
         refuse_without_play(character, replace(options, adjoint="continuous"))
-    track = Track(FRAMES * 100, eased(0.2, 1.3))
-    long = Animation(FRAMES * 100, (track,), (track,))
-    assert window_length(character, long, RunSettings()) and window_length(character, long, options) is None
-    with pytest.raises(ShotError, match="first pose"):
-        window_length(character, long, replace(options, window=20.0))

@@ -216,7 +216,7 @@ def assignments(args: argparse.Namespace) -> dict[str, dict[str, object]]:
 
     names = {"bake": None, "samples_per_second": None, "splines": False}
     writer = {name: value for name, empty in names.items() if (value := getattr(args, name, empty)) != empty}
-    searched = ("robust", "scenarios", "window", "avoid_reversals")
+    searched = ("robust", "scenarios", "avoid_reversals")
     search = {name: value for name in searched if (value := getattr(args, name, None)) is not None}
     own = {"usd.write": writer, "retarget.optimize": search}
     return merge([*(read_assignment(text) for text in args.set), {name: v for name, v in own.items() if v}])

@@ -199,25 +199,6 @@ class ErrorShares:
     links_m: Array
 
 
-@dataclass(frozen=True)
-class WindowRow:
-    """One window of a search in windows.
-
-    Attributes:
-        start_s, kept_s, end_s: It begins at `start_s` and was searched to `end_s`; its part to `kept_s` was kept [s].
-        searched: Whether it was searched in this run; otherwise it was kept from an earlier one.
-        iterations: Of its search.
-        wall_s: Of its search and its simulations [s].
-    """
-
-    start_s: float
-    kept_s: float
-    end_s: float
-    searched: bool
-    iterations: int
-    wall_s: float
-
-
 @dataclass(frozen=True, eq=False)
 class LostMotion:
     """What the play of gears would do to a simulated motion, see `accuracy.motors.backlash`.
@@ -272,7 +253,6 @@ class Result:
         lost_motion: What the play of gears would do to the input, and to the curves found; empty without play.
         robustness: The curves on robots that differ from the model; None where they were optimised for one robot.
         friction_band_m: How far Coulomb friction may hold each target off at rest [m], shape [K]; None without any.
-        windows: Windows in time in which the shot was searched; empty where one search covered it.
     """
 
     reference: Motion
@@ -307,7 +287,6 @@ class Result:
     error_shares: ErrorShares | None = None
     lost_motion: tuple[LostMotion, ...] = ()
     robustness: Robustness | None = None
-    windows: tuple[WindowRow, ...] = ()
     processor_s: float | None = None
     friction_band_m: Array | None = None
 

@@ -27,7 +27,6 @@ class RunSettings:
         motors: `auto`, `on` (every motor may change) or `off` (idle motors are not checked at the end).
         ideal_motors: Whether joints follow their curves exactly, whatever the models of their motors say.
         directions: `auto`, `on` (bodies keep all coordinates) or `off` (the smallest POD subspaces at any error).
-        window: Length of the windows in which a long shot is searched [s]; 0: one search; None: by its length.
         avoid_reversals: Weight of the squared ways of the targets across the play of gears, over squared errors; 0:
             play does not count.
         robust: Settings of an optimisation for a set of robots; None: for the nominal robot alone.
@@ -47,7 +46,6 @@ class RunSettings:
     ideal_motors: bool = False
     directions: str = "auto"
     robust: RobustSettings | None = None
-    window: float | None = None
     avoid_reversals: float = 0.0
 
     @property
@@ -56,9 +54,7 @@ class RunSettings:
         return self.integrator or "bdf2"
 
 
-LONG_SHOT = 30.0  # a longer one is searched in windows unless the user says otherwise [s]
-WINDOW = 10.0  # length of a window's kept part [s]
-WINDOW_OVERLAP = 0.25  # most, of the length of a window
+LONG_SHOT = 30.0  # of a longer one, an inspection simulates its busiest part of this length [s]
 INTEGRATORS = ("bdf2", "newmark", "generalized-alpha", "rk4", "radau")
 SHAPERS = ("zv", "zvd", "zv2", "zvd2", "lowpass")  # input shapers and a filter
 

@@ -20,5 +20,3 @@ from calmotion.retargeting.solver.damping_homotopy import damping_homotopy as da
 from calmotion.retargeting.solver.gauss_newton import Search as Search
 from calmotion.retargeting.solver.gauss_newton import minimize as minimize
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance as optimize_to_tolerance
-from calmotion.retargeting.windows.plan import least_gain as least_gain
-from calmotion.retargeting.windows.store import windows_path as windows_path

@@ -34,7 +34,7 @@ def with_moving_end(at: Evaluation, start: Array) -> tuple[RetargetProblem, Arra
     exceeds limits there; else as they are."""
     problem = at.problem
     limits, grid, basis = problem.limits, problem.grid, problem.space.basis
-    if limits is None or basis.wraps or basis.kept_ends or grid.continues:
+    if limits is None or basis.wraps or basis.kept_ends:
         return problem, start
     late = limits.judged & (grid.times >= basis.knots[-3 if len(basis.knots) > 2 else 0])
     over = [np.max(_excess(limits.bounds[name], v[late]), initial=0.0) for name, v in at.limited.items()]

@@ -8,7 +8,6 @@ from calmotion.retargeting.avoided_reversals import refuse_without_play
 from calmotion.retargeting.optimize import refuse_other_integrators
 from calmotion.retargeting.problem.posing import unknowns
 from calmotion.retargeting.robust.retarget import uncertainties_of
-from calmotion.retargeting.windows.plan import window_length
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.run_checks import check_simulation
 
@@ -21,7 +20,6 @@ def check_search(character: Character, animation: Animation, options: RunSetting
             robot of which nothing is uncertain, to be robust against, or none whose gears have play to avoid reversals.
     """
     refuse_other_integrators(options)
-    window_length(character, animation, options)
     refuse_without_play(character, options)
     if options.robust is not None:
         uncertainties_of(compile_shot(character, animation))

@@ -21,8 +21,6 @@ from calmotion.retargeting.optimize import optimize_shot, refuse_other_integrato
 from calmotion.retargeting.robust.retarget import retarget_robustly
 from calmotion.retargeting.search_progress import SuccessiveSearches
 from calmotion.retargeting.simplification.idle_motors import JOINING_GAIN
-from calmotion.retargeting.windows.optimize import optimize_windows
-from calmotion.retargeting.windows.plan import window_length
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.open_chains import refused_gap
 from calmotion.simulation.simulate import Progress
@@ -51,17 +49,16 @@ FIRST_STEP = 0.2  # of the shake: the error that the step of the first search ma
 
 def optimize_to_tolerance(
     shot: CompiledShot, options: RunSettings, progress: Progress, checkpoint: Path | None = None,
-    known: ReferenceRun | None = None, stored: Path | None = None, memory: RunMemory | None = None,
+    known: ReferenceRun | None = None, memory: RunMemory | None = None,
 ) -> Result:  # fmt: skip
     """As `optimize_shot`, with the time step and the POD subspaces of the bodies chosen by their errors.
 
     The first search uses a step that resolves the vibration of the input to a fifth of its size. The remaining
     vibration is much smaller, so its error is known afterwards; if it exceeds the tolerance, the search continues with
     a finer step, and if the deflections have left the POD subspaces, with new ones. At the end the input is simulated
-    by steps that resolve it, unless the shot is almost that of the last run, or is searched in windows.
+    by steps that resolve it, unless the shot is almost that of the last run.
 
     Args:
-        stored: File of the windows of a long shot that are done, see `windows`.
         memory: Of the last run, whose choices the first search takes, and which takes those of this one.
     """
     refuse_other_integrators(options)
@@ -90,14 +87,13 @@ def optimize_to_tolerance(
         reduced = projected.shot.with_tracks(tracks)
         of_step = replace(options, step=step) if chooses else options
         try:
-            latest = _searched(reduced, of_step, searches, checkpoint, stored, memory)
+            latest = _searched(reduced, of_step, searches, checkpoint, memory)
             searches.ended()
             result = with_modes(latest if result is None else _continued(result, latest), shot.bodies)
             if result.interrupted:
                 break
             tracks = found_tracks(result, animation)
-            iterations = max((row.iterations for row in latest.windows), default=latest.iterations)
-            ended = iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
+            ended = latest.iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
             unknown = not again and not number and not ended  # later searches end near the motion of the first
             result, accurate = _with_accuracy(result, reduced, projected, tracks, options, unknown)
             accuracy = result.accuracy
@@ -124,7 +120,7 @@ def optimize_to_tolerance(
         searches.ended()
         reduced, of_step = projected.shot, replace(options, step=result.step_s if chooses else options.step)
         result = with_modes(_robustly(reduced, of_step, options, result, searches), shot.bodies)
-    if not chooses or again or result.interrupted or result.windows:
+    if not chooses or again or result.interrupted:
         return result
     return with_input_resolved(result, reduced.with_tracks(animation.tracks), options)
 
@@ -197,31 +193,26 @@ def _is_accurate(
 
 
 def _searched(
-    shot: CompiledShot, options: RunSettings, progress: SuccessiveSearches, checkpoint: Path | None,
-    stored: Path | None, memory: RunMemory,
-) -> Result:  # fmt: skip
+    shot: CompiledShot, options: RunSettings, progress: SuccessiveSearches, checkpoint: Path | None, memory: RunMemory
+) -> Result:
     """One search; it continues with the idle motors if these would gain too much."""
     character = shot.character
-    first = _search(shot, options, progress, checkpoint, stored, memory)
+    first = _search(shot, options, progress, checkpoint, memory)
     enough = JOINING_GAIN * tolerance_of(character, options.tolerance)
     if first.interrupted or first.idle_gain_m is None or first.idle_gain_m <= enough or options.motors == OFF:
         return first
     progress.ended()
     motors = tuple(replace(motor, idle=False) for motor in character.motors)
     every = shot.with_tracks(found_tracks(first, shot.animation)).with_character(replace(character, motors=motors))
-    return _continued(first, _search(every, options, progress, checkpoint, stored, memory))
+    return _continued(first, _search(every, options, progress, checkpoint, memory))
 
 
 def _search(
-    shot: CompiledShot, options: RunSettings, progress: SuccessiveSearches, checkpoint: Path | None,
-    stored: Path | None, memory: RunMemory,
-) -> Result:  # fmt: skip
-    """One search over the shot, or in windows where it is long."""
-    length, begin = window_length(shot.character, shot.animation, options), time.process_time()
-    if length is None:
-        found = optimize_shot(shot, options, progress, checkpoint, memory=memory)
-    else:
-        found = optimize_windows(shot, options, length, progress, checkpoint, stored)
+    shot: CompiledShot, options: RunSettings, progress: SuccessiveSearches, checkpoint: Path | None, memory: RunMemory
+) -> Result:
+    """One search, with its processor time."""
+    begin = time.process_time()
+    found = optimize_shot(shot, options, progress, checkpoint, memory=memory)
     return replace(found, processor_s=time.process_time() - begin)
 
 

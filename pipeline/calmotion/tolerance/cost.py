@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 from calmotion.errors import ShotError
 from calmotion.model import Animation, Character
-from calmotion.model.run import LONG_SHOT, WINDOW, WINDOW_OVERLAP, RunSettings
+from calmotion.model.run import RunSettings
 from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
 
 # Measured on the five samples: 1.5 to 2.9 us for a step and a coordinate; a search costs 40 to 300 simulations.
 SECONDS = 3e-6  # for a step and a coordinate
 SEARCH = 200.0  # simulations of a search
-SEARCH_IN_WINDOWS = 20.0  # measured: 302 s of processor time for 160 s of the bartender, in longer steps than these
 MANY_MODES = 1000  # of a body: more are what costs
 ELASTIC = 10  # elastic coordinates of a flexible body whose modes are not chosen yet
 _FINE = 0.1  # of the usual step: steps that are shorter are what costs
@@ -71,20 +70,9 @@ def expected_cost(character: Character, animation: Animation, options: RunSettin
         cause = "calm:flexible:modeCount"
     # arrays have a row for each body, as wide as the largest; see `multibody.model.system.State`
     numbers = len(character.bodies) * (16 + 2 * max(modes, default=0)) + 6 * len(character.joints)
-    share = _share_in_window(animation, options, character.retarget.cyclic) if searches else 0.0
-    copies = COPIES_OF_SEARCH if share == 1.0 else COPIES + COPIES_OF_SEARCH * share
-    of_search = SEARCH if share == 1.0 else SEARCH_IN_WINDOWS * (1.0 + WINDOW_OVERLAP)  # what overlaps twice
-    hours = SECONDS * steps * coordinates * (of_search if searches else 1.0) / 3600.0
+    copies = COPIES_OF_SEARCH if searches else COPIES
+    hours = SECONDS * steps * coordinates * (SEARCH if searches else 1.0) / 3600.0
     return ExpectedCost(frames, steps, coordinates, hours, 8.0 * copies * numbers * steps, cause)
-
-
-def _share_in_window(animation: Animation, options: RunSettings, cyclic: bool) -> float:
-    """The share of a shot that a search has at once: all of it, unless it is long."""
-    length, window = float(animation.frame_times[-1]), options.window
-    one = cyclic or options.robust is not None or options.adjoint != "discrete"
-    if one or window == 0.0 or (window is None and length <= LONG_SHOT):
-        return 1.0
-    return min(1.0, (1.0 + WINDOW_OVERLAP) * (window or WINDOW) / length)
 
 
 def refuse_unaffordable(cost: ExpectedCost, path: str, most_hours: float, available: float) -> None:

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.errors import ShotError
-from calmotion.host import HostError, Run, Settings, parse_quantity
+from calmotion.host import HostError, Run, Settings
 from calmotion.model import (
     Animation,
     Body,
@@ -28,7 +27,7 @@ from calmotion.model import (
 from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.model.motor import SERVO, measure_of
 from calmotion.model.outputs import WARNING, Finding, ModeShapes, MotorEffects, PlannedStep, SystemModes
-from calmotion.model.run import WINDOW_OVERLAP, RunSettings
+from calmotion.model.run import RunSettings
 from calmotion.tolerance.reduced_bodies import ReducedBodies
 from calmotion.version import __version__
 from calmotion.workflow.problems import Problem
@@ -178,7 +177,7 @@ def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]
         "limits": [limit_row(character, use) for use in exceeded.uses] if exceeded else [],
         "tempo": _tempo_report(exceeded),
         "effects_of_gains": _effects(character, run.get(MotorEffects)),
-        "expected": _expected(character, animation, modes, settings),
+        "expected": _expected(character, animation),
         "system_frequencies_hz": modes.frequencies[:SHOWN_MODES].tolist() if modes else [],
         "system_damping_ratios": modes.damping[:SHOWN_MODES].tolist() if modes else [],
         "mode_shapes": list(shapes.paths) if (shapes := run.get(ModeShapes)) else [],
@@ -190,31 +189,15 @@ def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]
     }
 
 
-def _expected(
-    character: Character, animation: Animation, modes: SystemModes | None, settings: Settings | None
-) -> dict[str, Any]:  # fmt: skip
-    """What `optimize` is expected to take: windows, memory and time; of the order of the real ones."""
-    from calmotion.retargeting.windows.plan import overlap_time, plan_windows, window_length
+def _expected(character: Character, animation: Animation) -> dict[str, float]:
+    """What `optimize` is expected to take: memory and time, of the order of the real ones."""
     from calmotion.tolerance.cost import expected_cost
 
-    options, given = RunSettings(), (settings or {}).get("retarget.optimize", {}).get("window")
-    if given is not None:
-        window = parse_quantity(given, "s") if isinstance(given, str) else float(str(given))
-        options = RunSettings(window=window if window >= 0.0 else None)
-    cost = expected_cost(character, animation, options, True)
-    row: dict[str, Any] = {
+    cost = expected_cost(character, animation, RunSettings(), True)
+    return {
         "duration_s": float(animation.frame_times[-1]), "steps": cost.steps, "memory_gb": cost.memory / 1e9,
-        "hours": cost.hours, "windows": 1, "window_s": None, "overlap_s": None,
+        "hours": cost.hours,
     }  # fmt: skip
-    try:
-        length = window_length(character, animation, options)
-    except ShotError:  # `optimize` says what is wrong
-        length = None
-    if length is None:
-        return row
-    overlap = overlap_time(modes.frequencies, modes.damping, length) if modes else WINDOW_OVERLAP * length
-    count = len(plan_windows(animation.frame_times, length, overlap))
-    return row | {"windows": count, "window_s": length, "overlap_s": overlap}
 
 
 def _without(

@@ -110,7 +110,6 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "efforts": effort_rows(character, result),
         "reactions": reaction_rows(character, final.motion),
         "contacts": contact_rows(character, final.motion),
-        "windows": [asdict(row) for row in result.windows],
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
     }
     source = run.get(Source)

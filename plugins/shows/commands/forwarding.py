@@ -21,12 +21,11 @@ _VALUES = (
     "pre_roll",
     "robust",
     "scenarios",
-    "window",
     "avoid_reversals",
     "bake",
     "samples_per_second",
 )
-_OF_SEARCHES = ("robust", "scenarios", "window", "avoid_reversals")
+_OF_SEARCHES = ("robust", "scenarios", "avoid_reversals")
 _FLAGS = ("verify", "strict", "splines")
 _LISTS = {"keep": "--keep", "leave_out": "--leave-out", "run": "--run", "set": "--set"}
 
@@ -45,7 +44,6 @@ def forwarded_options(command: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--robust", nargs="?", const="worst", choices=("worst", "mean"), help="robust curves")
     group.add_argument("--scenarios", metavar="N", help="robots of --robust")
-    group.add_argument("--window", metavar="TIME", help="length of the windows of long shots")
     group.add_argument(
         "--avoid-reversals", metavar="WEIGHT", nargs="?", const="10", help="avoid reversals of gears with play"
     )

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.model.contact import Contact
-from calmotion.model.run import RunSettings
-from calmotion.retargeting.windows.plan import window_length
 from calmotion.simulation.inputs.contacts import held_steps
 from calmotion.simulation.inputs.time_grid import make_grid
 from steppers import ROBOT, write_stepper
@@ -49,10 +47,7 @@ def test_what_contacts_do_not_support_is_refused(tmp_path, edit, words):
         cm.simulate(shot, step=1 / 48)
 
 
-def test_other_integrators_and_windows_are_refused(tmp_path):
+def test_other_integrators_are_refused(tmp_path):
     shot = cm.open_shot(write_stepper(tmp_path / "stepper.usda"))
     with pytest.raises(ShotError, match="only bdf2 simulates contacts"):
         cm.simulate(shot, step=1 / 48, integrator="newmark")
-    with pytest.raises(ShotError, match="windows do not support contacts"):
-        window_length(shot.character, shot.animation, RunSettings(window=0.5))
-    assert window_length(shot.character, shot.animation, RunSettings()) is None

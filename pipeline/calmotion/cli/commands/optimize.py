@@ -23,13 +23,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     run_options(command)
     simulation_options(command, "optimize supports only bdf2")
     command.add_argument(
-        "--window",
-        metavar="TIME",
-        type=quantity("s"),
-        help="length of the windows in which a long shot is searched, each going on from the one before (default: 10 s "
-        "where the shot is longer than 30 s; 0: one search)",
-    )
-    command.add_argument(
         "--avoid-reversals",
         metavar="WEIGHT",
         nargs="?",

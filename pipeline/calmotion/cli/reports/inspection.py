@@ -130,11 +130,8 @@ def _expected(row: dict[str, Any]) -> str:
 
     from calmotion.tolerance.cost import readable_hours
 
-    windows = ""
-    if row["windows"] > 1:
-        windows = f", in {row['windows']} windows of {row['window_s']:.3g} s that overlap by {row['overlap_s']:.3g} s"
     time, size = readable_hours(row["hours"]), decimal(round(1e9 * row["memory_gb"]))
-    return f"optimize is expected to take about {time} of processor time, and {size} of memory for the search{windows}"
+    return f"optimize is expected to take about {time} of processor time, and {size} of memory for the search"
 
 
 def _print_gains(console: Console, report: dict[str, Any]) -> None:

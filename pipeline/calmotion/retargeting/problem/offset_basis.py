@@ -198,8 +198,6 @@ def _periodic(knots: Array) -> tuple[Array, csc_matrix, Array]:
 def _ends(merge: csc_matrix, kept_ends: bool, grid: TimeGrid, moving_end: bool) -> csc_matrix:
     """Combinations of open B-splines that satisfy the end conditions, as columns of the identity and sums of them."""
     count = merge.shape[0]
-    if grid.joined or grid.continues:
-        return _ends_of_window(merge, kept_ends, grid)
     if kept_ends:
         order = 3 if grid.cyclic else 2
         return merge[:, order:-order]
@@ -221,14 +219,3 @@ def _level_start(merge: csc_matrix) -> csc_matrix:
 def _level_end(merge: csc_matrix) -> csc_matrix:
     """The same at the end."""
     return csc_matrix(hstack([merge[:, :-3], csc_matrix(merge[:, -3:].sum(axis=1))]))
-
-
-def _ends_of_window(merge: csc_matrix, kept_ends: bool, grid: TimeGrid) -> csc_matrix:
-    """The same for a window of a longer shot: value, slope and curvature of the offset vanish where windows meet."""
-    if grid.joined or kept_ends:
-        merge = merge[:, 3 if grid.joined else 2 :]
-    elif grid.pre_steps == 0:
-        merge = _level_start(merge)
-    if grid.continues or kept_ends:
-        return merge[:, : -3 if grid.continues else -2]
-    return _level_end(merge)

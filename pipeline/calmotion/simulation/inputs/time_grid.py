@@ -28,9 +28,6 @@ class TimeGrid:
         h: Step [s].
         cyclic: Whether the shot loops: its last frame is its first. Instants 0 and 1 are then the last two of the
             loop before (`dynamics.periodic`), the second of them the first frame.
-        joined: Whether it is a window of a longer shot that goes on from an earlier one: the instants before its first
-            frame, and that frame, are known.
-        continues: Whether the shot goes on after its last frame.
     """
 
     frame_times: Array
@@ -38,8 +35,6 @@ class TimeGrid:
     pre_steps: int
     h: float
     cyclic: bool = False
-    joined: bool = False
-    continues: bool = False
 
     @property
     def times(self) -> Array:

@@ -9,12 +9,12 @@ from calmotion_plugins.shows.commands.forwarding import command_of, extras_of, f
 
 GIVEN = (
     "--tolerance", "0.5mm", "--step", "2ms", "--pre-roll", "1s", "--keep", "modes", "--leave-out", "turning",
-    "--verify", "--strict", "--robust", "mean", "--scenarios", "5", "--window", "10s", "--bake", "--splines",
+    "--verify", "--strict", "--robust", "mean", "--scenarios", "5", "--bake", "--splines",
     "--motors", "ideal", "--set", "fe.mesh.element_size=5mm", "--run", "speed_watch.report", "--settings", "s.toml",
     "--plugins", "more",
 )  # fmt: skip
 SAME = (
-    "tolerance", "step", "pre_roll", "keep", "leave_out", "verify", "strict", "robust", "scenarios", "window", "bake",
+    "tolerance", "step", "pre_roll", "keep", "leave_out", "verify", "strict", "robust", "scenarios", "bake",
     "splines", "motors", "set", "run",
 )  # fmt: skip
 
@@ -38,7 +38,7 @@ def test_simulations_refuse_options_of_searches():
     line = forwarded(args)
     assert command_of(args) == "simulate" and line == ["--integrator=radau"]
     assert parser.parse_args(["simulate", "shot.usda", *line]).integrator == "radau"
-    for given in (["--window", "5s"], ["--robust"]):
+    for given in (["--scenarios", "5"], ["--robust"]):
         with pytest.raises(SettingError, match=f"{given[0]} belongs to `calmotion optimize`"):
             forwarded(parser.parse_args([*simulated, *given]))
 
