@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calmotion.mesh.tetrahedra import oriented_tets
 from calmotion.model import ElasticMaterial
-from calmotion.reduction.basis.natural_modes import frequencies, vector_mass
+from calmotion.reduction.basis.natural_modes import clamped_modes, vector_mass
 from calmotion.reduction.elements.assembly import assemble
 
 STEEL = ElasticMaterial("/block", 2e11, 0.3, 2900.0)
@@ -69,12 +69,12 @@ def test_the_mass_matrix_is_that_of_abaqus(block):
 def test_the_clamped_block_has_the_known_frequencies(block):
     _, model, _ = block
     clamped = np.flatnonzero(model.mesh.nodes[:, 0] < 1e-6)
-    assert frequencies(model, 3, clamped) == pytest.approx([81.882, 81.946, 304.963], abs=2e-3)
+    assert clamped_modes(model, 3, clamped)[0] == pytest.approx([81.882, 81.946, 304.963], abs=2e-3)
 
 
 def test_the_free_block_has_the_known_frequencies(block):
     _, model, _ = block
-    assert frequencies(model, 9)[6:] == pytest.approx([451.333, 452.010, 607.870], abs=2e-3)
+    assert clamped_modes(model, 3)[0] == pytest.approx([451.333, 452.010, 607.870], abs=2e-3)
 
 
 def test_the_beams_of_scikit_fem_have_their_first_eigenvalue(shared_data):
@@ -93,7 +93,7 @@ def test_the_beams_of_scikit_fem_have_their_first_eigenvalue(shared_data):
     fixed = mesh.cells_dict["triangle"][mesh.cell_data_dict["gmsh:physical"]["triangle"] == mesh.field_data["fixed"][0]]
     model = assemble(mesh.points, tets, ElasticMaterial("/beams", 200e9, 0.3, 8050.0))
     held = model.mesh.surface[np.isin(model.mesh.surface[:, :3], renumber(mesh, tets, fixed)).all(axis=1)]
-    f = frequencies(model, 1, np.unique(held))
+    f = clamped_modes(model, 1, np.unique(held))[0]
     assert (2.0 * np.pi * f[0]) ** 2 == pytest.approx(50194.51, rel=2e-5)
     assert (2.0 * np.pi * f[0]) ** 2 == pytest.approx(50194.9444, rel=1e-7)
 

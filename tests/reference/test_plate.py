@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from boxes import box_tets
 from calmotion.model import ElasticMaterial
-from calmotion.reduction.basis.natural_modes import SparseSolver, frequencies, vector_mass
+from calmotion.reduction.basis.natural_modes import SparseSolver, clamped_modes, vector_mass
 from calmotion.reduction.elements.assembly import assemble
 
 SIDE, THICKNESS = 1.0, 0.02
@@ -26,7 +26,7 @@ def respond(model, held, load):
 
 def test_frequencies_of_a_cantilevered_plate():
     model = assemble(*box_tets((20, 20, 1), (SIDE, SIDE, THICKNESS)), STEEL)
-    f = frequencies(model, 5, np.flatnonzero(model.mesh.nodes[:, 0] < 1e-9))
+    f = clamped_modes(model, 5, np.flatnonzero(model.mesh.nodes[:, 0] < 1e-9))[0]
     found = 2.0 * np.pi * f * SIDE**2 * np.sqrt(STEEL.density * THICKNESS / BENDING)
     # rotary inertia and shear, which the thin plate has not, take half a percent off the higher ones at 50 to 1
     assert found[:2] == pytest.approx(CANTILEVER[:2], rel=5e-3)
@@ -62,10 +62,10 @@ def test_frequencies_converge_at_the_order_of_the_element():
     quadratic elements; near the corners of a coarse mesh it is a little less."""
     block = ElasticMaterial("/Looks/Block", 1.0, 0.3, 1.0)
     errors = []
-    finest = frequencies(assemble(*box_tets((10, 6, 5), (1.0, 0.6, 0.5)), block), 8)[6:] ** 2
+    finest = clamped_modes(assemble(*box_tets((10, 6, 5), (1.0, 0.6, 0.5)), block), 2)[0] ** 2
     for n in (1, 2, 3):
         model = assemble(*box_tets((2 * n, n, n), (1.0, 0.6, 0.5)), block)
-        errors.append(frequencies(model, 8)[6:] ** 2 - finest)
+        errors.append(clamped_modes(model, 2)[0] ** 2 - finest)
     order = np.log(np.array(errors[1]) / errors[2]) / np.log(3 / 2)
     assert (np.array(errors) > 0.0).all()
     assert (order > 2.8).all()
@@ -82,6 +82,6 @@ def test_a_nearly_incompressible_beam_does_not_lock(poissons_ratio):
     for across in (1, 2, 4):
         model = assemble(*box_tets((10 * across, across, across), (1.0, 0.1, 0.1)), rubber)
         held = np.flatnonzero(model.mesh.nodes[:, 0] < 1e-9)
-        found.append(frequencies(model, 2, held).mean())  # a pair: the beam is square
+        found.append(clamped_modes(model, 2, held)[0].mean())  # a pair: the beam is square
     coarse, fine = found[0] / found[2] - 1.0, found[1] / found[2] - 1.0
     assert 0.0 < fine < 0.02 and coarse > 3.5 * fine

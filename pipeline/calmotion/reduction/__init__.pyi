@@ -1,9 +1,9 @@
 """Public names of `calmotion.reduction`: each is imported when it is first used."""
 
+from calmotion.reduction.basis.natural_modes import clamped_modes as clamped_modes
 from calmotion.reduction.cache import cache_key as cache_key
 from calmotion.reduction.cache import recomputed as recomputed
 from calmotion.reduction.damping import modal_damping as modal_damping
-from calmotion.reduction.discretization_error import clamped_modes as clamped_modes
 from calmotion.reduction.discretization_error import frequency_errors as frequency_errors
 from calmotion.reduction.elements.assembly import FEModel as FEModel
 from calmotion.reduction.elements.assembly import assemble as assemble

@@ -9,7 +9,7 @@ import numpy as np
 from calmotion.arrays import Array, Indices, IntArray
 from calmotion.mesh.quadratic import QuadraticMesh
 from calmotion.model.character import ElasticMaterial
-from calmotion.reduction.basis.natural_modes import lowest_modes, shift_of_free, vector_mass
+from calmotion.reduction.basis.natural_modes import clamped_modes
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import GradientRule
 from calmotion.support.compilation import kernel
@@ -39,24 +39,6 @@ def frequency_errors(
     """
     frequencies, modes = clamped_modes(model, count, clamped)
     return frequencies, 0.5 * energy_errors(model.mesh, material, modes)
-
-
-def clamped_modes(model: FEModel, count: int, clamped: Indices | None = None) -> tuple[Array, Array]:
-    """Lowest elastic frequencies [Hz], shape [count], and their modes, shape [n, 3, count]; arguments as above."""
-    n = len(model.mesh.nodes)
-    M = vector_mass(model.mass)
-    free = np.ones(n, dtype=bool)
-    if clamped is not None and len(clamped):
-        free[clamped] = False
-        rigid, shift = 0, 0.0
-    else:
-        rigid, shift = 6, shift_of_free(model, M)
-    dofs = np.flatnonzero(np.repeat(free, 3))
-    K, M = model.stiffness[dofs][:, dofs], M[dofs][:, dofs]
-    values, vectors = lowest_modes(K, M, rigid + count, shift=shift, points=model.mesh.nodes[free])
-    modes = np.zeros((3 * n, vectors.shape[1]))
-    modes[dofs] = vectors
-    return np.sqrt(np.maximum(values[rigid:], 0.0)) / (2.0 * np.pi), modes.reshape(n, 3, -1)[:, :, rigid:]
 
 
 def energy_errors(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> Array:

@@ -28,8 +28,9 @@ from calmotion.mesh.tetrahedra import min_dihedral_deg
 from calmotion.model.character import Body, Frame
 from calmotion.model.meshes import FEMesh
 from calmotion.reduction.basis.fixed_interface import ritz_modes
+from calmotion.reduction.basis.natural_modes import clamped_modes
 from calmotion.reduction.cache import cached_reduction
-from calmotion.reduction.discretization_error import clamped_modes, element_errors
+from calmotion.reduction.discretization_error import element_errors
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
 from calmotion.reduction.reduce import FullBody, full_body

@@ -15,7 +15,7 @@ from calmotion.mesh.patches.automatic_patch import radius_alike
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches, spans_a_plane
 from calmotion.model.character import Body, ElasticMaterial
 from calmotion.model.meshes import FEMesh
-from calmotion.reduction.discretization_error import clamped_modes
+from calmotion.reduction.basis.natural_modes import clamped_modes
 from calmotion.reduction.elements.assembly import FEModel, assemble
 
 # Of what a body turns by at its end, from which a patch is looked at. With half the radius a patch turns eight times as

@@ -6,8 +6,9 @@ import trimesh
 from calmotion.model.character import ElasticMaterial
 from calmotion.model.materials.parts import Part
 from calmotion.model.materials.printed import Core, core_of
+from calmotion.reduction.basis.natural_modes import clamped_modes
 from calmotion.reduction.damping import ratio_of_parts
-from calmotion.reduction.discretization_error import clamped_modes, frequency_errors
+from calmotion.reduction.discretization_error import frequency_errors
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, strain_gram
 

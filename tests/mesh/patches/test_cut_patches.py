@@ -9,7 +9,7 @@ from calmotion.mesh.quadratic import quadratic_mesh
 from calmotion.mesh.tetrahedra import surface_area, tet_volumes
 from calmotion.model import Body, FlexibleSettings
 from calmotion.model.meshes import CutPatch
-from calmotion.reduction.discretization_error import clamped_modes
+from calmotion.reduction.basis.natural_modes import clamped_modes
 from calmotion.reduction.elements.assembly import assemble
 
 SIZE, RADIUS = (0.3, 0.02, 0.02), 0.016

@@ -85,23 +85,25 @@ def shift_of_free(model: FEModel, M: Any) -> float:
     return _BELOW * float(values[_RIGID])
 
 
-def frequencies(model: FEModel, count: int, clamped: Indices | None = None) -> Array:
-    """Lowest natural frequencies of the full model [Hz], shape [count].
+def clamped_modes(model: FEModel, count: int, clamped: Indices | None = None) -> tuple[Array, Array]:
+    """Lowest elastic frequencies [Hz], shape [count], and their modes, shape [n, 3, count].
 
     Args:
         model: Its matrices.
-        count: Number of frequencies; for a free body the six rigid ones (zero) come first.
-        clamped: Clamped nodes, or None for a free body.
+        count: Number of elastic frequencies; the six rigid modes of a free body are not counted.
+        clamped: Clamped nodes; None for a free body.
     """
     n = len(model.mesh.nodes)
-    free = np.ones(n, dtype=bool)
-    shift = 0.0
     M = vector_mass(model.mass)
-    if clamped is None or len(clamped) == 0:
-        shift = shift_of_free(model, M)
-    else:
+    free = np.ones(n, dtype=bool)
+    if clamped is not None and len(clamped):
         free[clamped] = False
+        rigid, shift = 0, 0.0
+    else:
+        rigid, shift = 6, shift_of_free(model, M)
     dofs = np.flatnonzero(np.repeat(free, 3))
     K, M = model.stiffness[dofs][:, dofs], M[dofs][:, dofs]
-    values, _ = lowest_modes(K, M, count, shift=shift, points=model.mesh.nodes[free])
-    return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
+    values, vectors = lowest_modes(K, M, rigid + count, shift=shift, points=model.mesh.nodes[free])
+    modes = np.zeros((3 * n, vectors.shape[1]))
+    modes[dofs] = vectors
+    return np.sqrt(np.maximum(values[rigid:], 0.0)) / (2.0 * np.pi), modes.reshape(n, 3, -1)[:, :, rigid:]
