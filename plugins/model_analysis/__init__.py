@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
@@ -238,15 +237,6 @@ class VerifyResult(Operator):
     requires = (CompiledShot, Source, Result)
     uses = (ReducedBodies, ConvergedReduction, ShapedTracks, ModelChoices)
     provides = (Verification,)
-    properties = (
-        Property(
-            "on", str, "",
-            description="Where parts of a long shot are simulated independently: local or dask://HOST:PORT, as of "
-            "`calmotion batch --on`; empty: in one piece, here",
-        ),
-        Property("workers", int, 0, minimum=1, description="Most parts at once; 0: one for each processor, or all"),
-        Property("part", float, 60.0, unit="s", minimum=1.0, description="Length of these parts at least [s]"),
-    )  # fmt: skip
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
@@ -254,7 +244,7 @@ class VerifyResult(Operator):
         return NotAsked("no --verify is requested") if source is None or not source.verify else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.tolerance import Elsewhere, verify
+        from calmotion.tolerance import verify
 
         shot, shaped, reduced = compiled_in(context.get), context.get(ShapedTracks), context.get(ReducedBodies)
         if shaped is not None:
@@ -264,22 +254,7 @@ class VerifyResult(Operator):
         reduction = reduction if converged is None else converged.reduction
         source = context.get(Source)
         options = run_settings(source, context.get(ModelChoices))
-        elsewhere = None
-        if context.properties.on:
-            elsewhere = Elsewhere(partial(self._performed, context), context.properties.part)
-        return [verify(shot, reduction, context.get(Result), options, context.progress, elsewhere)]
-
-    @staticmethod
-    def _performed(
-        context: RunContext, function: Callable[..., Any], work: Sequence[tuple[Any, ...]]
-    ) -> Iterator[tuple[int, Any]]:
-        """The parts on the backend that the properties name, with the progress of their number."""
-        from calmotion.workflow import results_on
-
-        chosen = context.properties
-        for done, found in enumerate(results_on(chosen.on, chosen.workers or None, function, work), 1):
-            context.progress(0.5 + 0.5 * done / len(work), f"{done} of {len(work)} parts are simulated")
-            yield found
+        return [verify(shot, reduction, context.get(Result), options, context.progress)]
 
 
 register, unregister = registration(

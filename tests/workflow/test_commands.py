@@ -146,23 +146,6 @@ def test_a_result_can_be_verified(simulated):
     assert verification.step_s < simulated.report()["step_s"] and verification.error_m >= 0.0
 
 
-def test_a_long_result_is_verified_in_parts_by_processes(tmp_path):
-    samples = ", ".join(f"{24 * k}: {(0, 30, 10, 20)[k % 4]}" for k in range(21))
-    text = ONE_HINGE.replace("endTimeCode = 24", "endTimeCode = 480")
-    text = text.replace("{ 0: 0, 6: 10, 12: 30, 18: 20, 24: 0 }", f"{{ {samples} }}")
-    (tmp_path / "long.usda").write_text(text)
-    chosen = {"retarget.verify": {"on": "local", "workers": 2, "part": "8s"}}
-    result = cm.simulate(tmp_path / "long.usda", step="4ms", verify=True, settings=chosen)
-    report, whole = result.report(), result.verify()
-    assert report["verified_parts"] == 2 and whole.parts == 1
-    assert report["verified_gap_m"] < 1e-6 and report["verified_step_s"] == whole.step_s
-    assert report["verified_error_m"] == pytest.approx(whole.error_m, abs=1e-6)
-    wrong = cm.simulate(
-        tmp_path / "long.usda", step="4ms", verify=True, settings={"retarget.verify": {"on": "moon", "part": "8s"}}
-    )
-    assert "cannot run there" in str(wrong.problems[0].error)
-
-
 def test_progress_has_stage_fraction_and_time_left(shot_file):
     seen = []
     cm.simulate(shot_file, step="4ms", progress=seen.append)

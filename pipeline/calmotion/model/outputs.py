@@ -107,22 +107,17 @@ class Verification:
         step_s: Step of the finer run [s].
         modes: Its elastic coordinates.
         mesh_m: Estimated error of its meshes at the targets [m], by which the distance may be too small.
-        parts: Number of parts in time in which it was simulated.
-        gap_m: Largest distance of a target between two parts where one takes over [m]; the distance may be too small
-            by it.
     """
 
     error_m: float
     step_s: float
     modes: int
     mesh_m: float = 0.0
-    parts: int = 1
-    gap_m: float = 0.0
 
     @property
     def bound_m(self) -> float:
         """What the error of the run is at most, as far as is known [m]."""
-        return self.error_m + self.mesh_m + self.gap_m
+        return self.error_m + self.mesh_m
 
 
 @dataclass(frozen=True, eq=False)

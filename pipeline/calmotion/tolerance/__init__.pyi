@@ -37,5 +37,4 @@ from calmotion.tolerance.step_error import StepRun as StepRun
 from calmotion.tolerance.step_error import distance as distance
 from calmotion.tolerance.step_error import frames_of_result as frames_of_result
 from calmotion.tolerance.step_error import simulate_at as simulate_at
-from calmotion.tolerance.verification.parts_in_time import Elsewhere as Elsewhere
-from calmotion.tolerance.verification.verify import verify as verify
+from calmotion.tolerance.verification import verify as verify

@@ -26,7 +26,6 @@ from calmotion.workflow.running.workers import executor_on as executor_on
 from calmotion.workflow.running.workers import finished as finished
 from calmotion.workflow.running.workers import refuse_unknown_place as refuse_unknown_place
 from calmotion.workflow.running.workers import result_of as result_of
-from calmotion.workflow.running.workers import results_on as results_on
 from calmotion.workflow.shot import Given as Given
 from calmotion.workflow.shot import Path as Path
 from calmotion.workflow.shot import Shot as Shot

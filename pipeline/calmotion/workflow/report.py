@@ -204,8 +204,6 @@ def _accuracy(run: Run, result: Result) -> dict[str, Any]:
         "verified_mesh_error_m": verified.mesh_m if verified else None,
         "verified_step_s": verified.step_s if verified else None,
         "verified_modes": verified.modes if verified else None,
-        "verified_parts": verified.parts if verified else None,
-        "verified_gap_m": verified.gap_m if verified else None,
     }
 
 

@@ -251,13 +251,8 @@ class SimulationResult:
             options["samples_per_second"] = samples_per_second
         return again(self._outcome, WrittenLayer, OutputPaths(layer=os.fspath(layer)), settings={"usd.write": options})
 
-    def verify(self, on: str = "", workers: int | None = None) -> Verification:
+    def verify(self) -> Verification:
         """Measure the error of the result against a finer run of the same curves: takes several times as long.
-
-        Args:
-            on: Where parts of a long shot are simulated independently: `local` or `dask://HOST:PORT`, as of `batch`;
-                empty: in one piece, here.
-            workers: Most parts at once; None: one for each processor (local), or all.
 
         Raises:
             RunError: The finer run failed.
@@ -266,10 +261,7 @@ class SimulationResult:
 
         from calmotion.model.run import Source
 
-        source, chosen = self._outcome.require(Source), {"on": on, "workers": workers or 0}
-        return again(
-            self._outcome, Verification, replace(source, verify=True), settings={"retarget.verify": chosen}
-        )  # fmt: skip
+        return again(self._outcome, Verification, replace(self._outcome.require(Source), verify=True))
 
     def _motion_of(self, simulation: Simulation) -> RobotMotion:
         motion, reference, rows = simulation.motion, self.result.reference, simulation.motion.judged

@@ -8,9 +8,7 @@ from concurrent.futures import Executor, Future
 import pytest
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
-from calmotion.support.worker_processes import Fault
-from calmotion.workflow.running.workers import executor_on, finished, result_of, results_on
-from odd_jobs import odd_job
+from calmotion.workflow.running.workers import executor_on, finished, result_of
 
 
 def test_threads_of_this_machine_share_its_processors():
@@ -29,8 +27,6 @@ def _share():
 def test_a_place_that_is_not_known_is_refused(text):
     with pytest.raises(SettingError, match="--on"), executor_on(text, None):
         pass
-    with pytest.raises(SettingError, match="--on"):
-        next(results_on(text, None, divmod, [(1, 2)]))
 
 
 @pytest.mark.parametrize("text", ["slurm", "slurm?slurm_partition=cpu"])
@@ -89,29 +85,3 @@ def test_what_is_lost_has_a_reason():
     gone.cancel()
     gone.set_running_or_notify_cancel()
     assert "OSError: the node is gone" in result_of(lost).reason and "scheduler" in result_of(gone).reason
-
-
-def test_calls_on_this_machine_are_processes_of_their_own():
-    found = dict(results_on("local", 2, os.getpid, [(), ()]))
-    assert os.getpid() not in found.values() and len(found) == 2
-    ((_, died),) = results_on("local", 1, os._exit, [(3,)])
-    assert isinstance(died, Fault) and "exit status 3" in died.reason
-    ((_, failed),) = results_on("local", 1, divmod, [(7, 0)])
-    assert isinstance(failed, Fault) and failed.reason.startswith("ZeroDivisionError")
-    ((_, refused),) = results_on("local", 1, odd_job, [("refuse", "shots")])
-    assert isinstance(refused, ShotError)
-    assert (refused.problem, refused.path, refused.found) == ("there are no shots", "SHOTS", None)
-
-
-@pytest.mark.long
-def test_calls_on_dask_come_back_refused_or_with_the_reason_why_they_are_lost():
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
-    ) as cluster:
-        address = cluster.scheduler_address.replace("tcp://", "dask://")
-        assert dict(results_on(address, 1, divmod, [(7, 2), (9, 4)])) == {0: (3, 1), 1: (2, 1)}
-        ((_, refused),) = results_on(address, None, odd_job, [("refuse", "shots")])
-        assert isinstance(refused, ShotError) and refused.path == "SHOTS"
-        ((_, died),) = results_on(address, None, os._exit, [(3,)])
-        assert isinstance(died, Fault) and "KilledWorker" in died.reason

@@ -115,11 +115,6 @@ def print_budget(console: Console, report: dict[str, Any]) -> None:
             f"{1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} elastic coordinates, "
             f"whose meshes may be off by {length(report['verified_mesh_error_m'])}",
         )
-        if report["verified_parts"] > 1:
-            gap = length(report["verified_gap_m"])
-            say(
-                console, f"that run was made of {report['verified_parts']} parts, which differ by {gap} where they meet"
-            )
 
 
 def print_robustness(console: Console, report: dict[str, Any]) -> None:

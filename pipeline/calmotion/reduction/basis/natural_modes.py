@@ -11,7 +11,7 @@ from calmotion.linear_algebra.block_lanczos import lowest_by_lanczos
 from calmotion.linear_algebra.sparse_solver import SparseSolver
 from calmotion.reduction.elements.assembly import FEModel
 
-__all__ = ["SparseSolver", "frequencies", "lowest_modes", "vector_mass"]
+__all__ = ["SparseSolver", "clamped_modes", "lowest_modes", "vector_mass"]
 
 _RIGID = 6  # modes of a free body without frequency
 _BELOW = 0.01  # shift over the square of a frequency above the first elastic one

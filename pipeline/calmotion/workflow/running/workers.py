@@ -17,7 +17,7 @@ from calmotion.errors import ShotError
 from calmotion.host import SettingError
 from calmotion.support import interrupts
 from calmotion.support.operating_system import processors, use_processors
-from calmotion.support.worker_processes import Fault, results_of
+from calmotion.support.worker_processes import Fault
 from calmotion.version import __version__
 
 LOCAL, _DASK = "local", "dask://"
@@ -101,33 +101,6 @@ def finished(
         yield None
 
 
-def results_on(
-    on: str, workers: int | None, function: Callable[..., Any], work: Sequence[tuple[Any, ...]]
-) -> Iterator[tuple[int, Any]]:
-    """The results of a function as independent jobs, in the order in which they are ready, each with its index.
-
-    Args:
-        on, workers: As of `executor_on`; on this machine, each call is in a process of its own.
-        function: Of a module that workers can import.
-        work: Arguments of each call; they and the results must be picklable.
-
-    Yields:
-        A `ShotError` instead of a result where the function raised one, a `Fault` where it raised another exception, or
-        its workers died.
-    """
-    refuse_unknown_place(on)
-    calls = [(function, arguments) for arguments in work]
-    if on == LOCAL:
-        for index, found in results_of(_called, calls, workers or len(processors())):
-            yield index, _value(found)
-        return
-    with executor_on(on, workers) as (executor, limit):
-        for ended in finished(executor, deque((_called, *call, k) for k, call in enumerate(calls)), limit):
-            if ended is not None:
-                (*_, index), future = ended
-                yield index, _value(result_of(future))
-
-
 def result_of(future: Future[Any]) -> Any:
     """The result of a future; a `Fault` where it was lost with its workers or the scheduler, or has an exception."""
     try:
@@ -136,26 +109,6 @@ def result_of(future: Future[Any]) -> Any:
         return Fault("the scheduler is gone")
     except Exception as error:
         return Fault(f"its worker ended or failed: {type(error).__name__}: {error}")
-
-
-def _called(function: Callable[..., Any], arguments: tuple[Any, ...], index: int = 0) -> Any:
-    """A call on a worker: a refusal as plain values, since exceptions lose their fields on the way."""
-    try:
-        return "done", function(*arguments)
-    except ShotError as error:
-        return "refused", error.as_dict()
-    except Exception as error:
-        return Fault(f"{type(error).__name__}: {error}")
-
-
-def _value(found: Any) -> Any:
-    if isinstance(found, Fault):
-        return found
-    outcome, value = found
-    if outcome == "done":
-        return value
-    fields = dict(value)
-    return ShotError(fields.pop("problem"), **fields | {"found": fields["found"] or None})
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from calmotion.model.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.simulation import simulate_to_tolerance
-from calmotion.tolerance.verification.verify import verify
+from calmotion.tolerance.verification import verify
 
 
 def quiet(fraction, message):
