@@ -40,9 +40,7 @@ help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,14p'
 
 demo: $(INSTALLED)
-	@mkdir -p build
-	$(RUN) -m calmotion optimize samples/bartender/bartender.usda -o build/bartender_calm.usda \
-		--rrd build/bartender.rrd --csv build/bartender.csv
+	$(RUN) -m calmotion demo -o build
 
 # Every check runs, also when an earlier one fails, so that one run shows all there is to repair.
 test: $(INSTALLED_DEV)

@@ -1,4 +1,4 @@
-"""Puts the bundled plugins and the USD schemas into the wheel as package data.
+"""Puts the bundled plugins, the USD schemas and the shot of the demo into the wheel as package data.
 
 With `CALMOTION_WHEEL_KERNELS=FOLDER` (`make wheel`) the compiled kernels of that folder as well; the wheel is then for
 one platform and version of Python.
@@ -23,7 +23,8 @@ class BundledFiles(BuildHookInterface):
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         if version == "editable":
             return
-        included = {"usd_schemas": f"{TARGET}/usd_schemas"}
+        demo = "samples/bartender/bartender.usda"  # what `calmotion demo` optimises
+        included = {"usd_schemas": f"{TARGET}/usd_schemas", demo: f"{TARGET}/samples/bartender.usda"}
         # plugins/blender is an extension of Blender, not of ours, and under another licence
         for manifest in sorted(Path(self.root, "plugins").glob("*/plugin.toml")):
             name = manifest.parent.name

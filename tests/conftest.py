@@ -134,10 +134,14 @@ def _ordered(items):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Put tests in order, and skip the long ones unless they are asked for."""
+    """Put tests in order, and skip the long ones unless they are asked for, and what this system lacks."""
     items[:] = _ordered(items)
-    if "long" in (config.getoption("-m") or ""):
-        return
+    left_out = {}
+    if "long" not in (config.getoption("-m") or ""):
+        left_out["long"] = "long; run with -m long"
+    if not hasattr(os, "symlink"):
+        left_out["posix"] = "this system has no links, owners, pipes or signals of POSIX"
     for item in items:
-        if item.get_closest_marker("long"):
-            item.add_marker(pytest.mark.skip(reason="long; run with -m long"))
+        for marker, reason in left_out.items():
+            if item.get_closest_marker(marker):
+                item.add_marker(pytest.mark.skip(reason=reason))

@@ -13,23 +13,22 @@ CUP = "/Bartender/Cup/CupTarget"
 
 
 @pytest.fixture(scope="module")
-def run(calmotion_process, repository, tmp_path_factory):
-    """Folder and report of an optimisation of the bartender with everything that can be written."""
+def run(calmotion_process, tmp_path_factory):
+    """Folder and report of `calmotion demo`, which optimises the bartender."""
     folder = tmp_path_factory.mktemp("bartender")
-    shot = repository / "samples" / "bartender" / "bartender.usda"
-    done = calmotion_process(
-        "optimize",
-        shot,
-        "-o",
-        folder / "calm.usda",
-        "--csv",
-        folder / "calm.csv",
-        "--rrd",
-        folder / "calm.rrd",
-        "--json",
-    )
+    done = calmotion_process("demo", "-o", folder, "--json")
     assert done.returncode == 0, done.stdout + done.stderr
     return folder, json.loads(done.stdout)
+
+
+def test_the_demo_writes_a_layer_a_recording_a_table_and_pictures(run):
+    folder, _ = run
+    written = {path.name for path in folder.iterdir()}
+    assert written == {
+        "bartender.usda", "bartender_calm.usda", "bartender_calm_root.usda", "bartender.rrd", "bartender.csv",
+        "figures",
+    }  # fmt: skip
+    assert (folder / "figures" / "filmstrip.png").read_bytes().startswith(b"\x89PNG")
 
 
 def target(report, path=CUP):
@@ -87,7 +86,7 @@ def test_root_layer_opens_with_the_new_curves_within_their_limits(run):
 
 def test_table_has_the_columns_of_the_contract_and_the_reported_maximum(run):
     folder, report = run
-    with open(folder / "calm.csv", newline="") as file:
+    with open(folder / "bartender.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0])[:6] == [
         "time_s",

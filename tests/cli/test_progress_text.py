@@ -1,7 +1,7 @@
 """The remaining time in the display of progress."""
 
 import pytest
-from calmotion.cli.progress import time_left
+from calmotion.cli.bars import time_left
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ import pytest
 from calmotion.cli.signals import as_interrupts, ignore
 from calmotion.support import interrupts
 
-NUMBERS = [signal.SIGTERM, signal.SIGHUP]
+pytestmark = pytest.mark.posix
+NUMBERS = [signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)]
 
 
 @pytest.fixture(autouse=True)

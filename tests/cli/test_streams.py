@@ -16,7 +16,7 @@ def ran(line, folder, repository):
     return subprocess.run(["sh", "-c", line], cwd=folder, capture_output=True, text=True, timeout=600, env=environment)
 
 
-@pytest.mark.skipif(os.name == "nt", reason="needs a shell")
+@pytest.mark.posix
 @pytest.mark.parametrize(
     ("line", "status"),
     [
@@ -33,7 +33,7 @@ def test_streams_that_take_nothing_end_in_no_traceback(tmp_path, repository, lin
         assert "No space left" in done.stderr
 
 
-@pytest.mark.skipif(os.name == "nt", reason="needs a shell")
+@pytest.mark.posix
 def test_a_layer_does_not_get_the_number_of_a_closed_stream(tmp_path, repository):
     (tmp_path / "shot.usda").write_text(ONE_HINGE)
     line = f"{' '.join(LINE)} simulate shot.usda -o out.usda --step 10ms --tolerance 1mm --json >&- 2>&-"

@@ -19,7 +19,7 @@ def test_a_disabled_plugin_is_remembered_and_enabled_again(environment):
     assert disabled_plugins(environment) == {"figures", "rerun_logger"}
     choose("figures", True, environment)
     assert disabled_plugins(environment) == {"rerun_logger"} and file.name == FILE_NAME
-    assert [path.name for path in file.parent.iterdir()] == [FILE_NAME]
+    assert {path.name for path in file.parent.iterdir()} == {FILE_NAME, ".lock"}
 
 
 def test_choices_that_are_made_at_once_are_all_kept(environment):

@@ -62,7 +62,7 @@ def _of_a_child(pipe):
     pipe.send(in_parallel(lambda n: n * n, range(4)))
 
 
-@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork on this system")
+@pytest.mark.posix
 def test_a_forked_process_has_threads_of_its_own():
     assert in_parallel(lambda n: n, range(4)) == [0, 1, 2, 3]
     context = multiprocessing.get_context("fork")

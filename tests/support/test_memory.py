@@ -4,9 +4,11 @@ import math
 import subprocess
 import sys
 
+import pytest
 from calmotion.support import memory
 
 
+@pytest.mark.posix
 def test_memory_of_the_machine_is_read():
     assert 1e6 < memory.available_memory() < 1e15 or memory.available_memory() == math.inf
     assert memory.peak_memory() > 0.01
@@ -21,6 +23,7 @@ def test_a_container_limits_it(tmp_path, monkeypatch):
     assert memory.available_memory() > 2e6
 
 
+@pytest.mark.posix
 def test_a_limit_of_the_address_space_counts():
     code = (
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (2**30, 2**30));"
@@ -30,6 +33,7 @@ def test_a_limit_of_the_address_space_counts():
     assert 0 < float(done.stdout) < 2**30
 
 
+@pytest.mark.posix
 def test_what_does_not_fit_into_the_limit_of_the_address_space_is_refused():
     code = """
 import resource; resource.setrlimit(resource.RLIMIT_AS, (2**30, 2**30))

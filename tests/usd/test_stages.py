@@ -35,7 +35,7 @@ for path in sys.argv[1:]:
 """
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+@pytest.mark.posix
 def test_a_named_pipe_is_refused_wherever_it_is_named(tmp_path):
     pipe = tmp_path / "pipe.usda"
     os.mkfifo(pipe)

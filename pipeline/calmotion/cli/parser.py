@@ -21,7 +21,7 @@ TASKS = (
     ("Remove the shake", ("simulate", "optimize", "watch", "live", "excite", "calibrate", "refine")),
     ("Work on a show", ("batch", "sequence", "submit")),
     ("Play it on the robot", ("export",)),
-    ("Measure, extend, set up", ("bench", "plugins", "warmup", "doctor", "cache")),
+    ("Measure, extend, set up", ("demo", "bench", "plugins", "warmup", "doctor", "cache")),
 )
 START = (
     ("calmotion inspect shot.usda", "what is in the shot?"),
@@ -56,7 +56,6 @@ def overview(commands: Mapping[str, str]) -> str:
     lines += ["", "Start with:", *example_lines(START), ""]
     lines += [
         "calmotion COMMAND --help lists the options of a command, with examples.",
-        "calmotion --version prints the version.",
         "Exit status: 0 done, 1 the shot cannot be processed, 2 wrong usage,",
         "130 interrupted.",
     ]

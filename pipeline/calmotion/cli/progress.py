@@ -67,6 +67,8 @@ class ProgressDisplay:
         if self._bars is None:
             self._log(stage, message)
             return
+        from calmotion.cli.bars import time_left
+
         self._bars.message = message
         left = time_left(state.time_left_s)
         if stage not in self._tasks:
@@ -133,12 +135,3 @@ class FarmProgress:
     @staticmethod
     def _say(word: str, text: str) -> None:
         print(f"openjd_{word}: {' '.join(text.split())}", file=sys.stdout, flush=True)
-
-
-def time_left(seconds: float | None) -> str:
-    """A remaining time [s] as text; empty where it is not known or below two seconds."""
-    if seconds is None or seconds < 2.0:
-        return ""
-    if seconds < 100.0:
-        return f"about {seconds:.0f} s left"
-    return f"about {seconds / 60.0:.0f} min left" if seconds < 6000.0 else f"about {seconds / 3600.0:.1f} h left"

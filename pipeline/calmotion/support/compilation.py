@@ -15,6 +15,7 @@ import os
 import re
 import stat
 import sys
+import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -24,6 +25,7 @@ import llvmlite
 import numba
 import numpy as np
 from numba import config, njit
+from numba.core import event
 
 from calmotion.errors import ShotError
 from calmotion.support.caching.cache_folder import KERNELS, cache_folder
@@ -42,6 +44,49 @@ _COMPILERS = {"by_reference.py", "compilation.py", "numba_internals.py"}
 _KERNEL = re.compile(rb"kernel\ndef ")
 _KNOWN = ((0, 63), (0, 68))  # first and last version of numba whose private interfaces are those that are used
 PLAIN = "CALMOTION_PLAIN_NUMBA"  # in the environment, `1`: none of them
+
+
+class Compilation(event.Listener):  # type: ignore[misc]
+    """What was compiled in this process; told by events that numba documents.
+
+    Attributes:
+        compiled: Number of kernels.
+        kernel: The one that is being compiled; empty where none is.
+        seconds: Processor time of those that are compiled, kernels within kernels counted once [s].
+    """
+
+    TYPICAL = 220  # kernels of a shot with flexible links: the bartender with empty caches
+
+    def __init__(self) -> None:
+        self.compiled, self.kernel, self.seconds = 0, "", 0.0
+        self._depth, self._begin = 0, 0.0
+        event.register("numba:compile", self)
+
+    def on_start(self, happened: Any) -> None:
+        """A kernel is compiled, maybe for one that calls it."""
+        if not self._depth:
+            self._begin = time.process_time()
+        self._depth += 1
+        self.kernel = happened.data["dispatcher"].py_func.__name__
+
+    def on_end(self, happened: Any) -> None:
+        """A kernel was compiled."""
+        self.compiled += 1
+        self._depth -= 1
+        if not self._depth:
+            self.seconds += time.process_time() - self._begin
+            self.kernel = ""
+
+    @property
+    def time_left_s(self) -> float | None:
+        """Time that the rest of a shot's kernels takes [s]; None while that is not known."""
+        if self.compiled < self.TYPICAL // 10:
+            return None
+        spent = self.seconds + (time.process_time() - self._begin if self._depth else 0.0)
+        return max(0.0, spent / self.compiled * (self.TYPICAL - self.compiled))
+
+
+compiling = Compilation()
 
 
 def is_plain() -> bool:

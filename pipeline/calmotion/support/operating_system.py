@@ -20,6 +20,7 @@ TEMPORARY = "/tmp"  # nosec B108  # of systems that name no folder; names in it 
 SYSTEM_FOLDERS = ("/dev", "/proc", "/sys")  # devices and processes
 SHARED_MEMORY = "/dev/shm/"  # nosec B108  # memory that is used like a disk
 PIPES = "/dev/fd"  # where open files have names
+LOCK = ".lock"  # in a folder that is locked
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 _LOOK_S = 0.5  # between two looks at another process
 
@@ -36,21 +37,19 @@ def module(name: str) -> Any:
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Wait until no other process is in such a block with the same folder, which is there.
+    """Wait until no other thread or process is in such a block with the same folder, which is there.
 
-    The lock is of the folder itself, so that no file of it is left, and ends with the process. Systems and file systems
-    that cannot lock a folder run the block at once.
+    File systems that cannot lock, and folders that cannot be written, run the block at once.
     """
-    descriptor, fcntl = None, module("fcntl")
+    from filelock import FileLock
+
+    lock = FileLock(folder / LOCK)
+    with contextlib.suppress(OSError, NotImplementedError):
+        lock.acquire()
     try:
-        if fcntl is not None:
-            with contextlib.suppress(OSError):
-                descriptor = os.open(folder, os.O_RDONLY)
-                fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
     finally:
-        if descriptor is not None:
-            os.close(descriptor)
+        lock.release()
 
 
 def processors() -> list[int]:

@@ -12,13 +12,12 @@ import time
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 from calmotion import ShotError
 from calmotion.host import OperatorResult
 from calmotion.model import OutputPaths, RunSettings
+from calmotion.support import compiling
 from calmotion.tolerance import simulate_at
 from calmotion.workflow import optimize
 
@@ -27,8 +26,6 @@ from ..common.shots import SAMPLES, load
 from ..common.tables import markdown
 from ..common.timing import processor_time
 
-import_module("calmotion.support")  # sets options of numba that it reads once
-event: Any = import_module("numba.core.event")
 STAGES = ("read", "analyse", "mesh", "reduce", "search", "write", "compile")
 _TIMES = 3
 # what is named nowhere here is `other`
@@ -69,9 +66,9 @@ def measure(path: str) -> Stages:
     Raises:
         ShotError: It cannot be processed.
     """
-    compiling = _Compiling()
+    already = compiling.seconds
     used: defaultdict[str, float] = defaultdict(float)
-    state = {"cpu": processor_time(), "compile": 0.0}
+    state = {"cpu": processor_time(), "compile": already}
 
     def done(result: OperatorResult) -> None:
         now, compiled = processor_time(), compiling.seconds
@@ -79,13 +76,9 @@ def measure(path: str) -> Stages:
         state.update({"cpu": now, "compile": compiled})
 
     begin = time.perf_counter()
-    event.register("numba:compile", compiling)
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            found = optimize(path, outputs=OutputPaths(layer=str(Path(folder) / "layer.usda")), on_operator=done).result
-    finally:
-        event.unregister("numba:compile", compiling)
-    used["compile"] = compiling.seconds
+    with tempfile.TemporaryDirectory() as folder:
+        found = optimize(path, outputs=OutputPaths(layer=str(Path(folder) / "layer.usda")), on_operator=done).result
+    used["compile"] = compiling.seconds - already
     sweeps = found.forward_simulations + found.linearized_sweeps
     wall = time.perf_counter() - begin
     return Stages(Path(path).stem, dict(used), wall, sweeps, _single_simulation(path, found.step_s))
@@ -99,25 +92,6 @@ def _single_simulation(path: str, step: float) -> float:
         simulate_at(shot, RunSettings(), step)
         times.append(time.process_time() - begin)
     return min(times[1:])
-
-
-class _Compiling(event.Listener):  # type: ignore[misc]
-    """Processor time in which numba compiles, kernels within kernels counted once [s]."""
-
-    def __init__(self) -> None:
-        self.seconds, self._depth, self._begin = 0.0, 0, 0.0
-
-    def on_start(self, happened: Any) -> None:
-        """Called by numba when it begins to compile a function."""
-        if not self._depth:
-            self._begin = processor_time()
-        self._depth += 1
-
-    def on_end(self, happened: Any) -> None:
-        """Called by numba when it has compiled it."""
-        self._depth -= 1
-        if not self._depth:
-            self.seconds += processor_time() - self._begin
 
 
 def table(runs: Sequence[Stages]) -> str:

@@ -32,7 +32,7 @@ def test_a_folder_that_cannot_be_written_is_reported_and_nothing_is_left(tmp_pat
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-@pytest.mark.skipif(os.name == "nt", reason="no limit of the size of files")
+@pytest.mark.posix
 @pytest.mark.parametrize("size", [0, 96, 20_000])
 def test_a_full_disk_is_reported_and_leaves_the_old_recording(tmp_path, size):
     """At once or later, where rerun by itself waits for ever in some of the runs."""

@@ -139,7 +139,7 @@ def test_imports_that_begin_at_once_make_one_environment(tmp_path, monkeypatch):
     assert made == [folder] and len(set(found)) == 1
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners there")
+@pytest.mark.posix
 def test_an_environment_that_another_user_can_write_is_made_anew(tmp_path, monkeypatch):
     """It would run what that user puts there."""
     made = []

@@ -95,7 +95,7 @@ def test_a_file_that_is_missing_is_refused(tmp_path):
         read_description(str(tmp_path / "none.urdf"), {})
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+@pytest.mark.posix
 @pytest.mark.parametrize(
     "where", ["beside", "in a folder of meshes", "in a file that is included", "as the included file"]
 )

@@ -86,6 +86,7 @@ def test_a_cache_keeps_its_limit(folder, monkeypatch):
     assert stored_arrays(REDUCTIONS, "4") is not None and stored_arrays(REDUCTIONS, "0") is None
 
 
+@pytest.mark.posix
 def test_a_symbolic_link_is_removed_and_what_it_names_is_not(folder, tmp_path_factory):
     precious = tmp_path_factory.mktemp("precious")
     (precious / "file").write_text("precious")
@@ -96,7 +97,7 @@ def test_a_symbolic_link_is_removed_and_what_it_names_is_not(folder, tmp_path_fa
     assert (precious / "file").read_text() == "precious"
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners there")
+@pytest.mark.posix
 @pytest.mark.parametrize("foreign", ["writable by a group", "writable by all", "of another user"])
 def test_what_another_user_can_write_is_not_read_and_made_again_without_a_word(folder, caplog, monkeypatch, foreign):
     store_arrays(MESHES, "key", {"a": np.zeros(1)})
@@ -112,7 +113,7 @@ def test_what_another_user_can_write_is_not_read_and_made_again_without_a_word(f
     assert stored_arrays(MESHES, "key")["a"] == 1.0
 
 
-@pytest.mark.skipif(os.name != "posix", reason="there is no umask")
+@pytest.mark.posix
 def test_files_are_read_whatever_the_umask_is(folder):
     for mask in (0o002, 0o000, 0o077):
         former = os.umask(mask)
@@ -123,7 +124,8 @@ def test_files_are_read_whatever_the_umask_is(folder):
         assert stored_arrays(MESHES, f"{mask}") is not None
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners there")
+@pytest.mark.posix
+@pytest.mark.posix
 def test_a_kernel_that_another_user_can_write_is_never_unpickled(tmp_path):
     from calmotion.support.kernel_cache import KernelCacheFile
 

@@ -82,7 +82,7 @@ def test_another_name_is_damage_and_another_version_is_none():
             unsealed(b"content" + bytes(72) + former)
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+@pytest.mark.posix
 def test_a_named_pipe_stops_nobody(tmp_path):
     os.mkfifo(tmp_path / "x.npz")
     code = "import sys; from calmotion.support.caching.verified_files import read_verified; read_verified(sys.argv[1])"

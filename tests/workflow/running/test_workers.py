@@ -11,6 +11,7 @@ from calmotion.host import SettingError
 from calmotion.workflow.running.workers import executor_on, finished, result_of
 
 
+@pytest.mark.posix
 def test_threads_of_this_machine_share_its_processors():
     with executor_on("local", 2) as (executor, limit):
         assert isinstance(executor, Executor) and limit == 2

@@ -1,0 +1,69 @@
+"""What Windows and macOS do otherwise, on this system: no POSIX, other ends of lines, names, encodings, long paths."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+from one_hinge import HINGE, ONE_HINGE
+
+MOTION = f"time_s,{HINGE}\n0,0\n0.5,0.1\n1,0.2\n"
+SETTINGS = "[figures.plot]\ndpi = 100\n"
+# What is computed, read, written, locked and run in other processes.
+CORE = (
+    "tests/support", "tests/host/test_choices.py", "tests/cli/test_main.py", "tests/cli/test_streams.py",
+    "tests/workflow/test_outputs.py", "tests/workflow/running", "tests/plugins/rerun_logger/test_recording.py",
+    "tests/mesh/tetrahedralize",
+)  # fmt: skip
+
+
+def test_the_core_works_where_nothing_of_posix_is_there(repository):
+    """Modules, functions and signals are taken away from Calmotion and links from all; processes are spawned."""
+    path = [repository / "tests" / "helpers" / "deprived", repository / "pipeline", os.environ.get("PYTHONPATH", "")]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, path))}
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *CORE]
+    done = subprocess.run(command, cwd=repository, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-4000:]
+    skipped = "this system has no links, owners, pipes or signals of POSIX"
+    assert skipped in done.stdout, "the deprived interpreter was not used"
+
+
+@pytest.fixture
+def simulated(calmotion):
+    """Simulates a hinge whose shot, motion and settings lie in a folder; the report."""
+
+    def run(folder, ends="\n"):
+        folder.mkdir(parents=True)
+        for name, text in (("shot.usda", ONE_HINGE), ("motion.csv", MOTION), ("settings.toml", SETTINGS)):
+            (folder / name).write_bytes(text.replace("\n", ends).encode())
+        inputs = [folder / "shot.usda", "--motion", folder / "motion.csv", "--settings", folder / "settings.toml"]
+        outputs = ["-o", folder / "calm.usda", "--csv", folder / "calm.csv", "--rrd", folder / "calm.rrd"]
+        done = calmotion("simulate", *inputs, *outputs, "--json", "--quiet")
+        assert done.returncode == 0, done.stdout
+        assert {"calm.usda", "calm_root.usda", "calm.csv", "calm.rrd"} <= {path.name for path in folder.iterdir()}
+        return json.loads(done.stdout)
+
+    return run
+
+
+def test_files_of_windows_are_read_as_others(simulated, tmp_path):
+    ours, theirs = simulated(tmp_path / "lf"), simulated(tmp_path / "crlf", "\r\n")
+    assert theirs["targets"] == ours["targets"] and theirs["steps"] == ours["steps"]
+
+
+@pytest.mark.parametrize("name", ["Roboter für den Prüfstand", "ロボット", "/".join(["long" * 12] * 5)])
+def test_folders_have_any_name_and_length(simulated, tmp_path, name):
+    simulated(tmp_path / name)
+
+
+def test_text_is_written_and_read_in_one_encoding_on_all_systems(repository, tmp_path):
+    """Python warns of each file that is opened in the encoding of the system."""
+    (tmp_path / "shot.usda").write_text(ONE_HINGE)
+    command = [sys.executable, "-X", "warn_default_encoding", "-m", "calmotion", "simulate", "shot.usda"]
+    command += ["-o", "calm.usda", "--csv", "calm.csv", "--rrd", "calm.rrd", "--figures", "figures", "--json"]
+    environment = os.environ | {"PYTHONPATH": str(repository / "pipeline"), "PYTHONWARNINGS": "default"}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    told = [line for line in done.stderr.splitlines() if "EncodingWarning" in line]
+    assert not [line for line in told if "calmotion" in line.rpartition("site-packages")[2]], told
