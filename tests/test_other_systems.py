@@ -12,9 +12,9 @@ MOTION = f"time_s,{HINGE}\n0,0\n0.5,0.1\n1,0.2\n"
 SETTINGS = "[figures.plot]\ndpi = 100\n"
 # What is computed, read, written, locked and run in other processes.
 CORE = (
-    "tests/support", "tests/host/test_choices.py", "tests/cli/test_main.py", "tests/cli/test_streams.py",
-    "tests/workflow/test_outputs.py", "tests/workflow/running", "tests/plugins/rerun_logger/test_recording.py",
-    "tests/mesh/tetrahedralize",
+    "tests/support/caching", "tests/support/test_files.py", "tests/support/test_memory.py",
+    "tests/support/test_worker_processes.py", "tests/host/test_choices.py", "tests/workflow/test_outputs.py",
+    "tests/workflow/running", "tests/plugins/rerun_logger/test_recording.py",
 )  # fmt: skip
 
 
