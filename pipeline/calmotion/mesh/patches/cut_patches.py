@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,8 +11,7 @@ from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.errors import ShotError
 from calmotion.mesh.bisection import bisected
 from calmotion.mesh.patches.automatic_patch import Skin
-from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches
-from calmotion.mesh.patches.joint_places import Ball
+from calmotion.mesh.patches.interface_patches import AttachmentFrame, InterfacePatch, interface_patches
 from calmotion.mesh.patches.just_reached import just_reached
 from calmotion.mesh.patches.sphere_cut import cut, inside
 from calmotion.mesh.quadratic import quadratic_mesh
@@ -25,6 +25,24 @@ _BISECTIONS = 12
 # Spheres of a patch that are tried, and relative error of its area that is enough; how often elements along which a
 # sphere passes are bisected, and error from which they are
 _TRIALS, _AREA, _ROUNDS, _FAR = 5, 5e-3, 4, 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class _Rim:
+    """A sphere along which a mesh was cut.
+
+    Attributes:
+        patch: Of which it is.
+        origin: Of the frame of the joint [m], shape [3].
+        center, radius: [m].
+        axis: Of the joint; None: the radius is given.
+    """
+
+    patch: InterfacePatch
+    origin: Array
+    center: Array
+    radius: float
+    axis: Array | None
 
 
 def with_rims(
@@ -53,27 +71,27 @@ def with_rims(
         whole = interface_patches(quadratic_mesh(points, tets), attachments, radius, body.path, meshed=meshed)
     except ShotError:
         return points, tets, ()  # the reduction reports it
-    rims: list[tuple[Array, Array, float, Array | None, Sequence[Ball]]] = []
+    rims: list[_Rim] = []
     given = radius >= 0.0
     for patch in whole:
-        if patch.center is None:
-            continue
-        center, radius = patch.center, patch.radius
         frame = attachments[patch.attachments[0]].frame
-        axis = None if given else frame.axis
-        points, tets = _finer_at(points, tets, center, radius, axis)
-        done = [(center, radius) for _, center, radius, *_ in rims]
-        points, tets, radius = _cut_to_area(points, tets, center, radius, done, axis)
-        for ball in patch.balls:
-            points, tets = cut(points, tets, *ball, _held(points, boundary_triangles(tets), [*done, (center, radius)]))
-        rims.append((frame.position, center, radius, axis, patch.balls))
-    found = []
-    for origin, center, radius, axis, balls in rims:
-        held = _within(points, tets, center, radius, axis)
-        for ball in balls:
+        for center in patch.centers:
+            axis = None if given else frame.axis
+            points, tets = _finer_at(points, tets, center, patch.radius, axis)
+            done = [(rim.center, rim.radius) for rim in rims]
+            points, tets, radius = _cut_to_area(points, tets, center, patch.radius, done, axis)
+            for ball in patch.balls:
+                held = _held(points, boundary_triangles(tets), [*done, (center, radius)])
+                points, tets = cut(points, tets, *ball, held)
+            rims.append(_Rim(patch, frame.position, center, radius, axis))
+    found: dict[int, tuple[Array, list[IntArray]]] = {}
+    for rim in rims:
+        held = _within(points, tets, rim.center, rim.radius, rim.axis)
+        for ball in rim.patch.balls:
             held = held[inside(points[held], *ball)]
-        found.append((origin, held))
-    return points, tets, tuple((origin, triangles) for origin, triangles in found if len(triangles))
+        found.setdefault(id(rim.patch), (rim.origin, []))[1].append(held)
+    made = ((origin, np.concatenate(parts)) for origin, parts in found.values())
+    return points, tets, tuple((origin, triangles) for origin, triangles in made if len(triangles))
 
 
 def _held(points: Array, surface: IntArray, done: Sequence[tuple[Array, float]]) -> BoolArray:

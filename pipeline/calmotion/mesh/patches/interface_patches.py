@@ -19,6 +19,7 @@ from calmotion.mesh.patches.automatic_patch import (
     radius_alike,
 )
 from calmotion.mesh.patches.contact_place import contact_place
+from calmotion.mesh.patches.forks import other_cheek
 from calmotion.mesh.patches.joint_places import TIE, Ball, balls_between, cut_at, nearest_apart, reached_by, within
 from calmotion.mesh.patches.named_patch import named_patch
 from calmotion.mesh.patches.seats import seat_radius
@@ -62,6 +63,7 @@ class InterfacePatch:
         radius: Largest distance of its nodes from the first, or the radius that it was made with [m].
         center: Of the sphere with this radius that it lies in [m], shape [3]; None where it is no such part.
         balls: That it lies in as well, see `balls_between`; those that contain the sphere are left out.
+        opposite: Center of a second sphere of this radius that it lies in, at the other cheek of a fork, or None.
     """
 
     nodes: IntArray
@@ -69,6 +71,12 @@ class InterfacePatch:
     radius: float
     center: Array | None = None
     balls: tuple[Ball, ...] = ()
+    opposite: Array | None = None
+
+    @property
+    def centers(self) -> tuple[Array, ...]:
+        """Of its spheres [m]."""
+        return tuple(center for center in (self.center, self.opposite) if center is not None)
 
 
 def interface_patches(
@@ -137,8 +145,7 @@ def interface_patches(
             room = float(others.min(initial=np.inf, where=others > one))
             place = _Place(centers[k], frames[k].axis, skin, measured, room, least)
             patch = _patch(mesh, candidates, free, place, attachments[group[0]].path, group, radius, body)
-            if patch.center is not None:
-                patch = replace(patch, balls=reached_by(balls, patch.center, patch.radius))
+            patch = replace(patch, balls=reached_by(balls, patch.centers, patch.radius))
         taken |= np.isin(surface, patch.nodes)
         patches.append(patch)
     if patches and radius >= 0.0 and np.all(taken | (distance.min(axis=0) <= radius)):
@@ -297,7 +304,10 @@ def _patch(
             path=body, attribute="calm:flexible:interfaceRadius", found=f"{len(nodes)} nodes within {radius:.4g} m",
             remedy="Move the joints apart, or author a smaller elementSize or another interfaceRadius",
         )  # fmt: skip
-    return InterfacePatch(nodes=nodes.astype(np.int32), attachments=tuple(group), radius=radius, center=center)
+    opposite = other_cheek(place.skin, center, radius, place.axis) if automatic else None
+    if opposite is not None:
+        nodes = np.union1d(nodes, nodes_of_area(mesh, candidates, opposite, radius, place.axis))
+    return InterfacePatch(nodes.astype(np.int32), tuple(group), radius, center, opposite=opposite)
 
 
 def _nearest_spanning(mesh: QuadraticMesh, free: IntArray, center: Array, least: float) -> IntArray:

@@ -79,11 +79,11 @@ def within(points: Array, balls: Sequence[Ball]) -> BoolArray:
     return found
 
 
-def reached_by(balls: Sequence[Ball], center: Array, radius: float) -> tuple[Ball, ...]:
-    """The balls that do not contain a sphere.
+def reached_by(balls: Sequence[Ball], centers: Sequence[Array], radius: float) -> tuple[Ball, ...]:
+    """The balls that do not contain all of some spheres; without spheres, none.
 
     Args:
         balls: Of `balls_between`.
-        center, radius: Of the sphere [m].
+        centers, radius: Of the spheres [m].
     """
-    return tuple(ball for ball in balls if np.linalg.norm(ball[0] - center) + radius > ball[1])
+    return tuple(ball for ball in balls if any(np.linalg.norm(ball[0] - c) + radius > ball[1] for c in centers))
