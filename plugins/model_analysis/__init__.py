@@ -80,7 +80,11 @@ class AnalyseShot(Operator):
         if source is not None:
             cost = expected_cost(character, animation, options, source.command == "optimize")
             refuse_unaffordable(cost, character.path, context.properties.max_hours, available_memory())
-        return [analyse(character, animation, options, forced, changes)]
+        choices = analyse(character, animation, options, forced, changes)
+        if source is not None and source.command == "inspect":  # reports of the others tell them with their errors
+            for note in choices.notes:
+                context.report("info", note)
+        return [choices]
 
 
 class RefineReduction(Operator):

@@ -45,11 +45,13 @@ class ModelChoices:
         character: The shot's character, marked with what is left out of it.
         rows: Every decision.
         forced: Kinds that the user forced, `on` or `off`.
+        notes: What was noticed of the shot, as sentences for the user.
     """
 
     character: Character
     rows: tuple[ModelChoice, ...] = ()
     forced: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @property
     def left_out(self) -> tuple[Simplification, ...]:

@@ -121,3 +121,13 @@ def test_a_still_of_one_frame_needs_no_decision():
     shot = plastic_arm()
     still = replace(shot, animation=replace(shot.animation, frame_times=np.zeros(1)))
     assert _analyse(still).rows == ()
+
+
+def test_targets_that_do_not_move_are_named():
+    shot = mixed_arm()
+    moving = _analyse(shot, changes=True).notes
+    root = shot.character.joints[shot.character.motors[0].joint]
+    at_hinge = replace(shot.character.targets[0], body=root.body1, frame=root.frame1)
+    still = replace(shot, character=replace(shot.character, targets=(at_hinge,)))
+    (note,) = _analyse(still, changes=True).notes
+    assert moving == () and note.startswith(f"target {at_hinge.path} does not move")

@@ -43,17 +43,18 @@ def analyse(
         return ModelChoices(_with_forced(character, forced), (), forced)
     tree = span_tree(character)
     rows: list[ModelChoice] = []
+    notes: tuple[str, ...] = ()
     if tree.closing or any(body.flexible for body in character.bodies):
         # what simulates the rigid robot takes a while to load, and a rigid shot without loops does not need it
         from calmotion.tolerance.simplification.by_rigid_poses import decide
 
         try:
-            character, rows = decide(character, animation, options, tree, choice, changes)
+            character, rows, notes = decide(character, animation, options, tree, choice, changes)
         except SimulationFailure:
             return ModelChoices(_with_forced(character, forced), (), forced)
     found = _turning(turning_of(character, animation, tree, changes), choice("turning"))
     character, more = _straight(character, found, "turning" in forced)
-    return ModelChoices(_with_forced(character, forced), (*rows, *more), forced)
+    return ModelChoices(_with_forced(character, forced), (*rows, *more), forced, notes)
 
 
 def _choice(forced: Mapping[str, str], kind: str) -> str:

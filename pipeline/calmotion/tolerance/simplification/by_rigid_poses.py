@@ -13,6 +13,7 @@ from calmotion.model import Animation, Body, Character, MassProperties, ModelCho
 from calmotion.model.character import contact_joints
 from calmotion.model.model_choice import AUTO, OFF, ON
 from calmotion.model.run import RunSettings
+from calmotion.multibody.analysis.kinematics import target_frames
 from calmotion.multibody.model.model import body_anchors, rigid_body
 from calmotion.multibody.model.topology import Tree, chain_members
 from calmotion.simulation.inputs.gearing import leaders
@@ -22,12 +23,14 @@ from calmotion.tolerance.simplification.influence import NOTHING, influence
 from calmotion.tolerance.simplification.redundant_constraints import closures_of
 
 STEP = 1.0 / 100.0  # between the poses of the rigid robot [s]
+_MOVES = 1e-6  # range of a joint that moves [rad or m]
+_STILL = 1e-6  # range of a target that does not, of the largest of all that moves
 
 
 def decide(
     character: Character, animation: Animation, options: RunSettings, tree: Tree, choice: Callable[[str], str],
     changes: bool,
-) -> tuple[Character, list[ModelChoice]]:  # fmt: skip
+) -> tuple[Character, list[ModelChoice], tuple[str, ...]]:  # fmt: skip
     """Decide which bodies are rigid, which joints of closed chains are needed and which motors move targets.
 
     Args:
@@ -36,7 +39,7 @@ def decide(
         changes: Whether motors' curves are to be changed.
 
     Returns:
-        The character marked with the decisions, and these.
+        The character marked with the decisions, these, and notes for the user.
 
     Raises:
         SimulationFailure: The rigid robot cannot follow its tracks.
@@ -44,11 +47,11 @@ def decide(
     """
     poses_matter = changes or bool(tree.closing)
     if not poses_matter and choice("bodies") == AUTO:
-        return character, []
+        return character, [], ()
     rough = with_rough_masses(character)
     character, rows = _bodies(character, choice("bodies"))
     if not poses_matter:
-        return character, rows
+        return character, rows, ()
     rigid = [rigid_body(body, own) for body, own in zip(rough.bodies, body_anchors(rough, tree), strict=True)]
     grid = grid_of(character, animation, replace(options, step=STEP))
     poses = rigid_poses(character, animation, grid, tree, rigid, options.tolerance)
@@ -56,7 +59,21 @@ def decide(
         character, more = _motors(character, poses, choice("motors"))
         rows += more
     character, more = _loops(character, tree, poses, choice("loops"))
-    return character, rows + more
+    return character, rows + more, _still_targets(character, poses)
+
+
+def _still_targets(character: Character, poses: RigidPoses) -> tuple[str, ...]:
+    """Notes about targets whose position counts and does not change while motors move."""
+    if not np.ptp(poses.joint_angles, axis=0).max(initial=0.0) > _MOVES:
+        return ()
+    places, _ = target_frames(poses.model, poses.c, poses.q, np.zeros(poses.c.shape[:2] + (0,)))
+    spread = np.linalg.norm(np.ptp(places, axis=0), axis=1)
+    largest = max(float(spread.max(initial=0.0)), float(np.linalg.norm(np.ptp(poses.c, axis=0), axis=1).max()))
+    return tuple(
+        f"target {target.path} does not move, so that it shows no shake: choose a point of a link that moves"
+        for target, moved in zip(character.targets, spread, strict=True)
+        if target.position_weight > 0.0 and moved <= _STILL * largest
+    )
 
 
 def with_rough_masses(character: Character) -> Character:
