@@ -47,6 +47,8 @@ def curves_of(outcome: Outcome, result: Result | None) -> MotorCurves:
         ShotError: There are no motors.
     """
     character, animation = outcome.require(Character), outcome.require(Animation)
+    if result is not None:
+        animation = result.performed_animation(animation)
     if not character.motors:
         raise ShotError(
             "the shot has no motors to export", path=character.path, remedy="Animate the drives of its joints."

@@ -30,11 +30,12 @@ class PlotFigures(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from .drawing import draw_figures
 
+        result = context.get(Result)
         written = draw_figures(
             context.get(OutputPaths).figures or "",
             context.get(Character),
-            context.get(Animation),
-            context.get(Result),
+            result.performed_animation(context.get(Animation)),
+            result,
             modes=context.get(SystemModes),
             dpi=context.properties.dpi,
             instants=context.properties.instants,

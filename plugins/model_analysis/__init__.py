@@ -250,7 +250,8 @@ class VerifyResult(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.tolerance import verify
 
-        shot, shaped, reduced = compiled_in(context.get), context.get(ShapedTracks), context.get(ReducedBodies)
+        result, shaped, reduced = context.get(Result), context.get(ShapedTracks), context.get(ReducedBodies)
+        shot = compiled_in(context.get).at(result.retimed)
         if shaped is not None:
             shot = shot.with_tracks(shaped.tracks)
         converged = context.get(ConvergedReduction)
@@ -258,7 +259,7 @@ class VerifyResult(Operator):
         reduction = reduction if converged is None else converged.reduction
         source = context.get(Source)
         options = run_settings(source, context.get(ModelChoices))
-        return [verify(shot, reduction, context.get(Result), options, context.progress)]
+        return [verify(shot, reduction, result, options, context.progress)]
 
 
 register, unregister = registration(

@@ -36,12 +36,12 @@ class LogRecording(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from .recording import write_recording
 
-        path = context.get(OutputPaths).rrd or ""
+        path, result = context.get(OutputPaths).rrd or "", context.get(Result)
         write_recording(
             path,
             context.get(Character),
-            context.get(Animation),
-            context.get(Result),
+            result.performed_animation(context.get(Animation)),
+            result,
             samples_per_plot=context.properties.samples_per_plot,
             progress=context.progress,
             operators=context.results,

@@ -43,6 +43,12 @@ class WriteResult(Operator):
             description="Also write body transforms, of a rigid robot with the new curves, or of the predicted motion "
             "with its deformed meshes.",
         ),
+        Property(
+            "retime_scene",
+            bool,
+            True,
+            description="Cameras, props and sounds follow the tempo of a retimed performance, not the character alone.",
+        ),
     )
 
     @classmethod
@@ -87,7 +93,10 @@ class WriteResult(Operator):
         from calmotion.usd import WriteOptions
 
         values = context.properties
-        return WriteOptions(samples_per_second=values.samples_per_second, splines=values.splines, bake=values.bake)
+        return WriteOptions(
+            samples_per_second=values.samples_per_second, splines=values.splines, bake=values.bake,
+            retime_scene=values.retime_scene,
+        )  # fmt: skip
 
 
 register, unregister = registration(WriteResult)

@@ -12,10 +12,12 @@ from calmotion.model import (
     Character,
     ModelChoices,
     OutputPaths,
+    Provenance,
     Result,
     RobustSettings,
     ShapedTracks,
     Source,
+    TempoSettings,
     is_exceeded,
     is_reached,
     run_settings,
@@ -36,7 +38,7 @@ def _with_budget(context: RunContext, result: Result, **more: float) -> Result:
     from calmotion.retargeting import best_so_far
     from calmotion.tolerance import with_budget, with_error_shares, with_friction_band, with_lost_motion
 
-    shot, tolerance = compiled_in(context.get), context.get(Source).settings.tolerance
+    shot, tolerance = compiled_in(context.get).at(result.retimed), context.get(Source).settings.tolerance
     try:
         if not result.interrupted:
             result = with_error_shares(shot, result, _options(context), context.progress)
@@ -131,9 +133,9 @@ class OptimizeShot(Operator):
     idname = "retarget.optimize"
     label = "Optimise the motor curves"
     requires = (CompiledShot, Source)
-    uses = (ConvergedReduction, OutputPaths, ModelChoices, Character, Animation)
+    uses = (ConvergedReduction, OutputPaths, ModelChoices, Character, Animation, Provenance)
     provides = (Result,)
-    checks = (Character, Animation, Source, ModelChoices)
+    checks = (Character, Animation, Source, ModelChoices, Provenance)
     properties = (
         Property("max_iterations", int, 30, minimum=1, description="Largest number of Gauss-Newton iterations"),
         Property(
@@ -190,6 +192,29 @@ class OptimizeShot(Operator):
             description="Weight of what the play of gears would move the targets, over that of their errors; 0: play "
             "does not count",
         ),
+        Property("retime", bool, False, description="Slow the animation down where limits of motors ask for it"),
+        Property(
+            "slowest",
+            float,
+            None,
+            minimum=1.0,
+            description="Largest stretch of any part of the animation; auto: that of the shot",
+        ),
+        Property(
+            "fastest",
+            float,
+            None,
+            minimum=0.01,
+            maximum=1.0,
+            description="Smallest stretch: below 1 parts may catch up; auto: that of the shot",
+        ),
+        Property(
+            "pinned",
+            str,
+            "",
+            description="Times whose distances stay as they are animated, with commas between them: time codes, or "
+            "seconds after the first frame with an s; empty: those of the shot",
+        ),
         Property(
             "draws", int, 200, minimum=20, maximum=100_000, description="Random robots on which the curves are measured"
         ),
@@ -226,7 +251,7 @@ class OptimizeShot(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retargeting import (
             checkpoint_path,
-            optimize_to_tolerance,
+            optimize_with_tempo,
             remove_checkpoint,
         )
 
@@ -238,7 +263,7 @@ class OptimizeShot(Operator):
         known, memory = (None, None) if converged is None else (converged.known, converged.memory)
         shot = compiled_in(context.get)
         try:
-            result = optimize_to_tolerance(shot, options, context.progress, kept, known, memory)
+            result = optimize_with_tempo(shot, options, context.progress, kept, known, memory)
         except ShotError:
             if kept:  # the same command would resume only to be refused again
                 remove_checkpoint(kept)
@@ -259,8 +284,7 @@ class OptimizeShot(Operator):
             )
         return [_with_budget(context, result, least_gain=options.least_gain)]
 
-    @staticmethod
-    def _search_options(context: RunContext) -> Any:
+    def _search_options(self, context: RunContext) -> Any:
         values = context.properties
         given = {"least_gain": values.least_gain} if values.least_gain else {}
         return _options(
@@ -271,10 +295,23 @@ class OptimizeShot(Operator):
             smoothness=values.smoothness,
             adjoint=values.adjoint,
             avoid_reversals=values.avoid_reversals,
+            retime=self._tempo(context) if values.retime else None,
             robust=None
             if values.robust == "off"
             else RobustSettings(values.robust, values.scenarios, values.draws, values.nominal_error, values.tradeoff),
         )
+
+    @staticmethod
+    def _tempo(context: RunContext) -> Any:
+        """How the tempo may change: what the user says, else the shot."""
+        from calmotion.retargeting import pinned_times
+
+        values, character, provenance = context.properties, context.get(Character), context.get(Provenance)
+        shot = TempoSettings() if character is None else character.retarget.tempo
+        pinned = shot.pinned
+        if values.pinned and provenance is not None:
+            pinned = pinned_times(values.pinned, provenance.start_time_code, provenance.time_codes_per_second)
+        return TempoSettings(values.slowest or shot.slowest, values.fastest or shot.fastest, pinned)
 
 
 register, unregister = registration(ShapeTracks, SimulateShot, OptimizeShot)

@@ -40,13 +40,13 @@ class WriteVideo(Operator):
         """Write the video; its path."""
         from .film import Settings, write_video
 
-        values = context.properties
+        values, result = context.properties, context.get(Result)
         path = context.get(OutputPaths).video or ""
         write_video(
             path,
             context.get(Character),
-            context.get(Animation),
-            context.get(Result),
+            result.performed_animation(context.get(Animation)),
+            result,
             Settings(values.width, values.rate, values.slow, values.quality),
             context.progress,
         )

@@ -145,7 +145,7 @@ def test_worse_curves_are_blamed_on_limits_only_where_one_is_reached(host, monke
         stopped="iteration limit",
         limits=(LimitUse(0, "position", 1.0, 0.5, 1.0 + excess, 0.1, excess, cost),),
     )
-    monkeypatch.setattr("calmotion.retargeting.to_tolerance.optimize_to_tolerance", lambda *rest: made)
+    monkeypatch.setattr("calmotion.retargeting.retiming.retime.optimize_with_tempo", lambda *rest: made)
     told = []
     monkeypatch.setattr("calmotion.host.operators.RunContext.report", lambda context, level, text: told.append(text))
     run_operator(host, "retarget.optimize", [compile_shot(*small_shot()), source("optimize")])

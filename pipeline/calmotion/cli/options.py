@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from calmotion.cli.parser import SHARED
+from calmotion.cli.retiming import retime_settings
 
 if TYPE_CHECKING:
     from calmotion.cli.progress import ProgressDisplay
@@ -215,9 +216,14 @@ def assignments(args: argparse.Namespace) -> dict[str, dict[str, object]]:
     from calmotion.host import merge, read_assignment
 
     names = {"bake": None, "samples_per_second": None, "splines": False}
-    writer = {name: value for name, empty in names.items() if (value := getattr(args, name, empty)) != empty}
+    writer: dict[str, object] = {
+        name: value for name, empty in names.items() if (value := getattr(args, name, empty)) != empty
+    }
     searched = ("robust", "scenarios", "avoid_reversals")
     search = {name: value for name in searched if (value := getattr(args, name, None)) is not None}
+    search |= retime_settings(args)
+    if getattr(args, "retime_scene", None) is not None:
+        writer["retime_scene"] = args.retime_scene == "yes"
     own = {"usd.write": writer, "retarget.optimize": search}
     return merge([*(read_assignment(text) for text in args.set), {name: v for name, v in own.items() if v}])
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray
+from calmotion.model.retiming.tempo import TimeMap
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +113,7 @@ class Animation:
         moving: Moving roots, none for a character with a fixed root.
         weights: Weights of targets that change in time; the others are those of `Target`.
         free: When motors may be changed, where that changes in time.
+        tempo: At which it is performed, so that times are the performance's; None: that of the shot as it was made.
     """
 
     frame_times: Array
@@ -120,3 +122,4 @@ class Animation:
     moving: tuple[MovingFrame, ...] = ()
     weights: tuple[WeightTrack, ...] = ()
     free: tuple[FreeTrack, ...] = ()
+    tempo: TimeMap | None = None

@@ -16,6 +16,7 @@ from calmotion.model.contact import Contact
 from calmotion.model.materials.parts import Part
 from calmotion.model.materials.printed import Core
 from calmotion.model.motor import PRESCRIBED, Motor
+from calmotion.model.retiming.tempo import TempoSettings
 from calmotion.model.robust.settings import Uncertainty
 
 WORLD = -1
@@ -277,6 +278,7 @@ class RetargetSettings:
         endpoints: `free` or `kept`.
         cyclic: Whether the shot is cyclic.
         uncertainty: What is not known exactly of the robot.
+        tempo: How the tempo may change where that is asked for.
     """
 
     tolerance: float | None = None
@@ -287,6 +289,7 @@ class RetargetSettings:
     endpoints: str = "free"
     cyclic: bool = False
     uncertainty: Uncertainty = Uncertainty()
+    tempo: TempoSettings = TempoSettings()
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
+from scipy.spatial.transform import Rotation, RotationSpline
 
 from calmotion.arrays import Array
-from calmotion.model.animation import Animation, Track
+from calmotion.model.animation import Animation, MovingFrame, Track
 from calmotion.model.character import Character
 from calmotion.model.result import MotorCurve, Result
 
@@ -117,6 +118,19 @@ def cycle_gap(track: Track, end: float, turning: bool) -> float:
     first, last = held_curve(track, end)(np.array([0.0, end]), 0)
     apart = last - first
     return float(abs(apart - TURN * np.round(apart / TURN)) if turning else abs(apart))
+
+
+def rotation_spline(frame: MovingFrame) -> RotationSpline:
+    """The rotations of a root that moves, between its samples."""
+    times, rotations = frame.times, Rotation.from_quat(np.roll(frame.rotations, -1, axis=1))
+    if len(times) == 1:
+        times, rotations = np.array([times[0], times[0] + 1.0]), Rotation.concatenate([rotations, rotations])
+    return RotationSpline(times, rotations)
+
+
+def root_at(frame: MovingFrame, time: float | Array) -> Rotation:
+    """How a root is turned at a time [s], or at several."""
+    return rotation_spline(frame)(np.clip(time, frame.times[0], frame.times[-1]))
 
 
 def optimized_curve(animation: Animation, curve: MotorCurve, cyclic: bool) -> Sample:

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calmotion.arrays import Array
+from calmotion.model.animation import Animation
 from calmotion.model.budget import BudgetEntry
 from calmotion.model.limits.use import LimitUse
+from calmotion.model.retiming.retimed import Retimed
 from calmotion.model.robust.robots import Robustness
 
 
@@ -253,6 +255,7 @@ class Result:
         lost_motion: What the play of gears would do to the input, and to the curves found; empty without play.
         robustness: The curves on robots that differ from the model; None where they were optimised for one robot.
         friction_band_m: How far Coulomb friction may hold each target off at rest [m], shape [K]; None without any.
+        retimed: The animation at the tempo that was found, to whose times all motions belong; None: at its own.
     """
 
     reference: Motion
@@ -289,6 +292,11 @@ class Result:
     robustness: Robustness | None = None
     processor_s: float | None = None
     friction_band_m: Array | None = None
+    retimed: Retimed | None = None
+
+    def performed_animation(self, animation: Animation) -> Animation:
+        """An animation at the tempo of this result."""
+        return animation if self.retimed is None else self.retimed.animation
 
     @property
     def improved(self) -> bool | None:

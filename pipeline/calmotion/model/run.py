@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from calmotion.model.budget import SEARCH_SHARE
+from calmotion.model.retiming.tempo import TempoSettings
 from calmotion.model.robust.settings import RobustSettings
 
 
@@ -29,6 +30,7 @@ class RunSettings:
         directions: `auto`, `on` (bodies keep all coordinates) or `off` (the smallest POD subspaces at any error).
         avoid_reversals: Weight of the squared ways of the targets across the play of gears, over squared errors; 0:
             play does not count.
+        retime: How the tempo may change; None: not at all.
         robust: Settings of an optimisation for a set of robots; None: for the nominal robot alone.
     """
 
@@ -47,6 +49,7 @@ class RunSettings:
     directions: str = "auto"
     robust: RobustSettings | None = None
     avoid_reversals: float = 0.0
+    retime: TempoSettings | None = None
 
     @property
     def scheme(self) -> str:

@@ -19,13 +19,17 @@ def columns(character: Character, result: Result) -> dict[str, Array]:
     Reactions are what each joint does to its body1, world axes, see `calmotion.model.Motion`.
 
     Returns:
-        `time_s` [s]; positions and errors of targets [m], rotation errors [rad]; motor angles [rad] or lengths [m],
+        `time_s` [s], and at another tempo `animation_s`, the time of the animation; positions and errors of targets
+        [m], rotation errors [rad]; motor angles [rad] or lengths [m],
         efforts [N m] or [N]; `<joint path>.force.x` and so on [N], `<joint path>.moment.x` and so on [N m].
     """
     simulation = result.after or result.before
     motion = simulation.motion
     rows = motion.judged
-    table = {"time_s": motion.times[rows]} | target_columns(character, simulation)
+    table = {"time_s": motion.times[rows]}
+    if result.retimed is not None and (tempo := result.retimed.animation.tempo) is not None:
+        table["animation_s"] = tempo.animated(table["time_s"])
+    table |= target_columns(character, simulation)
     for m, motor in enumerate(character.motors):
         table[f"{motor.path}.input"] = result.reference.motor_values[rows, m]
         table[f"{motor.path}.output"] = motion.motor_values[rows, m]

@@ -7,6 +7,7 @@ from calmotion.model.run import RunSettings
 from calmotion.retargeting.avoided_reversals import refuse_without_play
 from calmotion.retargeting.optimize import refuse_other_integrators
 from calmotion.retargeting.problem.posing import unknowns
+from calmotion.retargeting.retiming.settings import refuse_tempo
 from calmotion.retargeting.robust.retarget import uncertainties_of
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.run_checks import check_simulation
@@ -21,6 +22,8 @@ def check_search(character: Character, animation: Animation, options: RunSetting
     """
     refuse_other_integrators(options)
     refuse_without_play(character, options)
+    if options.retime is not None:
+        refuse_tempo(character, animation, options.retime)
     if options.robust is not None:
         uncertainties_of(compile_shot(character, animation))
     unknowns(character, animation, check_simulation(character, animation, options), options)

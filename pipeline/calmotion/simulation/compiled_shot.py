@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from calmotion.model import Animation, Character, Track
 
 if TYPE_CHECKING:
+    from calmotion.model.retiming.retimed import Retimed
     from calmotion.multibody.model.model import Model
     from calmotion.multibody.model.topology import Tree
     from calmotion.reduction.reduced_body import ReducedBody
@@ -48,6 +49,10 @@ class CompiledShot:
     def with_tracks(self, tracks: Sequence[Track]) -> CompiledShot:
         """The same shot with other current curves of the motors; the animator's remain the intended ones."""
         return replace(self, animation=replace(self.animation, current=tuple(tracks)))
+
+    def at(self, retimed: Retimed | None) -> CompiledShot:
+        """The same robot in its animation at another tempo; None: as it is."""
+        return self if retimed is None else replace(self, animation=retimed.animation, character=retimed.character)
 
     def with_bodies(self, bodies: Sequence[ReducedBody]) -> CompiledShot:
         """The same shot with other reductions of its bodies."""

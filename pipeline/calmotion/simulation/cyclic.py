@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Animation, Character, Track
-from calmotion.model.curves import CLOSED, cycle_gap
+from calmotion.model.curves import CLOSED, cycle_gap, root_at
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.trajectory import Trajectory, copy_of_instant
@@ -20,7 +20,6 @@ from calmotion.multibody.model.model import Model, start_angles
 from calmotion.multibody.model.moving_markers import rooted
 from calmotion.multibody.model.system import State
 from calmotion.multibody.sensitivity.periodic import Monodromy, find_periodic_motion
-from calmotion.simulation.inputs.roots import root_at
 
 EASE = 1.0  # in which the loop gets up to speed, before one of it leads to a first guess [s]
 

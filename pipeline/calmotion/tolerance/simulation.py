@@ -12,8 +12,9 @@ from functools import partial
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.model import Accuracy, Animation, Character, Result, Simplification, Track
+from calmotion.model import Accuracy, Animation, Character, MotorCurve, Result, Simplification, Track
 from calmotion.model.budget import STEP, SUBSPACE
+from calmotion.model.curves import optimized_curve
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.parallel import at_once
@@ -243,8 +244,14 @@ def intended_positions(shot: CompiledShot, options: RunSettings) -> Array:
 
 
 def found_tracks(result: Result, animation: Animation) -> tuple[Track, ...]:
-    """The curves that were found: samples at the frames hold them exactly."""
-    return tuple(
-        Track(animation.frame_times, curve.frame_values) if curve.changed else track
-        for curve, track in zip(result.curves, animation.tracks, strict=True)
-    )
+    """The curves that were found: samples at the frames hold them exactly, but for what was animated between."""
+    frames = animation.frame_times
+
+    def found(curve: MotorCurve, track: Track) -> Track:
+        if not curve.changed:
+            return track
+        if animation.tempo is None or len(track.times) <= len(frames):
+            return Track(frames, curve.frame_values)
+        return Track(track.times, optimized_curve(animation, curve, False)(track.times, 0), track.corners)
+
+    return tuple(map(found, result.curves, animation.tracks))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from calmotion.host import OperatorResult, SettingError, Settings, merge, quantity_of
 from calmotion.model.model_choice import KINDS, OFF, ON
@@ -85,6 +86,7 @@ def optimize(
     motors: str = AUTHORED,
     integrator: str | None = None,
     adjoint: str | None = None,
+    retime: bool | Mapping[str, Any] = False,
     keep: Sequence[str] = (),
     leave_out: Sequence[str] = (),
     verify: bool = False,
@@ -106,6 +108,9 @@ def optimize(
             on_operator, cancel: As of `simulate`.
         integrator: `bdf2`, the only one for the optimiser.
         adjoint: `discrete` (None; exact gradients) or `continuous` (to compare with).
+        retime: Whether parts may be slower where limits of motors ask for it, and how: `{"slowest": 1.5,
+            "fastest": 0.9, "pin": (24, 48, 72)}` has the largest and the smallest stretch, and time codes whose
+            distances stay.
 
     Raises:
         ShotError: The shot cannot be processed; a `RunError` names the operators and plugins that failed.
@@ -116,7 +121,7 @@ def optimize(
     chosen: Settings = {"retarget.optimize": {"adjoint": adjoint}} if adjoint is not None else {}
     outcome = carry_out(
         _opened(shot), "optimize", wanted=_wanted(verify), operators=operators, source=source, outputs=outputs,
-        settings=merge([_forced(keep, leave_out), chosen, read_settings(settings)]),
+        settings=merge([_forced(keep, leave_out), chosen, _tempo(retime), read_settings(settings)]),
         hooks=Hooks(progress, on_operator, cancel),
     )  # fmt: skip
     result = OptimizationResult(outcome)
@@ -235,6 +240,26 @@ def _source(
         shaper=shaper,
         verify=verify,
     )
+
+
+def _tempo(retime: bool | Mapping[str, Any]) -> Settings:
+    """Settings of a search that may change the tempo.
+
+    Raises:
+        SettingError: It has a key that means nothing.
+    """
+    if isinstance(retime, bool):
+        return {"retarget.optimize": {"retime": True}} if retime else {}
+    given = dict(retime)
+    pins = given.pop("pin", ())
+    unknown = set(given) - {"slowest", "fastest"}
+    if unknown:
+        raise SettingError(
+            "this is nothing of a tempo", path="retime", found=", ".join(sorted(unknown)),
+            remedy="Use slowest, fastest and pin.",
+        )  # fmt: skip
+    pinned = {"pinned": ",".join(str(pin) for pin in pins)} if len(pins) else {}
+    return {"retarget.optimize": {"retime": True} | given | pinned}
 
 
 def _forced(keep: Sequence[str], leave_out: Sequence[str]) -> Settings:

@@ -16,6 +16,7 @@ from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.model.limits.use import is_exceeded
 from calmotion.model.motor import measure_of
 from calmotion.model.outputs import CsvFile, Figures, Recording, Rig, Verification, Video, WrittenLayer
+from calmotion.model.retiming.retimed import Retimed
 from calmotion.model.run import Source
 from calmotion.support.memory import peak_memory
 from calmotion.version import __version__
@@ -109,7 +110,8 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "remaining_errors": remaining_errors(choices.character if choices else character, result),
         "efforts": effort_rows(character, result),
         "reactions": reaction_rows(character, final.motion),
-        "contacts": contact_rows(character, final.motion),
+        "contacts": contact_rows(character if result.retimed is None else result.retimed.character, final.motion),
+        "retime": _retime(character, result.retimed),
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
     }
     source = run.get(Source)
@@ -130,6 +132,27 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "operators": [operator_row(row) for row in run.results],
     }
     return report
+
+
+def _retime(character: Character, retimed: Retimed | None) -> dict[str, Any] | None:
+    """The tempo that was found; None where the tempo could not change."""
+    if retimed is None:
+        return None
+    report, tempo = retimed.report, retimed.animation.tempo
+    return {
+        "added_s": 0.0 if tempo is None else tempo.added,
+        "uniform_added_s": report.uniform_added,
+        "lower_bound_s": report.lower_bound,
+        "map": [] if tempo is None else np.stack([tempo.animation, tempo.performance], axis=1).tolist(),
+        "stretches": [
+            {
+                "from_s": part.start, "to_s": part.end, "factor": part.factor,
+                "because": [{"path": character.motors[k].path, "quantity": name} for k, name in part.because],
+            }
+            for part in report.stretches
+        ],
+        "pins": [{"time_s": time, "shift_s": shift} for time, shift in report.pins],
+    }  # fmt: skip
 
 
 def _error_shares(character: Character, result: Result) -> list[dict[str, Any]]:

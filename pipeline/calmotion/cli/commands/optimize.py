@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 
 from calmotion.cli import Output, quantity, run_options, shot_arguments, simulation_options
+from calmotion.cli.retiming import refuse_unused_retiming, retime_options
 
 EXAMPLES = (
     ("calmotion optimize shot.usda -o calm.usda", "the usual case"),
     ("calmotion optimize shot.usda -o calm.usda --tolerance 0.5mm", "finer"),
     ("calmotion optimize shot.usda -o calm.usda --video calm.webp", "show others what changed"),
+    ("calmotion optimize shot.usda -o calm.usda --retime", "slower where motors cannot follow"),
     ("calmotion optimize shot.usda -o calm.usda --bake simulated", "for viewers without physics"),
 )
 
@@ -31,6 +33,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="avoid reversals of the torques of gears with play (calm:motor:backlash) where they move the targets: "
         "weight of the way across the play over that of the error (default: 10)",
     )
+    retime_options(command)
     group = command.add_argument_group(
         "robust curves",
         "Robots differ from their model: calm:retarget:uncertainty:modulus, :damping, :payload and :gains.",
@@ -64,4 +67,5 @@ def run(args: argparse.Namespace, output: Output) -> int:
             "this is the number of robots of a robust search, and none is requested", path="--scenarios",
             found=args.scenarios, remedy="Add --robust, or leave it out.",
         )  # fmt: skip
+    refuse_unused_retiming(args)
     return run_shot(optimize, args, output)

@@ -39,6 +39,31 @@ def print_tempo(console: Console, tempo: dict[str, Any] | None) -> None:
     say(console, f"Slowed down only where it must be, it takes at least {parts:.2f} s more.")
 
 
+def print_retiming(console: Console, retime: dict[str, Any] | None) -> None:
+    """The tempo that was found, and why."""
+    if retime is None:
+        return
+    added, parts = retime["added_s"], retime["stretches"]
+    if not parts:
+        say(console, "The tempo stays as it is: the animation keeps the limits of the motors.")
+        return
+    say(
+        console,
+        f"The performance takes {added:.2f} s more; rigid links need {retime['lower_bound_s']:.2f} s at least, and "
+        f"{retime['uniform_added_s']:.2f} s at one tempo for the whole.",
+    )
+    rows = []
+    for part in parts:
+        reasons = [f"{reason['quantity']} of {reason['path']}" for reason in part["because"]]
+        more = f" and {len(reasons) - 2} more" if len(reasons) > 2 else ""
+        times = f"{part['from_s']:.2f} to {part['to_s']:.2f} s"
+        rows.append([times, f"{part['factor']:.2f}", " and ".join(reasons[:2]) + more])
+    print_table(console, "Tempo", ["animation", "times as long", "because of"], rows)
+    late = [f"{pin['time_s']:.2f} s {pin['shift_s']:+.3f} s" for pin in retime["pins"]]
+    if late:
+        say(console, f"pinned times in the performance: {', '.join(late)}")
+
+
 def print_reason(console: Console, report: dict[str, Any]) -> None:
     """Why the curves of `optimize` exceed limits or are worse than the animation, and what to do; else nothing."""
     limits, worse = report["limits"], not report["improved"]

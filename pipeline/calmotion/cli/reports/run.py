@@ -12,7 +12,7 @@ from rich.console import Console
 from calmotion.cli.quantities import about, angle, length
 from calmotion.cli.reports.feet import print_contacts, print_support
 from calmotion.cli.reports.left_out import print_left_out
-from calmotion.cli.reports.limits import print_limits
+from calmotion.cli.reports.limits import print_limits, print_retiming
 from calmotion.cli.reports.verdict import (
     is_optimized,
     is_still,
@@ -239,6 +239,7 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
             f"friction of motors may hold {held['path']} off by up to {about(held['max_error_m'])} where it rests, "
             "beside the errors above: no command takes that away",
         )
+    print_retiming(console, report["retime"])
     print_limits(console, report["limits"], bool(suffix))
     sags = {target["path"]: target[f"sag{suffix}_m"] or 0.0 for target in report["targets"]}
     hanging = max(sags, key=sags.__getitem__, default="")

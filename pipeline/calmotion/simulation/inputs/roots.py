@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation, RotationSpline
+from scipy.spatial.transform import Rotation
 
 from calmotion.arrays import Array
 from calmotion.model.animation import MovingFrame, Track
-from calmotion.model.curves import curve_of
+from calmotion.model.curves import curve_of, rotation_spline
 from calmotion.multibody.kernels.markers import WORLD_MARKER
 from calmotion.multibody.kernels.so3 import right_jacobian
 from calmotion.multibody.model.moving_markers import pack
@@ -49,7 +49,7 @@ def _looped_rotation(frame: MovingFrame, grid: TimeGrid) -> tuple[Rotation, Arra
     # loops on both sides make the interpolant periodic, as the influence of its ends dies out in a few samples
     around = range(-LOOPS, LOOPS + 1)
     times = np.concatenate([times + k * grid.end for k in around])
-    turning = _rotation_spline(MovingFrame(frame.joint, times, frame.positions, np.tile(quaternions, (len(around), 1))))
+    turning = rotation_spline(MovingFrame(frame.joint, times, frame.positions, np.tile(quaternions, (len(around), 1))))
     inside = np.mod(grid.times, grid.end)
     # RotationSpline gives rates in the frame's own axes
     return turning(inside), turning(inside, 1)
@@ -58,7 +58,7 @@ def _looped_rotation(frame: MovingFrame, grid: TimeGrid) -> tuple[Rotation, Arra
 def _eased_rotation(frame: MovingFrame, grid: TimeGrid) -> tuple[Rotation, Array]:
     """The same of one that plays once, after a pre-roll."""
     times, pre = grid.times, grid.pre_steps
-    turning = _rotation_spline(frame)
+    turning = rotation_spline(frame)
     first, last = frame.times[0], frame.times[-1]
     shown = times[pre:]
     inside, held = np.clip(shown, first, last), (shown < first) | (shown > last)
@@ -75,18 +75,6 @@ def _eased_rotation(frame: MovingFrame, grid: TimeGrid) -> tuple[Rotation, Array
         right_jacobian(theta[n], J)
         spins[n] = J @ slope[n]
     return Rotation.concatenate([start * Rotation.from_rotvec(theta), rotation]), np.concatenate([spins, spin])
-
-
-def _rotation_spline(frame: MovingFrame) -> RotationSpline:
-    times, rotations = frame.times, Rotation.from_quat(np.roll(frame.rotations, -1, axis=1))
-    if len(times) == 1:
-        times, rotations = np.array([times[0], times[0] + 1.0]), Rotation.concatenate([rotations, rotations])
-    return RotationSpline(times, rotations)
-
-
-def root_at(frame: MovingFrame, time: float) -> Rotation:
-    """How a root is turned at a time [s]."""
-    return _rotation_spline(frame)(np.clip(time, frame.times[0], frame.times[-1]))
 
 
 def root_tracks(moving: Sequence[MovingFrame]) -> list[Track]:

@@ -52,7 +52,9 @@ MOST_INSTANTS = 400  # of the linear programme
 FINEST = 1e-9  # of a limit, by which it may be exceeded through rounding
 
 
-def needed_tempo(times: Array, values: Array, limits: TempoLimits, efforts: MotorEfforts | None) -> Tempo:
+def needed_tempo(
+    times: Array, values: Array, limits: TempoLimits, efforts: MotorEfforts | None, fastest: float = 1.0
+) -> Tempo:
     """How much slower a motion has to be.
 
     Args:
@@ -60,20 +62,21 @@ def needed_tempo(times: Array, values: Array, limits: TempoLimits, efforts: Moto
         values: Of the motors [rad or m], shape [T, M].
         limits: Of the motors.
         efforts: Of the rigid robot at the same instants; None where none is limited.
+        fastest: Least stretch, below 1 where parts may be faster than they are animated.
     """
     curve = CubicSpline(times, values)
     uniform = _uniform([curve(times, order) for order in range(4)], limits, efforts)
     length = float(times[-1] - times[0])
     stride = max(1, -(-len(times) // MOST_INSTANTS))
     few = times[::stride] if (len(times) - 1) % stride == 0 else np.append(times[::stride], times[-1])
-    if uniform <= 1.0 + FINEST:
+    if uniform <= 1.0 + FINEST and fastest == 1.0:
         return Tempo(1.0, 0.0, 0.0, few, np.ones(len(few)))
     if not np.isfinite(uniform):
         return Tempo(np.inf, np.inf, np.inf, few, np.full(len(few), np.inf))
-    square = _fastest(few, curve, limits, _between(times, few, efforts), 0.25 / uniform**2)
+    square = _fastest(few, curve, limits, _between(times, few, efforts), (fastest, 2.0 * uniform))
     root = np.sqrt(square)
     added = float(np.sum(np.diff(few) * (2.0 / (root[:-1] + root[1:]) - 1.0)))
-    return Tempo(uniform, (uniform - 1.0) * length, max(added, 0.0), few, 1.0 / root)
+    return Tempo(uniform, (uniform - 1.0) * length, added, few, 1.0 / root)
 
 
 def _uniform(derivatives: list[Array], limits: TempoLimits, efforts: MotorEfforts | None) -> float:
@@ -98,9 +101,11 @@ def _between(times: Array, few: Array, efforts: MotorEfforts | None) -> MotorEff
 
 
 def _fastest(
-    times: Array, curve: CubicSpline, limits: TempoLimits, efforts: MotorEfforts | None, least: float
-) -> Array:
-    """The largest squares of the tempo at T instants, at most 1."""
+    times: Array, curve: CubicSpline, limits: TempoLimits, efforts: MotorEfforts | None,
+    stretches: tuple[float, float],
+) -> Array:  # fmt: skip
+    """The largest squares of the tempo at T instants, between the inverse squares of two stretches."""
+    most, least = stretches[0] ** -2, stretches[1] ** -2
     length, middle = np.diff(times)[:, None], 0.5 * (times[:-1] + times[1:])
     rate, acceleration = curve(middle, 1), curve(middle, 2)
     rows, bounds = [], []
@@ -124,13 +129,13 @@ def _fastest(
     keep(still, acceleration, rate, limits.acceleration)
     if efforts is not None:
         keep(efforts.at_rest, efforts.by_square, efforts.by_change, limits.effort)
-    with np.errstate(divide="ignore"):
-        fast = np.min((limits.velocity / np.abs(curve(times, 1))) ** 2, axis=1, initial=1.0)
+    with np.errstate(divide="ignore", over="ignore"):
+        fast = np.min((limits.velocity / np.abs(curve(times, 1))) ** 2, axis=1, initial=most)
     found = linprog(
         -np.ones(len(times)),
         sparse.vstack(rows),
         np.concatenate(bounds),
-        bounds=[(least, max(most, least)) for most in fast.tolist()],
+        bounds=[(least, max(square, least)) for square in fast.tolist()],
         method="highs",
     )
     if found.x is None:

@@ -21,14 +21,15 @@ from calmotion.multibody.analysis.motor_response import motor_responses
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.model.model import body_anchors, rigid_body
+from calmotion.multibody.model.model import Model, body_anchors, rigid_body
 from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import ForwardRun, limited_values, run_forward
 from calmotion.simulation.inputs.curves import Curves, sample_curves
 from calmotion.simulation.inputs.tempo import MOST_INSTANTS, MotorEfforts, TempoLimits, needed_tempo
-from calmotion.simulation.preparation import Prepared, prepare
+from calmotion.simulation.inputs.time_grid import TimeGrid
+from calmotion.simulation.preparation import prepare
 from calmotion.simulation.report import limit_uses
 from calmotion.tolerance.simplification.by_rigid_poses import with_rough_masses
 
@@ -68,39 +69,47 @@ def exceeded_limits(character: Character, animation: Animation, options: RunSett
     efforts = None
     if slower and "effort" in values and run is not None and steady is None:
         with contextlib.suppress(SimulationFailure):
-            efforts = _efforts(prepared, run, values["effort"], curves)
+            efforts = rigid_efforts(model, grid, world, curves, run)
     known = efforts is not None or all(use.quantity != "effort" for use in slower)
     if not slower or not known:
         return ExceededLimits(uses)
-    largest = {
-        name: bounds[name].upper if name in bounds else np.full(len(character.motors), np.inf) for name in _NAMES
-    }
     judged = grid.judged
     return ExceededLimits(
-        uses, needed_tempo(grid.times[judged], curves.angles[judged], TempoLimits(**largest), efforts)
+        uses, needed_tempo(grid.times[judged], curves.angles[judged], tempo_limits(character), efforts)
     )
 
 
-_NAMES = ("velocity", "acceleration", "jerk", "effort")
+def tempo_limits(character: Character) -> TempoLimits:
+    """The limits that a slower tempo helps to keep."""
+    bounds, none = motor_bounds(character), np.full(len(character.motors), np.inf)
+    names = ("velocity", "acceleration", "jerk", "effort")
+    return TempoLimits(**{name: bounds[name].upper if name in bounds else none for name in names})
 
 
-def _efforts(prepared: Prepared, run: ForwardRun, efforts: Array, curves: Curves) -> MotorEfforts:
-    """What the motors of the rigid robot have to do in the judged time: at rest, by the square of the tempo, and by its
+def rigid_efforts(model: Model, grid: TimeGrid, world: Array, curves: Curves, run: ForwardRun) -> MotorEfforts:
+    """What the motors of a rigid robot have to do in the judged time: at rest, by the square of the tempo, and by its
     change.
+
+    Args:
+        model, grid, world: The robot, the instants, and its moving roots.
+        curves, run: Of its motors, and its motion by them.
 
     Raises:
         SimulationFailure: A pose in which the robot finds no rest, or its system is singular.
     """
-    model, grid, states = prepared.model, prepared.grid, run.trajectory.states
+    states = run.trajectory.states
     slow = 1e3  # at which nothing but weight is left
     rest = run_forward(
-        model, Workspace.for_system(model.system), curves.angles, curves.rates / slow, slow * grid.h, prepared.world
+        model, Workspace.for_system(model.system), curves.angles, curves.rates / slow, slow * grid.h, world
     )
-    weight = model.motor_values(reactions(model.system, rest.trajectory, rest.joint_angles, rest.joint_rates).efforts)
+    efforts, weight = (
+        model.motor_values(reactions(model.system, one.trajectory, one.joint_angles, one.joint_rates).efforts)
+        for one in (run, rest)
+    )
     few = np.unique(np.linspace(0, len(grid.times) - 1, MOST_INSTANTS).round().astype(int))
     motors = np.arange(curves.angles.shape[1], dtype=np.int32)
     _, inertia = motor_responses(
-        model, states.c[few], states.q[few], run.joint_angles[few], motors, prepared.world[few], grid.times[few]
+        model, states.c[few], states.q[few], run.joint_angles[few], motors, world[few], grid.times[few]
     )
     change = CubicSpline(grid.times[few], np.einsum("tmk,tk->tm", inertia, curves.rates[few]))(grid.times)
     judged = grid.judged

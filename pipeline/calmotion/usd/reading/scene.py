@@ -10,7 +10,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import RetargetSettings
+from calmotion.model import RetargetSettings, TempoSettings
 from calmotion.model.robust.settings import Uncertainty
 from calmotion.usd import gf, schemas
 from calmotion.usd.calibrations import known_factors
@@ -102,7 +102,23 @@ def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
         endpoints=schemas.choice(prim, _SCHEMA, "calm:retarget:endpoints", ("free", "kept"), "has an unknown value"),
         cyclic=bool(schemas.value(prim, _SCHEMA, "calm:retarget:cyclic")),
         uncertainty=_uncertainty(prim),
+        tempo=_tempo(reading, prim),
     )
+
+
+def _tempo(reading: Reading, prim: Usd.Prim) -> TempoSettings:
+    """How the tempo may change.
+
+    Raises:
+        ShotError: A stretch out of range.
+    """
+    found = {name: schemas.value(prim, _SCHEMA, f"calm:retime:{name}") for name in ("slowest", "fastest", "pinned")}
+    slowest, fastest, pinned = found["slowest"], found["fastest"], found["pinned"]
+    schemas.require(1.0 <= slowest < np.inf, prim, "calm:retime:slowest", slowest, "must be 1 or more")
+    schemas.require(0.0 < fastest <= 1.0, prim, "calm:retime:fastest", fastest, "must be more than 0, and at most 1")
+    codes = np.unique(np.array(pinned if pinned is not None else (), dtype=np.float64))
+    times = (codes - reading.start) / prim.GetStage().GetTimeCodesPerSecond()
+    return TempoSettings(float(slowest), float(fastest), tuple(times.tolist()))
 
 
 def _positive(prim: Usd.Prim, name: str, *, zero: bool = False) -> float | None:

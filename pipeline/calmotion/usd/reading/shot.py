@@ -11,12 +11,14 @@ import numpy as np
 
 from calmotion.errors import raise_all
 from calmotion.model import Animation, Character, MotorTracks, MovingFrame, Provenance, Track
+from calmotion.model.retiming.performance import retimed, with_contacts_at
 from calmotion.support.naming import as_written, grouped_notes
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock, clock_of, still_clock
 from calmotion.usd.diagnostics import quiet, with_places
 from calmotion.usd.masks import masked
 from calmotion.usd.reading.animated.constants import hold_constants
+from calmotion.usd.reading.animated.retiming import retime_map, tempo_of
 from calmotion.usd.reading.animated_transforms import carriers, codes_of
 from calmotion.usd.reading.bases.roots import moving_frames
 from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
@@ -71,9 +73,11 @@ def read_shot(
         stages.refuse_result_layer(composed, path)
         earlier = stages.earlier_layers(composed)
         stage = stages.open_stage(path, muted=earlier) if earlier else composed
+        codes = retime_map(composed) if earlier else None
         part = masked(stage, earlier)
-        read = read_stage(part, still, given, measured, stage)
+        read = read_stage(part, still, given, measured, stage, None if codes is None else float(codes[-1, 0]))
         reading, clock, character, tracks = read.reading, read.clock, read.character, read.tracks
+        tempo, shown = tempo_of(clock, codes)
         current = tracks
         if earlier:
             # predicted motions are not animation; optimised curves of bodies and skeletons are
@@ -82,9 +86,9 @@ def read_shot(
             result = result if part is stage else masked(result, motions)
             of_motors = Reading(result, reading.units, clock.start)
             standing = hinge_stacks(reading, read.skeleton.drives)
-            current = motor_tracks(of_motors, read.skeleton.drives, clock, given, standing)
+            current = motor_tracks(of_motors, read.skeleton.drives, shown, given, standing)
             raise_all(of_motors.problems)
-        provenance = provenance_of(path, stage, clock, earlier)
+        provenance = provenance_of(path, stage, shown, earlier)
         of_results = notes_of_results(composed, path, earlier, provenance.layers)
         weights = weight_tracks(part, character.targets, clock)
         free = free_tracks(part, character.motors, clock)
@@ -92,7 +96,11 @@ def read_shot(
     notes = (f"{place}: {message}" for place, message in with_places(messages, part, prims_of(part)))
     told = (*character.notes, *of_results, *unread, *notes)
     character = dataclasses.replace(character, notes=tuple(as_written(note, provenance.names) for note in told))
-    return character, Animation(clock.frame_times(), tracks, current, read.moving, weights, free), provenance
+    animation = Animation(clock.frame_times(), tracks, current, read.moving, weights, free)
+    if tempo is not None:
+        made = retimed(dataclasses.replace(animation, current=tracks), tempo, shown.frame_times())
+        character, animation = with_contacts_at(character, tempo), dataclasses.replace(made, current=current)
+    return character, animation, provenance
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,12 +117,13 @@ class StageReading:
 
 def read_stage(
     stage: Usd.Stage, still: bool = False, given: MotorTracks | None = None, measured: Sequence[str] = (),
-    whole: Usd.Stage | None = None,
+    whole: Usd.Stage | None = None, end: float | None = None,
 ) -> StageReading:  # fmt: skip
     """Read a composed stage; arguments and errors as for `read_shot`.
 
     Args:
         whole: The stage with all of its prims, of which `stage` is a part; None: it is whole.
+        end: Time code of the last frame where the stage has that of a performance at another tempo.
     """
     with stages.refused_by_usd(stage), naming_variants(whole or stage):
         raise_all(list(wrong_types(stage)))
@@ -122,6 +131,8 @@ def read_stage(
         animated = hold_constants(stage)
         units = units_of(stage)
         clock = shot_clock(stage, given)
+        if end is not None:
+            clock = dataclasses.replace(clock, end=end)
         reading = Reading(stage, units, clock.start, whole=whole)
         reading.notes += animated
         if given is not None and (note := length_note(given, clock.frame_times())):

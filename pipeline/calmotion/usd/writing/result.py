@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from calmotion.errors import ShotError
@@ -16,6 +16,7 @@ from calmotion.usd.reading.motors.tracks import MOST as MAX_SAMPLES
 from calmotion.usd.writing import bake, metadata, motions
 from calmotion.usd.writing.curves import author_curves, ensure_drives, sample_times, with_authored
 from calmotion.usd.writing.root import keeps_earlier_curves, root_path, write_root
+from calmotion.usd.writing.scene import author_map, author_scene
 from calmotion.usd.writing.skeletal import author_skeletons
 from calmotion.usd.writing.splines import author_splines
 
@@ -35,11 +36,13 @@ class WriteOptions:
         splines: Whether motor curves are written as splines instead of samples.
         bake: `none`, `motors` (body transforms of a rigid robot with the new curves) or `simulated` (the predicted
             motion, deformed meshes included).
+        retime_scene: Whether all that moves in the stage follows the tempo of the performance, or the character alone.
     """
 
     samples_per_second: float | None = None
     splines: bool = False
     bake: str = "none"
+    retime_scene: bool = True
 
 
 def write_result(
@@ -70,6 +73,8 @@ def write_result(
     refuse_options(options, motors_that_may_change(character) if result.after else ())
     refuse_inputs(provenance, output)
     role = stages.MOTION if result.after is None else stages.CURVES
+    animation = result.performed_animation(animation)
+    provenance = _at_tempo(provenance, animation)
     clock = Clock(
         provenance.start_time_code,
         provenance.end_time_code,
@@ -92,8 +97,20 @@ def write_result(
     if role == stages.CURVES:
         written, knots = _write_curves(layer, shot, result, options)
     written |= _bake(layer, shot, result, options)
+    if animation.tempo is not None and role == stages.CURVES:
+        author_map(layer, character.path, animation.tempo, clock)
+        within = "/" if options.retime_scene else character.path
+        written |= author_scene(layer, shot.stage, animation.tempo, clock, animation.frame_times, within)
     write_layer(layer, output, lambda temporary: _validate(temporary, written, knots))
     return output, write_root(output, provenance, role)
+
+
+def _at_tempo(provenance: Provenance, animation: Animation) -> Provenance:
+    """The provenance with the end of a performance at another tempo."""
+    if animation.tempo is None:
+        return provenance
+    codes = float(animation.frame_times[-1]) * provenance.time_codes_per_second
+    return replace(provenance, end_time_code=provenance.start_time_code + codes)
 
 
 def refuse_options(options: WriteOptions, motors: Sequence[Motor], seconds: float = 0.0) -> None:
@@ -177,11 +194,11 @@ def refuse_inputs(provenance: Provenance, output: str) -> None:
         refuse_input_as_output(name, inputs)
 
 
-def _curves_to_write(character: Character, result: Result, provenance: Provenance) -> tuple[MotorCurve, ...]:
-    """The curves that changed, all of them where curves of an earlier result would show through; never those of motors
-    that are geared to others, which follow by themselves."""
-    write_all = keeps_earlier_curves(provenance)
-    independent = (curve for curve in result.curves if character.motors[curve.motor].follows is None)
+def _curves_to_write(shot: _Shot, result: Result) -> tuple[MotorCurve, ...]:
+    """The curves that changed, all of them where the tempo did or curves of an earlier result would show through; never
+    those of motors that are geared to others, which follow by themselves."""
+    write_all = shot.animation.tempo is not None or keeps_earlier_curves(shot.provenance)
+    independent = (curve for curve in result.curves if shot.character.motors[curve.motor].follows is None)
     return tuple(curve for curve in independent if curve.changed or write_all)
 
 
@@ -206,7 +223,7 @@ def _write_curves(
     """Author motor curves where they came from: attributes with their number of samples, and of knots."""
     character, animation, clock = shot.character, shot.animation, shot.clock
     curves: dict[str, tuple[MotorCurve, ...]] = {"drive": (), "bodies": (), "skeleton": ()}
-    for curve in _curves_to_write(character, result, shot.provenance):
+    for curve in _curves_to_write(shot, result):
         curves[character.motors[curve.motor].source] += (curve,)
     ensure_drives(layer, shot.stage, [character.motors[curve.motor] for curve in curves["drive"]])
     rate = options.samples_per_second

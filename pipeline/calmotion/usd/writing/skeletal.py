@@ -48,6 +48,8 @@ def author_skeletons(
         Path of each attribute that was written, with its number of samples.
     """
     changed = {character.motors[curve.motor].path: curve for curve in curves}
+    tempo = animation.tempo
+    made = clock.time_codes(times if tempo is None else tempo.animated(times))  # when the animation is there
     reading = Reading(stage, units_of(stage), clock.start)
     drives = read_skeleton(reading, clock, still=True).drives
     index = {motor.path: k for k, motor in enumerate(character.motors)}
@@ -64,19 +66,24 @@ def author_skeletons(
             if path in changed:
                 new[:, k] = curve_values(animation, changed[path], times, character.retarget.cyclic)
         change = stack.turned(new) @ np.swapaxes(stack.turned(old), 1, 2)
-        codes = clock.time_codes(times)
-        rotations = change @ stack.skeleton.local_rotations(stack.joint, codes)
+        rotations = change @ stack.skeleton.local_rotations(stack.joint, made)
         turned.setdefault(str(stack.skeleton.animation.GetPath()), []).append((stack, rotations))
     written: dict[str, int] = {}
     for name, parts in turned.items():
-        written |= dict(_author(layer, stage, name, parts, clock, times))
+        written |= dict(_author(layer, stage, name, parts, clock, times, made))
     return written
 
 
 def _author(
-    layer: Sdf.Layer, stage: Usd.Stage, name: str, parts: list[tuple[HingeStack, Array]], clock: Clock, times: Array
-) -> Iterator[tuple[str, int]]:
-    """Write one animation; yields what was written."""
+    layer: Sdf.Layer, stage: Usd.Stage, name: str, parts: list[tuple[HingeStack, Array]], clock: Clock, times: Array,
+    made: Array,
+) -> Iterator[tuple[str, int]]:  # fmt: skip
+    """Write one animation; yields what was written.
+
+    Args:
+        times: Of the samples [s].
+        made: Time codes of the shot with what these show.
+    """
     from pxr import Sdf, UsdSkel
 
     animation = UsdSkel.Animation(stage.GetPrimAtPath(name))
@@ -85,7 +92,7 @@ def _author(
     rotations = attribute_spec(layer, f"{name}.rotations", Sdf.ValueTypeNames.QuatfArray)
     last: dict[int, Array] = {}
     for n, code in enumerate(clock.time_codes(times)):
-        found = gf.quaternions(animation.GetRotationsAttr().Get(float(code)))
+        found = gf.quaternions(animation.GetRotationsAttr().Get(float(made[n])))
         found = np.concatenate([found, [_at_rest(stack) for stack in more]]) if more else found
         for stack, turns in parts:
             token = stack.skeleton.joints[stack.joint]

@@ -141,7 +141,7 @@ class Watch:
         from calmotion.model.curves import held_curve
 
         result, before = self._last.get(Result), self._last[Animation]
-        if result is None or result.after is None or not _same_times(animation, before):
+        if result is None or result.after is None or result.retimed is not None or not _same_times(animation, before):
             return animation
         times, current = animation.frame_times, list(animation.current)
         for curve in result.curves:

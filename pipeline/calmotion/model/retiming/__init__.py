@@ -1,0 +1,1 @@
+"""The tempo of a performance, and an animation at a tempo."""
