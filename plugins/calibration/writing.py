@@ -44,6 +44,7 @@ from .model.estimates import (
     GEAR_STIFFNESS,
     LOAD_FRICTION,
     MASS,
+    MAX_TORQUE,
     MODULUS,
     POSITION_GAIN,
     VELOCITY_GAIN,
@@ -194,6 +195,7 @@ class _Writer:
         for item in found:
             self._attribute(path, f"calm:motor:{_MOTOR[item.kind]}", item, unit.get(item.kind, effort / length))
         self._load(motor)
+        self._largest(motor, effort)
         kinds = {item.kind for item in found}
         # gains are read from one dialect: both are there, or none, and what the second multiplies
         if kinds & {POSITION_GAIN, VELOCITY_GAIN}:
@@ -214,6 +216,22 @@ class _Writer:
             if part.name.endswith("load"):
                 name = re.sub(r"_(\w)", lambda found: found[1].upper(), part.name)
                 self._number(motor.path, f"calm:motor:friction:{name}", getattr(law, part.name))
+
+    def _largest(self, motor: Motor, effort: float) -> None:
+        """The largest torque, which a factor of the gain of a motor with back-EMF multiplies as well."""
+        item, gain = (self._values.get((kind, motor.path, -1)) for kind in (MAX_TORQUE, POSITION_GAIN))
+        if item is None:
+            return
+        prim = self._reading.stage.GetPrimAtPath(motor.path)
+        factor = gain.value / gain.nominal if gain is not None and motor.rotor.back_emf > 0.0 else 1.0
+        if prim.GetAttribute("calm:motor:voltage").HasAuthoredValue():
+            duty = prim.GetAttribute("calm:motor:maxDuty").Get() or 1.0
+            self._attribute(motor.path, "calm:motor:maxDuty", item, factor * motor.max_torque / duty)
+            return
+        self._attribute(motor.path, "calm:motor:maxTorque", item, factor * effort)
+        drive = f"drive:{'linear' if motor.linear else 'angular'}:physics:maxForce"
+        if prim.GetAttribute(drive).HasAuthoredValue():  # the lower of both counts
+            self._attribute(motor.path, drive, item, factor * effort)
 
     def _note(self, item: Estimate) -> None:
         """An offset of an encoder, which no attribute of the joint has."""

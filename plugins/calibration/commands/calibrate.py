@@ -65,8 +65,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--parameters", metavar="KIND", nargs="+",
         help="what to estimate: modulus, damping, density, mass, centre, position_gain, velocity_gain, gear_stiffness, "
-        "armature, friction, viscous_friction, load_friction, delay, encoder_offset, each also as KIND:PATTERN for "
-        "some prim paths "
+        "armature, friction, viscous_friction, load_friction, max_torque, delay, encoder_offset, each also as "
+        "KIND:PATTERN for some prim paths "
         "(default: all but density, centre and encoder_offset)",
     )  # fmt: skip
     prior_option(command)

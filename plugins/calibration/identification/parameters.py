@@ -33,6 +33,7 @@ from ..model.estimates import (
     HIGHER_MODES,
     LOAD_FRICTION,
     MASS,
+    MAX_TORQUE,
     MODULUS,
     PLACE,
     POSITION_GAIN,
@@ -45,17 +46,17 @@ from ..model.estimates import (
 PRIORS: Mapping[str, float] = {
     MODULUS: 0.3, DAMPING: 1.0, DENSITY: 0.05, MASS: 0.1, CENTRE: 0.01, POSITION_GAIN: 0.3, VELOCITY_GAIN: 0.5,
     GEAR_STIFFNESS: 0.5, ARMATURE: 0.5, FRICTION: 1.0, VISCOUS_FRICTION: 1.0, LOAD_FRICTION: 1.0,
-    DELAY: 0.005,
+    MAX_TORQUE: 0.3, DELAY: 0.005,
     ENCODER_OFFSET: float(np.radians(1.0)), HIGHER_MODES: 0.01, CLOCK_OFFSET: 0.05, CLOCK_DRIFT: 1e-4,
     BIAS: 0.3, PLACE: 0.002,
 }  # fmt: skip
 DEFAULT = (
     MODULUS, DAMPING, MASS, POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION,
-    LOAD_FRICTION, DELAY,
+    LOAD_FRICTION, MAX_TORQUE, DELAY,
 )  # fmt: skip
 LOGARITHMIC = (
     MODULUS, DAMPING, DENSITY, MASS, POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION,
-    LOAD_FRICTION,
+    LOAD_FRICTION, MAX_TORQUE,
 )  # fmt: skip
 
 
@@ -232,6 +233,7 @@ def _of_motor(motor: Motor, kind: str, spread: float) -> list[Parameter]:
         FRICTION: (motor.rotor.friction, effort),
         VISCOUS_FRICTION: (motor.rotor.viscous_friction, f"{effort} s/{angle}"),
         LOAD_FRICTION: (motor.rotor.law.share, ""),
+        MAX_TORQUE: (motor.max_torque, effort),
     }[kind]
     of_rotor = kind not in (POSITION_GAIN, VELOCITY_GAIN)
     if (of_rotor and motor.model != SERVO) or motor.model not in (DRIVE, SERVO):

@@ -30,6 +30,7 @@ from ..model.estimates import (
     LOAD_FRICTION,
     MASS,
     MATERIAL_KINDS,
+    MAX_TORQUE,
     MODULUS,
     MOTOR_KINDS,
     POSITION_GAIN,
@@ -144,6 +145,7 @@ def _motor(motor: Motor, values: Values) -> Motor:
     )
     return replace(
         motor,
+        max_torque=of(MAX_TORQUE, motor.max_torque),
         velocity_gain=of(VELOCITY_GAIN, motor.velocity_gain),
         delay=of(DELAY, motor.delay),
         rotor=rotor,

@@ -10,8 +10,10 @@ from calmotion.arrays import Array, BoolArray
 from calmotion.errors import ShotError
 from calmotion.multibody import SimulationFailure, in_parallel
 from calmotion.support import answer
+from scipy.stats import norm
+from scipy.stats.qmc import Sobol
 
-from ..model.estimates import DAMPING
+from ..model.estimates import DAMPING, DELAY, FRICTION, LOAD_FRICTION, MAX_TORQUE
 from .disagreement import widened
 from .least_squares import Solution, chord, loss_of, minimize, posterior, weights_of
 from .measurement import Measurement, Sensor
@@ -23,6 +25,7 @@ from .takes import STIFF
 
 TRIED = np.linspace(-2.4, 2.4, 17)  # of all of them at once, in standard deviations of their priors
 FARTHEST = 5.0  # that the free decay may be away from the shot, in standard deviations
+DRAWN, FEW = 16, 24  # robots by their priors that are tried as well, and most parameters that these can tell apart
 BEST = 3  # of these, from which searches begin until one explains the recordings
 FIRST_ITERATIONS, EXPLAINED = 6, 2.0  # of such a search, and its loss over that of noise alone
 NEAR = 0.3  # change at which it ends, in standard deviations: another one follows
@@ -230,7 +233,7 @@ def _starts(problem: Calibrated, tell: Callable[[float, str], None]) -> list[Arr
     stiff = np.array([p.kind in STIFF for p in problem.parameters], float)
     tell(0.1, "looking for the stiffness")
     points = [np.concatenate([v * stiff, np.zeros(m)]) for v in (TRIED if stiff.any() else (0.0,))]
-    points += _of_decay(problem)
+    points += _of_decay(problem) + _drawn(problem)
 
     def tried(z: Array) -> tuple[float, Array, Calibrated] | None:
         own = problem.with_measurement(problem.measurement)
@@ -251,6 +254,19 @@ def _starts(problem: Calibrated, tell: Callable[[float, str], None]) -> list[Arr
         )  # fmt: skip
     found.sort(key=lambda item: item[0])
     return [z for _, z, _ in found[:BEST]]
+
+
+def _drawn(problem: Calibrated) -> list[Array]:
+    """Robots all over the priors, where a motor's friction or largest torque is estimated: these decide how a robot
+    moves only beyond some torque, so that a search that begins on the other side does not find them."""
+    n, m = len(problem.parameters), len(problem.measurement.parameters)
+    own = np.array([p.kind in (FRICTION, LOAD_FRICTION, MAX_TORQUE) for p in problem.parameters])
+    if not own.any() or n > FEW:
+        return []
+    draws = norm.ppf(Sobol(n, rng=0).random(DRAWN))
+    return [
+        np.concatenate([np.where([p.kind != DELAY for p in problem.parameters], x, 0.0), np.zeros(m)]) for x in draws
+    ]
 
 
 def _of_decay(problem: Calibrated) -> list[Array]:

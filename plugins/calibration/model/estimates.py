@@ -13,6 +13,7 @@ MODULUS, DAMPING, DENSITY, MASS, CENTRE = "modulus", "damping", "density", "mass
 POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS = "position_gain", "velocity_gain", "gear_stiffness"
 ARMATURE, FRICTION, VISCOUS_FRICTION, DELAY = "armature", "friction", "viscous_friction", "delay"
 LOAD_FRICTION = "load_friction"  # at rest, over the mean of the torques on both sides of the gear
+MAX_TORQUE = "max_torque"  # of a servo, at rest
 ENCODER_OFFSET = "encoder_offset"
 # what the model of the robot has wrong, and no attribute of a shot takes
 HIGHER_MODES = "higher_modes"
@@ -22,8 +23,8 @@ CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE = "clock_offset", "clock_drift", "bias", 
 MATERIAL_KINDS = (MODULUS, DAMPING, DENSITY)
 BODY_KINDS = (MASS, CENTRE)
 MOTOR_KINDS = (
-    POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION, LOAD_FRICTION, DELAY,
-    ENCODER_OFFSET,
+    POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION, LOAD_FRICTION, MAX_TORQUE,
+    DELAY, ENCODER_OFFSET,
 )  # fmt: skip
 ROBOT_KINDS = (*MATERIAL_KINDS, *BODY_KINDS, *MOTOR_KINDS)
 MODEL_KINDS = (HIGHER_MODES,)

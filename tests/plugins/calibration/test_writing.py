@@ -125,7 +125,8 @@ def test_metadata_that_were_damaged_tell_nothing(shot, tmp_path):
     assert read_shot(root)[0].retarget.uncertainty.calibrated.names == ()
 
 
-def test_a_servo_fed_with_a_voltage_gets_a_factor_of_its_gain_that_any_shot_of_it_takes(tmp_path):
+@pytest.mark.parametrize("largest", [None, 0.6])
+def test_a_servo_fed_with_a_voltage_gets_a_factor_of_its_gain_that_any_shot_of_it_takes(tmp_path, largest):
     def edit(gain):
         def author(stage):
             make_target(stage)
@@ -145,6 +146,7 @@ def test_a_servo_fed_with_a_voltage_gets_a_factor_of_its_gain_that_any_shot_of_i
         estimate("position_gain", SHOULDER, own.position_gain, 1.2 * own.position_gain),
         estimate("viscous_friction", SHOULDER, own.rotor.viscous_friction, 0.01),
         estimate("load_friction", SHOULDER, own.rotor.law.share, 0.3),
+        *([] if largest is None else [estimate("max_torque", SHOULDER, 0.7, largest)]),
     )
     layer, _ = write_calibration(character, provenance, calibration_of(*rows), str(tmp_path / "robot.usda"))
     stage = Usd.Stage.CreateNew(str(tmp_path / "both.usda"))
@@ -154,6 +156,37 @@ def test_a_servo_fed_with_a_voltage_gets_a_factor_of_its_gain_that_any_shot_of_i
     stage.Save()
     found = read_shot(str(tmp_path / "both.usda"))[0].motors[0]
     assert found.position_gain == pytest.approx(4.0 * 1.2 * own.position_gain, rel=1e-6)
-    assert found.max_torque == pytest.approx(1.2 * 0.7) and found.rotor.law.share == pytest.approx(0.3)
+    assert found.max_torque == pytest.approx(largest or 1.2 * 0.7) and found.rotor.law.share == pytest.approx(0.3)
     assert found.rotor.back_emf == pytest.approx(1.2 * own.rotor.back_emf, rel=1e-6)
     assert found.rotor.viscous_friction == pytest.approx(0.01, rel=1e-6)
+
+
+def test_the_largest_torque_is_that_of_the_duty_cycle_and_of_the_drive_where_these_limit_it(tmp_path):
+    def edit(stage):
+        make_target(stage)
+        joint = stage.GetPrimAtPath(SHOULDER)
+        joint.AddAppliedSchema("CalmMotorAPI")
+        for name, value in (("model", "servo"), ("type", "xl330-m288")):
+            joint.CreateAttribute(f"calm:motor:{name}", Sdf.ValueTypeNames.Token).Set(value)
+        for name, value in (("voltage", 7.4), ("dutyGain", 0.02)):
+            set_float(stage, SHOULDER, f"calm:motor:{name}", value)
+
+    def held(stage):
+        edit(stage)
+        for name in ("voltage", "dutyGain"):
+            stage.GetPrimAtPath(SHOULDER).RemoveProperty(f"calm:motor:{name}")
+        set_float(stage, SHOULDER, "calm:motor:positionGain", 0.01)
+        set_float(stage, SHOULDER, "drive:angular:physics:maxForce", 0.7)
+
+    for k, author in enumerate((edit, held)):
+        shot = str(write_arm(tmp_path / f"{k}.usda", author))
+        character, _, provenance = read_shot(shot)
+        own = character.motors[0]
+        rows = (
+            estimate("position_gain", SHOULDER, own.position_gain, 1.1 * own.position_gain),
+            estimate("max_torque", SHOULDER, own.max_torque, 1.3 * own.max_torque),
+        )
+        _, root = write_calibration(character, provenance, calibration_of(*rows), str(tmp_path / f"robot{k}.usda"))
+        found = read_shot(root)[0].motors[0]
+        assert found.max_torque == pytest.approx(1.3 * own.max_torque, rel=1e-5)
+        assert found.position_gain == pytest.approx(1.1 * own.position_gain, rel=1e-5)

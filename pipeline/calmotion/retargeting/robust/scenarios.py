@@ -23,7 +23,7 @@ from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 
 MODULUS, DAMPING, MASS, PAYLOAD = "modulus", "damping", "mass", "payload"
 GAINS = ("position_gain", "velocity_gain")
-OF_MOTOR, OF_ROTOR = (*GAINS, "delay"), (
+OF_MOTOR, OF_ROTOR = (*GAINS, "delay", "max_torque"), (
     "gear_stiffness", "armature", "friction", "viscous_friction",
 )  # fmt: skip
 LOAD_FRICTION = "load_friction"  # the share of the load in the friction of a rotor
@@ -143,12 +143,13 @@ def _other_motor(motor: Motor, factors: Mapping[str, float]) -> Motor:
     }
     if not own:
         return motor
+    # before the gain, which may change the largest torque, is another
+    of_motor = {name: own[name] * getattr(motor, name) for name in OF_MOTOR[1:] if name in own}
     if GAINS[0] in own:
         motor = motor.with_gain(own[GAINS[0]] * motor.position_gain)
     rotor: dict[str, Any] = {name: own[name] * getattr(motor.rotor, name) for name in OF_ROTOR if name in own}
     if LOAD_FRICTION in own:
         rotor["law"] = motor.rotor.law.with_share(own[LOAD_FRICTION] * motor.rotor.law.share)
-    of_motor = {name: own[name] * getattr(motor, name) for name in OF_MOTOR[1:] if name in own}
     return replace(motor, rotor=replace(motor.rotor, **rotor), **of_motor)
 
 

@@ -91,3 +91,19 @@ def test_a_robot_that_stands_elsewhere_than_the_shot_begins_is_begun_where_its_e
     found = calibrate_shots([(shot, [recording])], SETTINGS, RunSettings(step=1 / 240))
     assert found.estimate(f"position_gain {MOTOR}").value == pytest.approx(18.0, rel=0.03)
     assert any("begins elsewhere" in note for note in found.notes)
+
+
+def test_a_largest_torque_below_that_of_the_shot_is_found(shots):
+    """The search does not get there from a robot whose torque is never reached."""
+    shot = shots[1]
+    efforts = signals_of(robot_with(shot, {}), RunSettings(step=1 / 240)).efforts
+    largest = 0.7 * np.abs(efforts).max()
+    times = np.arange(0.0, 1.7, 1 / 100)
+    values = signals_of(robot_with(shot, {("max_torque", MOTOR, -1): largest}), RunSettings(step=1 / 480), 0.5).at(
+        ANGLE, 0, times
+    )
+    values = values + 3e-4 * np.random.default_rng(0).standard_normal(values.shape)
+    recording = SensorRecording("weak.csv", "", (Channel(ANGLE, MOTOR, times, values),))
+    settings = dataclasses.replace(SETTINGS, parameters=("position_gain", "max_torque"))
+    found = calibrate_shots([(shot, [recording])], settings, RunSettings(step=1 / 240))
+    assert found.estimate(f"max_torque {MOTOR}").value == pytest.approx(largest, rel=0.03)
