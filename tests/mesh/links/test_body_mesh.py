@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.mesh.grids import gridded
 from calmotion.mesh.sources import choice
 from calmotion.mesh.tetrahedralize import filling
 from calmotion.mesh.tetrahedralize import tetwild as tetwild_module
@@ -73,7 +72,7 @@ def test_copies_count_once_and_hidden_geometry_not_at_all():
     assert choice.solid_of(body, body.surfaces).volume == pytest.approx(8e-5)
 
 
-def test_tetrahedra_that_do_not_fill_the_surface_are_refused_where_a_grid_does_not_either(host, monkeypatch):
+def test_tetrahedra_that_do_not_fill_the_surface_are_refused(host, monkeypatch):
     small = box((0.19, 0.019, 0.019))
     corners = np.array(small.vertices)
     tets = np.array([[0, 1, 2, 4], [3, 1, 7, 2], [5, 1, 4, 7], [6, 2, 7, 4], [1, 2, 4, 7]], dtype=np.int32)
@@ -84,7 +83,6 @@ def test_tetrahedra_that_do_not_fill_the_surface_are_refused_where_a_grid_does_n
         return corners, tets
 
     monkeypatch.setattr(filling, "tetrahedralize", shrunken)
-    monkeypatch.setattr(gridded, "on_grid", lambda *given: None)
     with pytest.raises(ShotError, match="do not fill"):
         run(host, link(surface(box())))
     assert len(calls) == 3 and calls == sorted(calls, reverse=True)

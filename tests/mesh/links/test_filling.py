@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.errors import ShotError
-from calmotion.mesh.grids import gridded
 from calmotion.mesh.grids.contacts import without_contacts
 from calmotion.mesh.repair import closed_solid
 from calmotion.mesh.sources import choice
@@ -15,18 +14,20 @@ from calmotion.mesh.tetrahedralize import tetwild
 from mesher_links import box, link, run, surface
 
 
-@pytest.mark.parametrize("given", [{"element_size": 0.02}, pytest.param({}, marks=pytest.mark.long)])
-def test_a_mesh_that_takes_too_long_is_made_on_a_grid(host, monkeypatch, given):
-    limits = []
+def test_a_mesh_that_takes_too_long_is_made_again_with_larger_elements(host, monkeypatch):
+    mesh_of, tried = filling_module.tetrahedralize, []
 
-    def stuck(points, triangles, size, envelope, path, time, use_cache):
-        limits.append(time.limit)
-        raise tetwild.OutOfTime("took too long", path=path, found="12 triangles, 50 s")
+    def slow(points, triangles, size, envelope, path, time, use_cache):
+        tried.append((size, time.limit))
+        if len(tried) == 1:
+            raise tetwild.OutOfTime("took too long", path=path, found="12 triangles, 50 s")
+        return mesh_of(points, triangles, size, envelope, path, time, use_cache)
 
-    monkeypatch.setattr(filling_module, "tetrahedralize", stuck)
-    (mesh,) = run(host, link(surface(box()), **given), time_limit=50.0)
-    assert limits == pytest.approx([30.0])  # the rest is for what follows
-    assert any("on a grid" in text and "took too long (12 triangles" in text for text in mesh.quality.repairs)
+    monkeypatch.setattr(filling_module, "tetrahedralize", slow)
+    (mesh,) = run(host, link(surface(box()), element_size=0.02), time_limit=50.0)
+    assert [limit for _, limit in tried] == pytest.approx([30.0, 50.0])  # the rest is for what follows
+    assert tried[1][0] == pytest.approx(1.6 * tried[0][0])
+    assert any("1.6 times as large" in text for text in mesh.quality.repairs)
     assert mesh.quality.volume == pytest.approx(8e-5, rel=3e-2) and mesh.quality.frequency_error > 0.0
 
 
@@ -45,16 +46,11 @@ def test_a_surface_of_too_many_details_is_simplified(host):
     (mesh,) = run(host, link(surface(rough)))
     (note,) = (text for text in mesh.quality.repairs if "simplified to" in text)
     assert f"all {len(rough.faces)} would take too long" in note and "are missing" in note
-    assert not any("on a grid" in text for text in mesh.quality.repairs)
     assert mesh.quality.volume == pytest.approx(float(rough.volume), rel=1e-2)
 
 
 def test_details_are_left_out_where_following_them_takes_too_long(host, monkeypatch):
-    filling, mesh_of, tried = (
-        filling_module,
-        filling_module.tetrahedralize,
-        [],
-    )
+    filling, mesh_of, tried = filling_module, filling_module.tetrahedralize, []
 
     def slow(points, triangles, size, *rest):
         tried.append((len(triangles), size))
@@ -70,12 +66,11 @@ def test_details_are_left_out_where_following_them_takes_too_long(host, monkeypa
     assert mesh.quality.volume == pytest.approx(float(ball.volume), rel=1e-2)
 
 
-def test_a_solid_that_a_grid_does_not_resolve_is_refused_with_the_reason(host, monkeypatch):
+def test_a_solid_that_no_mesh_fills_in_time_is_refused_with_the_reason(host, monkeypatch):
     def stuck(points, triangles, size, envelope, path, time, use_cache):
         raise tetwild.OutOfTime("took too long", path=path)
 
     monkeypatch.setattr(filling_module, "tetrahedralize", stuck)
-    monkeypatch.setattr(gridded, "on_grid", lambda *given: None)
     with pytest.raises(ShotError, match="too long"):
         run(host, link(surface(box())))
 
@@ -97,17 +92,13 @@ def test_small_parts_that_hang_on_nothing_are_left_out(host, monkeypatch, size, 
         assert mesh.quality.volume == pytest.approx(8e-5, rel=1e-2) and mesh.points[:, 1].max() < 0.05
         assert any("loose parts" in text for text in mesh.quality.repairs)
     else:
-        (mesh,) = run(host, body)
-        assert any("on a grid" in text for text in mesh.quality.repairs) and mesh.points[:, 1].max() < 0.05
+        with pytest.raises(ShotError, match="do not fill"):
+            run(host, body)
 
 
 def test_parts_that_the_mesh_joins_along_an_edge_are_apart(host, monkeypatch):
     """As where it follows two walls half a millimetre apart: such a hinge doubled the frequency of a gripper's base."""
-    filling, mesh_of, joined = (
-        filling_module,
-        filling_module.tetrahedralize,
-        [],
-    )
+    filling, mesh_of, joined = filling_module, filling_module.tetrahedralize, []
 
     def with_contact(points, triangles, *rest):
         made, tets = mesh_of(points, triangles, *rest)

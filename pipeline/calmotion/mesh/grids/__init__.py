@@ -1,1 +1,1 @@
-"""Tetrahedra on a grid, for solids that TetWild does not fill."""
+"""What a grid or its points tell of a solid and of the tetrahedra that fill it."""

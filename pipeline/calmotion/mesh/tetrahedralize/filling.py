@@ -10,7 +10,6 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.mesh.element_sizes import Shape, envelope, expected_nodes, smallest_size
 from calmotion.mesh.grids.contacts import without_contacts
-from calmotion.mesh.grids.gridded import gridded
 from calmotion.mesh.repair.closed_solid import Solid, simplified
 from calmotion.mesh.surfaces.closed_surfaces import enclosed_volume
 from calmotion.mesh.surfaces.decimation import decimated
@@ -35,14 +34,11 @@ _DETAIL, _DENSE_DETAIL = 0.1, 0.5
 # walls. The boundary of the mesh is fitted to the surface afterwards.
 _TRIANGLES, _WIDER, _OF_WALL = 3_000, 4.0, 0.4
 _ATTEMPTS = 3
-# Share of the time for the first mesh: what is left is for a coarser one, or that of a grid, which is made in seconds
+# Share of the time for the first mesh: what is left is for a coarser one
 _FIRST, _FIRST_DENSE = 0.6, 0.4
 _LATE = 0.1  # share of the time after which an accepted mesh is not followed by a closer one
 _TRIANGLE = 3e-3  # processor time for a triangle of a surface with many details [s]; 2 to 3.3 ms were measured
 _COARSER = 1.6  # factor of size and envelope of a mesh that took too long
-# Largest error of the volume of a grid for a dense surface, which is reported: where it loses more, so many walls have
-# gaps that its frequencies tell nothing (a link of the G1 that lost 29% was five times too stiff)
-_COARSEST = 0.1
 INTERSECTS = "its surface intersects itself: the volume is that of all that it winds around"
 _LOOSE = 0.05  # of the volume: parts that a thin connection, which the mesh did not follow, held
 
@@ -72,9 +68,9 @@ def filled(
 ) -> FEMesh:  # fmt: skip
     """Tetrahedra of uniform size that fill a solid.
 
-    A surface with many details is simplified. A mesh that takes most of the time is replaced by one of a regular grid.
-    A mesh with an error of its volume is followed by one that is closer to the surface as long as there is time; the
-    best one counts, with its error.
+    A surface with many details is simplified. Where a mesh takes most of the time, a coarser one is made. A mesh with
+    an error of its volume is followed by one that is closer to the surface as long as there is time; the best one
+    counts, with its error.
 
     Args:
         index: Of the body in its character.
@@ -87,7 +83,7 @@ def filled(
         longer: Factor of the edge length on a surface with many details.
 
     Raises:
-        OutOfTime: It cannot be meshed in time, not even on a grid.
+        OutOfTime: It cannot be meshed in time.
         ShotError: The solid cannot be meshed, or the tetrahedra do not fill it.
     """
     refuse_too_many(shape, size, time, body.path)
@@ -103,7 +99,7 @@ def filled(
         try:
             _refuse_hopeless(attempt, body.path, time)
             points, tets = _meshed(attempt, body.path, time, _FIRST_DENSE if dense else _FIRST, use_cache)
-        except OutOfTime as reason:
+        except OutOfTime:
             if best is not None:
                 break
             made = None
@@ -113,10 +109,6 @@ def filled(
                 with suppress(OutOfTime):
                     made = _meshed(attempt, body.path, time, 0.5, use_cache)
             if made is None:
-                lost = _COARSEST if dense or time.used >= time.limit else _ACCEPTED
-                found = gridded(index, body, solid, shape, size, reason, time, lost)
-                if found is not None:
-                    return found
                 if dense:  # as hopeless
                     raise
                 made = _meshed(_coarser(solid, shape, attempt), body.path, time, 1.0, use_cache)
@@ -138,14 +130,7 @@ def filled(
             break
         size *= 0.8 if best.quality.volume_error > MAX_VOLUME_ERROR else 1.0
     assert best is not None
-    try:
-        accepted = _accepted(best, solid, volumes, body.path)
-    except ShotError as error:
-        found = gridded(index, body, solid, shape, size, error, time, _COARSEST if dense else _ACCEPTED)
-        if found is None:
-            raise
-        return found
-    return _whole(accepted, body.path, solid, distance)
+    return _whole(_accepted(best, solid, volumes, body.path), body.path, solid, distance)
 
 
 def _attempt(solid: Solid, shape: Shape, size: float, number: int, longer: float) -> _Attempt:
@@ -205,7 +190,6 @@ def _meshed(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Tetrahedra that take no more than a share of what is left of the time."""
     part = time.part(share)
-    time.triangles += len(attempt.triangles)
     # fTetWild measures distances by the diagonal of what it is given
     diagonal = _diagonal(attempt.points)
     try:

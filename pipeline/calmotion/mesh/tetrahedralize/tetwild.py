@@ -47,12 +47,10 @@ class ProcessorTime:
     Attributes:
         limit: Allowed [s].
         used: So far [s].
-        triangles: Of the surfaces that were meshed: what it takes at least, whatever the machine.
     """
 
     limit: float
     used: float = 0.0
-    triangles: int = 0
 
     def part(self, share: float) -> ProcessorTime:
         """The first part of what is left of it."""
