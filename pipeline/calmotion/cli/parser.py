@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # Commands that are named nowhere here, of plugins of others, stand in a group of their own.
 TASKS = (
     ("Prepare a shot", ("import", "rig", "motors", "materials", "inspect")),
-    ("Remove the shake", ("simulate", "optimize", "watch", "live", "excite", "calibrate", "refine")),
+    ("Remove the shake", ("diagnose", "simulate", "optimize", "watch", "live", "excite", "calibrate", "refine")),
     ("Work on a show", ("batch", "sequence", "submit")),
     ("Play it on the robot", ("export",)),
     ("Measure, extend, set up", ("demo", "bench", "plugins", "warmup", "doctor", "cache")),

@@ -25,7 +25,7 @@ REQUIRED_PLUGINS = (
 )  # fmt: skip
 
 # A benchmark of what another plugin does is told to need it, where that one is deleted.
-MEASURED = {"benchmarks": {"calibration", "live"}}
+MEASURED = {"benchmarks": {"calibration", "diagnosis", "live"}}
 
 
 def optional_plugins(folder):

@@ -46,7 +46,7 @@ BUILT_IN = {
     "plugins": BuiltIn("plugins", "list, check, disable and create plugins"),
     "demo": BuiltIn("demo", "optimise a sample, and show what comes of it"),
     "warmup": BuiltIn("warmup", "compile the kernels ahead of the first shot"),
-    "cache": BuiltIn("cache", "show, clear or prune the caches of kernels, meshes and reduced bodies"),
+    "cache": BuiltIn("cache", "show, clear or prune the caches of kernels, meshes and links"),
     "doctor": BuiltIn("doctor", "check the installation and the machine, and say what to do"),
 }
 # The bundled plugins that bring commands: whoever deletes one is told where its command went.
@@ -59,6 +59,7 @@ BROUGHT_BY: dict[str, str] = {
     "import": "robot_import",
     "calibrate": "calibration",
     "live": "live",
+    "diagnose": "diagnosis",
     "excite": "calibration",
     "refine": "calibration",
 }

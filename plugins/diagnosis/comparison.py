@@ -1,0 +1,234 @@
+"""Which causes explain the error: sets of explanations, compared by what they predict of held-out samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.recordings import ACCELEROMETER, UNITS
+
+from .explanations.base import Explanation
+from .explanations.joints import Backlash, Ripple
+from .explanations.loops import Delay, Friction, ServoGains
+from .explanations.stream import Stream
+from .explanations.structure import Base, Links
+from .fitting import Fit, fit, independent, score
+from .situation import Situation
+
+NONE, UNKNOWN = "none", "unknown"
+
+
+def explanations() -> tuple[Explanation, ...]:
+    """All that are known."""
+    return Links(), ServoGains(), Backlash(), Friction(), Stream(), Delay(), Base(), Ripple()
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One cause of the error.
+
+    Attributes:
+        cause: `none`, `links`, `servo_gains`, `backlash`, `friction`, `stream`, `delay`, `base`, `ripple`, `unknown`.
+        share: Of the error's energy, 0 to 1; shares of all causes add up to 1.
+        confidence: Probability that it acts and is the largest, or for others that it acts.
+        remedy: What to do.
+        parameters: `name`, `path`, `value`, `unit` of what was fitted.
+    """
+
+    cause: str
+    share: float
+    confidence: float
+    remedy: str
+    parameters: tuple[Mapping[str, Any], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What explains an error, the largest share first.
+
+    Attributes:
+        causes: The causes.
+        tells: What further measurement would tell the first two apart.
+        channels: `name`, `unit`, `error_rms`, `noise`, `unexplained_rms` of each.
+        fit: The explanations as they were fitted; None where there is nothing to explain.
+        situation: What was commanded and recorded.
+    """
+
+    causes: tuple[Cause, ...]
+    tells: str
+    channels: tuple[Mapping[str, Any], ...]
+    fit: Fit | None
+    situation: Situation
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was noticed."""
+        return self.situation.notes
+
+
+class Comparison:
+    """Fits sets of explanations and weighs them.
+
+    Attributes:
+        TEMPERATURE: By which differences of scores are divided: models are not exact, so that a likelihood exaggerates.
+    """
+
+    TEMPERATURE = 6.0
+    PAIRED = 5  # so many of the best single explanations are tried together with the best one
+    LEAST_SHARE = 0.03  # of the error's energy, of a cause that is reported
+    QUIET, SMALL = 1.6, 3.0  # times the noise, of an error that is none, and of one that is none if nothing explains it
+    WORTH = 3.0  # by which a score has to improve for one more explanation
+
+    def __init__(self, situation: Situation, progress: Callable[[float], None] | None = None):
+        self._situation, self._progress = situation, progress
+        self._able = {e.cause: e for e in explanations() if e.applies(situation)}
+        self._fits: dict[frozenset[str], Fit] = {}
+
+    def diagnosis(self) -> Diagnosis:
+        """The causes."""
+        s = self._situation
+        nothing = Fit({}, s.error, 0, score(s, s.error, 0))
+        if self._is_quiet(self.QUIET):
+            quiet = Cause(NONE, 1.0, 0.95, "nothing: the robot does what a healthy one does, within the noise")
+            return Diagnosis((quiet,), "", self._channels(nothing), None, s)
+        self._fits[frozenset()] = nothing
+        for k, cause in enumerate(self._able):
+            self._fit(cause)
+            if self._progress is not None:
+                self._progress(0.6 * (k + 1) / len(self._able))
+        singles = sorted(self._able, key=lambda cause: self._fits[frozenset([cause])].score)
+        for cause in singles[1 : self.PAIRED]:
+            self._fit(singles[0], cause)
+        best = self._best()
+        for cause in singles[: self.PAIRED]:
+            if len(best.causes) == 2 and cause not in best.causes:
+                self._fit(*best.causes, cause)
+        if self._progress is not None:
+            self._progress(1.0)
+        return self._concluded()
+
+    def _fit(self, *causes: str) -> Fit:
+        key = frozenset(causes)
+        if key not in self._fits:
+            ordered = [e for cause, e in self._able.items() if cause in key]
+            alone = {c: self._fits[frozenset([c])].effects[c] for c in causes if frozenset([c]) in self._fits}
+            self._fits[key] = fit(self._situation, ordered, alone)
+        return self._fits[key]
+
+    def _best(self) -> Fit:
+        """The fit of the best score; a larger one has to be better by more than chance."""
+        return min(self._fits.values(), key=lambda f: f.score + self.WORTH * len(f.causes))
+
+    def _concluded(self) -> Diagnosis:
+        best = self._best()
+        if not best.causes and self._is_quiet(self.SMALL):
+            quiet = Cause(NONE, 1.0, 0.7, "nothing: what is left is a little more than noise, and no cause explains it")
+            return Diagnosis((quiet,), "", self._channels(best), None, self._situation)
+        shares = self._shares(best)
+        unexplained = max(0.0, 1.0 - sum(shares.values()))
+        chances = self._chances()
+        order = sorted(shares, key=lambda cause: -shares[cause])
+        causes = []
+        for place, cause in enumerate(order):
+            if shares[cause] < self.LEAST_SHARE:
+                continue
+            effect = best.effects[cause]
+            sure = chances[0 if place == 0 else 1].get(cause, 0.0) * min(1.0, (1.0 - unexplained) / 0.7)
+            told = self._able[cause].remedy(self._situation, effect.parameters) if effect.parameters else ""
+            causes.append(Cause(cause, shares[cause], sure, told, effect.parameters))
+        unexplained = 1.0 - sum(cause.share for cause in causes)
+        if unexplained >= self.LEAST_SHARE:
+            causes.append(Cause(UNKNOWN, unexplained, 1.0, self._advice()))
+        causes.sort(key=lambda cause: -cause.share)
+        return Diagnosis(tuple(causes), self._tells(best), self._channels(best), best, self._situation)
+
+    def _is_quiet(self, times: float) -> bool:
+        """Whether the error of each sensor is below so many times its noise."""
+        s = self._situation
+        rows = [np.concatenate([s.error[s.blocks[b]] for b in own]) for own in s.blocks_of]
+        return all(float(np.sqrt(np.mean(row**2))) < times for row in rows)
+
+    def _importance(self) -> Array:
+        """Weight of each block in shares: the part of its error that is not noise, each sensor with its largest."""
+        s = self._situation
+        power = np.array([float(np.mean(s.error[block] ** 2)) for block in s.blocks])
+        out = np.zeros(len(power))
+        for own in s.blocks_of:
+            total = power[own].sum()
+            above = max(0.0, 1.0 - len(own) * self.QUIET**2 / max(total, 1e-12))
+            out[own] = above * power[own] / max(total, 1e-12)
+        return np.asarray(out / max(out.sum(), 1e-12))
+
+    def _shares(self, best: Fit) -> dict[str, float]:
+        """Share of each cause in the energy of the error, averaged over the sensors that show one."""
+        s, found = self._situation, dict.fromkeys(best.causes, 0.0)
+        for weight, block in zip(self._importance(), s.blocks, strict=True):
+            error = s.error[block]
+            energy = float(error @ error)
+            if not weight or not energy:
+                continue
+            explained = max(0.0, 1.0 - float(best.left[block] @ best.left[block]) / energy)
+            parts = {c: max(0.0, float(e.vector[block] @ error) / energy) for c, e in best.effects.items()}
+            total = sum(parts.values())
+            for cause, part in parts.items():
+                found[cause] += weight * explained * part / total if total else 0.0
+        return found
+
+    def _chances(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Chance of each cause to be the largest, and to act, over all fits."""
+        fits = list(self._fits.values())
+        scores = np.array([f.score + self.WORTH * len(f.causes) for f in fits])
+        weights = np.exp(-(scores - scores.min()) / self.TEMPERATURE)
+        weights /= weights.sum()
+        first, acts = dict.fromkeys(self._able, 0.0), dict.fromkeys(self._able, 0.0)
+        for f, weight in zip(fits, weights, strict=True):
+            if not f.causes or weight < 1e-6:
+                continue
+            shares = self._shares(f)
+            first[max(shares, key=lambda cause: shares[cause])] += weight
+            for cause, share in shares.items():
+                acts[cause] += weight * (share >= self.LEAST_SHARE)
+        return first, acts
+
+    def _tells(self, best: Fit) -> str:
+        """The measurement that separates the first cause from the next best one."""
+        first = self._chances()[0]
+        order = sorted(first, key=lambda cause: -first[cause])
+        shares = self._shares(best)
+        top = max(shares, key=lambda cause: shares[cause]) if shares else (order[0] if order else "")
+        other = next((cause for cause in order if cause != top), "")
+        if not top or not other:
+            return ""
+        return f"to tell {self._able[top].label} from {self._able[other].label}: {self._able[top].tells}"
+
+    def _advice(self) -> str:
+        s = self._situation
+        if s.mechanics is None:
+            return "name the shot of the robot: its inertias and modes tell joints, links and base apart"
+        if not s.encoders:
+            return "record the joints' encoders too: they tell what joints do from what the structure does"
+        return "no explanation fits: record the hand with an accelerometer, and the same motion at half of its speed"
+
+    def _channels(self, best: Fit) -> tuple[dict[str, Any], ...]:
+        s, rows = self._situation, []
+        for sensor, noise, weight, own in zip(s.sensors, s.noises, s.weights, s.blocks_of, strict=True):
+            error, left = (
+                float(np.sqrt(np.mean(np.concatenate([v[s.blocks[b]] for b in own]) ** 2))) / weight
+                for v in (s.error, best.left)
+            )
+            unit = "m/s" if sensor.kind == ACCELEROMETER else UNITS[sensor.kind]  # accelerations are integrated
+            rows.append(
+                {"name": sensor.name, "unit": unit, "error_rms": error, "noise": noise, "unexplained_rms": left}
+            )
+        return tuple(rows)
+
+
+def diagnosis_of(situation: Situation, progress: Callable[[float], None] | None = None) -> Diagnosis:
+    """What explains the error of a situation."""
+    return Comparison(situation, progress).diagnosis()
+
+
+__all__ = ["Cause", "Comparison", "Diagnosis", "diagnosis_of", "independent"]

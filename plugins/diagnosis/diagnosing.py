@@ -1,0 +1,114 @@
+"""Diagnose a recording: the command as a function."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from calmotion.host import open_host
+from calmotion.model import RunSettings, Source
+from calmotion.recordings import measured_prims, read_recordings
+from calmotion.tolerance import compiled_in
+from calmotion.version import __version__
+from calmotion.workflow import Given, Hooks, Path, Progress, Shot, compiled_run, plain, read_settings, with_shot
+
+from .comparison import Diagnosis, diagnosis_of
+from .opening import situation_of
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosedShot:
+    """What a recording shows.
+
+    Attributes:
+        diagnosis: The causes, and what they are found from.
+        figures: Paths of the figures.
+        total_wall_s: Time of all of it [s].
+    """
+
+    diagnosis: Diagnosis
+    figures: tuple[str, ...]
+    total_wall_s: float
+
+    def draw(self, folder: Path) -> tuple[str, ...]:
+        """Draw motion and error in time, spectra, and the error over speed and torque; returns the paths.
+
+        Raises:
+            ShotError: They cannot be written.
+        """
+        from .drawing import draw_diagnosis
+
+        return tuple(draw_diagnosis(os.fspath(folder), self.diagnosis))
+
+    def report(self) -> dict[str, Any]:
+        """The object that `--json` prints."""
+        found = self.diagnosis
+        report: dict[str, Any] = plain(
+            {
+                "command": "diagnose",
+                "version": __version__,
+                "causes": [vars(cause) for cause in found.causes],
+                "tells": found.tells,
+                "channels": found.channels,
+                "model": found.situation.known,
+                "notes": found.notes,
+                "figures": self.figures,
+                "total_wall_s": self.total_wall_s,
+            }
+        )
+        return report
+
+
+# parameters: one for each option of the command, all but the shot and the recordings by keyword
+def diagnose(
+    shot: Shot | Path | None,
+    recordings: Sequence[Path] | Path,
+    *,
+    commands: Path | None = None,
+    figures: Path | None = None,
+    settings: Given = None,
+    progress: Callable[[Progress], None] | None = None,
+    on_operator: Callable[[Any], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+) -> DiagnosedShot:
+    """Say what makes a robot shake, from recordings of one performance.
+
+    Args:
+        shot: The robot with the motion that it was to perform, or its USD file; None: only signals are known.
+        recordings: Files, each as FILE or FILE@/PRIM; their clocks begin with the first frame, or with `commands`.
+        commands: File with the commands as they were sent, `<joint path>.angle`, on the clock of the recordings.
+        figures: Folder for figures.
+        settings, progress, on_operator, cancel: As of `simulate`.
+
+    Raises:
+        ShotError: The shot cannot be processed, or a recording does not fit it.
+        SettingError: An argument does not fit.
+    """
+    begin = time.perf_counter()
+    chosen, hooks = read_settings(settings), Hooks(progress, on_operator, cancel)
+    files = [recordings] if isinstance(recordings, (str, os.PathLike)) else recordings
+    if shot is not None:
+        shot = shot.unread() if isinstance(shot, Shot) else Shot(with_shot(os.fspath(shot)))
+    host = open_host([]) if shot is None else shot.host
+    read = read_recordings(host, [os.fspath(file) for file in files], chosen)
+    sent = None if commands is None else read_recordings(host, [os.fspath(commands)], chosen)[0]
+    compiled = None
+    if shot is not None:
+        source = Source("", "", RunSettings(), measured=measured_prims(read))
+        compiled = compiled_in(compiled_run(shot, source, chosen, hooks).run.get)
+    situation = situation_of(compiled, read, sent)
+
+    def tell(fraction: float) -> None:
+        if cancel is not None and cancel():
+            from calmotion.workflow import Cancelled
+
+            raise Cancelled("the diagnosis was cancelled")
+        if progress is not None:
+            progress(Progress("Compare explanations", fraction, ""))
+
+    made = DiagnosedShot(diagnosis_of(situation, tell), (), 0.0)
+    drawn = () if figures is None else made.draw(figures)
+    return DiagnosedShot(made.diagnosis, drawn, time.perf_counter() - begin)

@@ -1,0 +1,129 @@
+"""`calmotion diagnose`: encoders and commands alone, and a shot."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from one_hinge import HINGE, ONE_HINGE, TIP
+from scipy.interpolate import CubicSpline
+
+COUNT = 2.0 * np.pi / 4096
+TICKS = np.arange(0.0, 8.0, 0.01)
+JOINTS = ("/Arm/shoulder", "/Arm/elbow")
+
+
+def moved(rng):
+    """Quick moves of two joints between poses, with rests."""
+    pose, parts, start = np.zeros(2), [], 0.3
+    while start < 7.0:
+        goal, length = rng.uniform(-1.0, 1.0, 2), rng.uniform(0.4, 0.8)
+        parts.append((start, length, goal - pose))
+        pose, start = goal, start + length + rng.choice([0.0, 0.5])
+
+    def command(times):
+        out = np.zeros((len(times), 2))
+        for begin, length, turn in parts:
+            s = np.clip((np.asarray(times) - begin) / length, 0.0, 1.0)
+            out += np.outer(s**3 * (10.0 - 15.0 * s + 6.0 * s * s), turn)
+        return out
+
+    return command
+
+
+def loop(command, frequency, damping):
+    """A loop in steps of 0.1 ms, which is no code of the plugin."""
+    h, omega = 1e-4, 2.0 * np.pi * frequency
+    times = np.arange(0.0, 8.0, h)
+    asked = command(times)
+    y, v, out = asked[0].copy(), np.zeros(2), np.zeros_like(asked)
+    for n, goal in enumerate(asked):
+        v += h * (omega**2 * (goal - y) - 2.0 * damping * omega * v)
+        y = y + h * v
+        out[n] = y
+    return lambda t: np.stack([np.interp(t, times, column) for column in out.T], axis=1)
+
+
+def written(path, times, values):
+    head = ",".join(["time_s", *(f"{joint}.angle" for joint in JOINTS)])
+    np.savetxt(path, np.column_stack([times, values]), delimiter=",", header=head, comments="")
+    return path
+
+
+@pytest.fixture
+def motion():
+    return moved(np.random.default_rng(5))
+
+
+def diagnosed(calmotion, folder, sent, encoders, times=TICKS, *options):
+    commands = written(folder / "sent.csv", times, sent)
+    recording = written(folder / "take.csv", TICKS, COUNT * np.round(encoders / COUNT))
+    done = calmotion("diagnose", "--recording", recording, "--commands", commands, "--json", *options)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize(
+    "cause, real",
+    [
+        ("none", lambda c: loop(c, 15.0, 0.8)(TICKS)),
+        ("servo_gains", lambda c: loop(c, 5.0, 0.12)(TICKS)),
+        ("delay", lambda c: loop(lambda t: c(np.maximum(t - 0.15, 0.0)), 15.0, 0.8)(TICKS)),
+        ("stream", lambda c: loop(lambda t: c(np.floor(t * 15.0) / 15.0), 15.0, 0.8)(TICKS)),
+    ],
+)
+def test_signals_alone_tell_what_a_loop_and_a_stream_do(calmotion, tmp_path, motion, cause, real):
+    report = diagnosed(calmotion, tmp_path, motion(TICKS), real(motion))
+    first = report["causes"][0]
+    assert first["cause"] == cause and first["share"] > 0.6
+    assert not report["model"]
+    assert sum(row["share"] for row in report["causes"]) == pytest.approx(1.0, abs=0.03)
+    values = {row["name"]: row["value"] for row in first["parameters"]}
+    if cause == "servo_gains":
+        assert values["frequency"] == pytest.approx(5.0, rel=0.05) and values["damping"] == pytest.approx(
+            0.12, abs=0.05
+        )
+    if cause == "stream":
+        assert values["rate"] == pytest.approx(15.0, rel=0.01)
+
+
+def test_gaps_in_a_log_of_commands_are_the_stream(calmotion, tmp_path, motion):
+    there = np.ones(len(TICKS), bool)
+    for start in (130, 260, 410, 555, 640):
+        there[start : start + 12] = False
+    held = np.maximum.accumulate(np.where(there, np.arange(len(TICKS)), 0))
+    real = loop(lambda t: motion(TICKS[held[np.minimum((t * 100.0).astype(int), len(held) - 1)]]), 15.0, 0.8)
+    report = diagnosed(calmotion, tmp_path, motion(TICKS[there]), real(TICKS), TICKS[there])
+    assert report["causes"][0]["cause"] == "stream" and report["causes"][0]["confidence"] > 0.8
+
+
+def test_the_answer_comes_first_and_figures_are_written(calmotion, tmp_path, motion):
+    commands = written(tmp_path / "sent.csv", TICKS, motion(TICKS))
+    recording = written(tmp_path / "take.csv", TICKS, loop(motion, 5.0, 0.12)(TICKS))
+    options = ("--recording", recording, "--commands", commands, "--figures", tmp_path / "figures")
+    done = calmotion("diagnose", *options)
+    assert done.returncode == 0, done.stderr
+    lines = " ".join(done.stdout.split("\n")[:6])
+    assert lines.startswith("A servo loop explains") and "velocity gain" in lines and "A measurement to tell" in lines
+    assert {file.name for file in (tmp_path / "figures").iterdir()} == {
+        "motion.png", "spectra.png", "speed_and_torque.png"
+    }  # fmt: skip
+
+
+def test_a_shot_knows_its_command_and_refuses_what_it_does_not_have(calmotion, tmp_path):
+    shot = tmp_path / "robot.usda"
+    shot.write_text(ONE_HINGE)
+    times = np.arange(0.0, 1.3, 0.005)
+    frames = np.radians([0.0, 10.0, 30.0, 20.0, 0.0])
+    turn = CubicSpline(np.arange(5) * 0.25, frames)(np.clip(times, 0.0, 1.0))
+    table = np.column_stack([times, COUNT * np.round(turn / COUNT)])
+    file = tmp_path / "take.csv"
+    np.savetxt(file, table, delimiter=",", header=f"time_s,{HINGE}.angle", comments="")
+    done = calmotion("diagnose", shot, "--recording", file, "--json")
+    assert done.returncode == 0, done.stderr
+    assert [row["cause"] for row in json.loads(done.stdout)["causes"]] == ["none"]
+    np.savetxt(file, table, delimiter=",", header="time_s,/Robot/Knee.angle", comments="")
+    done = calmotion("diagnose", shot, "--recording", file)
+    assert done.returncode != 0 and "/Robot/Knee" in done.stderr and HINGE in done.stderr
+    assert TIP
