@@ -45,6 +45,7 @@ def _entry(text: str, motion: BvhMotion) -> Entry:
     if not match:
         raise _wrong("this is not an entry of a mapping", text, "Write it like RightArm.Zrotation=shoulder*-1+90deg")
     channel, motor = match["channel"], match["motor"]
+    channel = next((name for name in motion.channels if name.replace(" ", "") == channel), channel)
     if channel not in motion.channels:
         known = ", ".join(motion.channels)
         raise _wrong(

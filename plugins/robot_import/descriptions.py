@@ -12,7 +12,7 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.support import nearest, refuse_lfs_pointers, refuse_special, remedy_for
 
 from .attributes import Element, judged
-from .mjcf import elements, locks, parts
+from .mjcf import elements, locks, parts, refuse_missing_meshes
 from .repairs import (
     PACKAGE,
     faults,
@@ -70,8 +70,11 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
     """
     root, prefixes = _root(path)
     if root.tag == "mujoco":
-        listed = elements(parts(root, path, lambda file: _root(file)[0]))
-        return Description(path, MJCF, unread=judged(MJCF, listed), locks=locks(listed))
+        files = parts(root, path, lambda file: _root(file)[0])
+        listed = elements(files)
+        unread = judged(MJCF, listed)
+        refuse_missing_meshes(files)
+        return Description(path, MJCF, unread=unread, locks=locks(listed))
     if root.tag != "robot":
         raise ShotError(
             "this is neither a URDF nor an MJCF robot", path=path, found=f"<{root.tag}>",

@@ -15,6 +15,7 @@ from .attributes import Element
 _JOINTS = ("joint", "freejoint")
 _INNER = ("body", "frame", "replicate")  # what contains bodies
 _FOLDERS = ("meshdir", "texturedir", "assetdir")
+_SHOWN = 4  # missing files in a message
 _MAIN = "main"  # the default class of what names none
 _ACTUATOR = "general"
 _ACTUATORS = (
@@ -75,6 +76,34 @@ def _parts(
                 if node.tag in ("include", "model") and os.path.isfile(file) and file not in seen:
                     yield from _parts(parse(file), file, parse, seen | {file}, folders)
     refuse_lfs_pointers(files, path=path, attribute="file")
+
+
+def refuse_missing_meshes(found: Sequence[Part]) -> None:
+    """Refuse meshes whose files are in none of the folders that a robot names.
+
+    Raises:
+        ShotError: With the files.
+    """
+    compilers = [(part, node) for part in found for node in part.root.iter("compiler")]
+    bare = any(node.get("strippath") == "true" for _, node in compilers)
+    named = [node.get(name, "") for _, node in compilers for name in _FOLDERS]
+    homes = dict.fromkeys(os.path.dirname(os.path.abspath(part.path)) for part in found)
+    folders = [os.path.join(home, folder) for home in homes for folder in ("", *named)]
+    files = {
+        os.path.basename(file) if bare else file: part
+        for part in found
+        for node in part.root.iter("mesh")
+        if (file := node.get("file"))
+    }
+    lost = [file for file in files if not any(os.path.exists(os.path.join(folder, file)) for folder in folders)]
+    if lost:
+        more = f"; {len(lost) - _SHOWN} more" if len(lost) > _SHOWN else ""
+        raise ShotError(
+            "meshes of the robot are missing", path=files[lost[0]].path, attribute="mesh.file",
+            found="; ".join(lost[:_SHOWN]) + more,
+            remedy=f"Put the files into {next(filter(None, named), 'the folder of the robot')}, or correct meshdir of "
+            "<compiler>",
+        )  # fmt: skip
 
 
 def elements(found: Sequence[Part]) -> list[Element]:

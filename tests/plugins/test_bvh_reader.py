@@ -53,6 +53,14 @@ def read(repository):
     return run
 
 
+def test_bones_with_spaces_and_dots_are_named_as_in_the_file(read, tmp_path):
+    path = bvh(tmp_path / "a.bvh")
+    path.write_text(path.read_text().replace("JOINT Arm", "JOINT Upper Arm.L"))
+    for name in ("Upper Arm.L", "UpperArm.L"):
+        found = read(path, map=f"{name}.Zrotation=shoulder*2")
+        assert found.values["shoulder"] == pytest.approx(2.0 * np.radians(20.0 * np.sin(TIMES)), abs=1e-9)
+
+
 @pytest.mark.parametrize("frame_time", ["0.0417", "0.041667", "0.0416667", "0.04166667"])
 def test_a_rounded_frame_time_loses_no_row(read, tmp_path, repository, frame_time):
     path = bvh(tmp_path / "a.bvh")

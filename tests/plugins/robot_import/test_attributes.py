@@ -34,6 +34,7 @@ def arm(joint="", extra="", kind="revolute"):
 def read(tmp_path):
     def run(text, name="robot.xml"):
         (tmp_path / "robot.xml").write_text(text)
+        (tmp_path / "m.stl").touch()
         return read_description(str(tmp_path / name), {})
 
     return run

@@ -136,6 +136,8 @@ CASES = {
                                 "a geom with a mass", mjcf('size="0.2 0.01 0.01"', 'size="0.2 0.01 0.01" mass="1"')),
     "a mesh that is moved": Case(MESHED.format('refpos="0 0 1"'), "wrong side", "remove the attribute",
                                  MESHED.format(""), prepare=lambda f, done: mesh_file(f, True)),
+    "a missing mesh of MuJoCo": Case(MESHED.format(""), "meshes of the robot are missing", "Put the files into",
+                                     MESHED.format(""), prepare=mesh_file),
     "a controller of MuJoCo": Case(tail(PID), "does not know", "as <position>, with its kp, and kd as kv",
                                    tail(PID.replace("pid", "position").replace("kd", "kv"))),
     "a joint that the table misspells": Case(URDF, "no joint", "Did you mean lift",
