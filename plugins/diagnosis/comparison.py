@@ -16,6 +16,8 @@ from .explanations.loops import Delay, Friction, ServoGains
 from .explanations.stream import Stream
 from .explanations.structure import Base, Links
 from .fitting import Fit, fit, independent, score
+from .formats import read_spectrum
+from .ringing import peaks, ringing
 from .situation import Situation
 
 NONE, UNKNOWN = "none", "unknown"
@@ -54,19 +56,19 @@ class Diagnosis:
         tells: What further measurement would tell the first two apart.
         channels: `name`, `unit`, `error_rms`, `noise`, `unexplained_rms` of each.
         fit: The explanations as they were fitted; None where there is nothing to explain.
-        situation: What was commanded and recorded.
+        situation: What was commanded and recorded; None of a spectrum.
     """
 
     causes: tuple[Cause, ...]
     tells: str
     channels: tuple[Mapping[str, Any], ...]
     fit: Fit | None
-    situation: Situation
+    situation: Situation | None
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What was noticed."""
-        return self.situation.notes
+        return () if self.situation is None else self.situation.notes
 
 
 class Comparison:
@@ -80,11 +82,13 @@ class Comparison:
     PAIRED = 5  # so many of the best single explanations are tried together with the best one
     LEAST_SHARE = 0.03  # of the error's energy, of a cause that is reported
     QUIET, SMALL = 1.6, 3.0  # times the noise, of an error that is none, and of one that is none if nothing explains it
+    MOSTLY = 0.7  # share that is not explained, from which on the cause is unknown
     WORTH = 3.0  # by which a score has to improve for one more explanation
 
     def __init__(self, situation: Situation, progress: Callable[[float], None] | None = None):
         self._situation, self._progress = situation, progress
-        self._able = {e.cause: e for e in explanations() if e.applies(situation)}
+        comparable = bool(situation.joints) and any(s.index >= 0 for s in situation.sensors)
+        self._able = {e.cause: e for e in explanations() if comparable and e.applies(situation)}
         self._fits: dict[frozenset[str], Fit] = {}
 
     def diagnosis(self) -> Diagnosis:
@@ -100,7 +104,7 @@ class Comparison:
             if self._progress is not None:
                 self._progress(0.6 * (k + 1) / len(self._able))
         singles = sorted(self._able, key=lambda cause: self._fits[frozenset([cause])].score)
-        for cause in singles[1 : self.PAIRED]:
+        for cause in singles[1 : self.PAIRED] if singles else ():
             self._fit(singles[0], cause)
         best = self._best()
         for cause in singles[: self.PAIRED]:
@@ -141,8 +145,9 @@ class Comparison:
             causes.append(Cause(cause, shares[cause], sure, told, effect.parameters))
         unexplained = 1.0 - sum(cause.share for cause in causes)
         if unexplained >= self.LEAST_SHARE:
-            causes.append(Cause(UNKNOWN, unexplained, 1.0, self._advice()))
-        causes.sort(key=lambda cause: -cause.share)
+            rest = Cause(UNKNOWN, unexplained, 1.0, self._advice(), ringing(self._situation, best.left))
+            # a cause that is found stands before what is not explained, unless that is nearly all
+            causes.insert(len(causes) if unexplained < self.MOSTLY else 0, rest)
         return Diagnosis(tuple(causes), self._tells(best), self._channels(best), best, self._situation)
 
     def _is_quiet(self, times: float) -> bool:
@@ -224,6 +229,17 @@ class Comparison:
                 {"name": sensor.name, "unit": unit, "error_rms": error, "noise": noise, "unexplained_rms": left}
             )
         return tuple(rows)
+
+
+def of_spectrum(file: str) -> Diagnosis:
+    """What a table of resonances alone says: where it rings.
+
+    Raises:
+        ShotError: It cannot be read.
+    """
+    rows = tuple(peaks(*read_spectrum(file), path=""))
+    told = "record encoders and an accelerometer during a motion, and name the robot's shot: a spectrum has no cause"
+    return Diagnosis((Cause(UNKNOWN, 1.0, 1.0, told, rows),), "", (), None, None)
 
 
 def diagnosis_of(situation: Situation, progress: Callable[[float], None] | None = None) -> Diagnosis:

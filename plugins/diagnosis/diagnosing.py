@@ -15,7 +15,8 @@ from calmotion.tolerance import compiled_in
 from calmotion.version import __version__
 from calmotion.workflow import Given, Hooks, Path, Progress, Shot, compiled_run, plain, read_settings, with_shot
 
-from .comparison import Diagnosis, diagnosis_of
+from .comparison import Diagnosis, diagnosis_of, of_spectrum
+from .formats import is_dataset, is_spectrum, read_dataset
 from .opening import situation_of
 
 
@@ -53,7 +54,7 @@ class DiagnosedShot:
                 "causes": [vars(cause) for cause in found.causes],
                 "tells": found.tells,
                 "channels": found.channels,
-                "model": found.situation.known,
+                "model": found.situation is not None and found.situation.known,
                 "notes": found.notes,
                 "figures": self.figures,
                 "total_wall_s": self.total_wall_s,
@@ -93,8 +94,15 @@ def diagnose(
     if shot is not None:
         shot = shot.unread() if isinstance(shot, Shot) else Shot(with_shot(os.fspath(shot)))
     host = open_host([]) if shot is None else shot.host
-    read = read_recordings(host, [os.fspath(file) for file in files], chosen)
+    names = [os.fspath(file) for file in files]
+    if len(names) == 1 and is_spectrum(names[0]):
+        return DiagnosedShot(of_spectrum(names[0]), (), time.perf_counter() - begin)
     sent = None if commands is None else read_recordings(host, [os.fspath(commands)], chosen)[0]
+    if len(names) == 1 and is_dataset(names[0]):
+        moved, asked = read_dataset(names[0])
+        read, sent = [moved], sent or asked
+    else:
+        read = [*read_recordings(host, names, chosen)]
     compiled = None
     if shot is not None:
         source = Source("", "", RunSettings(), measured=measured_prims(read))

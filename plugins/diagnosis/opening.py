@@ -23,6 +23,7 @@ STEP, COARSE = 1e-3, 4  # of the grid [s], and of the mechanics in steps of the 
 LONGEST = 30.0  # part of a recording that is diagnosed [s]
 LEAST_SAMPLES = 50
 SHIFTED = 0.3  # from which on the clocks of command and recording are taken to differ [s]
+CLEAR = 0.03  # largest mean square of what then is left, of the variance of the command
 SAME = 0.15  # difference of what was sent from the shot, of the range of its motion, up to which it is the same motion
 
 
@@ -239,7 +240,9 @@ def _on_one_clock(sensors: tuple[Sensor, ...], times: Array, command: Array, not
         asked = np.interp(grid, times, command[:, sensor.index])
         lags = np.arange(-300, 301)
         cost = [_difference(measured, asked, int(lag)) for lag in lags]
-        shifts.append(0.01 * float(lags[int(np.argmin(cost))]))
+        # a robot that follows badly seems to be early or late, too
+        clear = min(cost) < min(CLEAR * float(np.var(asked)), 0.25 * cost[len(lags) // 2])
+        shifts.append(0.01 * float(lags[int(np.argmin(cost))]) if clear else 0.0)
     shift = float(np.median(shifts)) if shifts else 0.0
     if abs(shift) < SHIFTED:
         return sensors

@@ -63,5 +63,8 @@ def _sent(arm: FaultyArm, rng: np.random.Generator):  # type: ignore[no-untyped-
     command, size = played(arm), arm.faults.get("ripple", 0.0)
     rippled, waves = int(rng.integers(0, 3)), int(rng.integers(14, 50))
     command = command.copy()
-    command[:, rippled] += size * np.sin(waves * arm.command[:, rippled])
+    gain, damping = arm.gains
+    # teeth are where the joint is, which lags behind its command
+    late = arm.times - damping[rippled] / gain[rippled]
+    command[:, rippled] += size * np.sin(waves * np.interp(late, arm.times, arm.command[:, rippled]))
     return command

@@ -147,7 +147,7 @@ class Ripple(AddedExplanation):
         rate = max(1.0 / float(np.median(np.diff(s.times))) for s in situation.sensors)
         most = min(self.MOST, self.FASTEST * min(rate, 250.0) * 2.0 * np.pi / max(fastest, 1e-9))
         step = 2.0 / turned
-        lowest = max(3.0, 8.0 * np.pi / turned)
+        lowest = max(8.0, 4.0 * np.pi / turned)  # two waves at least: less of one could be anything
         return list(np.arange(lowest, most, step))[:90]
 
     def _waves(self, situation: Situation, motion: Array, m: int, n: float) -> tuple[Columns, Array]:

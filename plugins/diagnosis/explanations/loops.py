@@ -28,6 +28,15 @@ def _with_frequency(situation: Situation, drive: Drive, motor: int, frequency: f
     return drive.with_joint(motor, {"gain": gain, "damping": damping * situation.joints[motor].critical(gain)})
 
 
+def _guessed_anew(situation: Situation, drive: Drive, motor: int, values: Values) -> Drive:
+    """A healthy loop of another frequency, where the gain is a guess."""
+    if "frequency" not in values:
+        return drive
+    gain, before = (TURN * values["frequency"]) ** 2 * situation.joints[motor].middle, drive.gain[motor]
+    ratio = drive.damping[motor] / situation.joints[motor].critical(before) if np.isfinite(before) else HEALTHY
+    return drive.with_joint(motor, {"gain": gain, "damping": ratio * situation.joints[motor].critical(gain)})
+
+
 class ServoGains(LoopExplanation):
     """A loop that rings, or is softer than the shot says."""
 
@@ -78,12 +87,11 @@ class Friction(LoopExplanation):
         joint = situation.joints[motor]
         lost = Parameter("lost_motion", "rad", (0.01, 0.03), 1e-5, 0.5, np.inf, True)
         excess = Parameter("excess_at_rest", "", (0.3,), 0.0, 2.0, 0.5)
-        return (lost, excess) if joint.gain else (lost, excess, _frequency(situation, motor))
+        return (lost, excess) if joint.gain and not joint.guessed else (lost, excess, _frequency(situation, motor))
 
     def changed(self, situation: Situation, drive: Drive, motor: int, values: Values) -> Drive:
         """With friction."""
-        if not np.isfinite(drive.gain[motor]):
-            drive = _with_frequency(situation, drive, motor, values["frequency"], HEALTHY)
+        drive = _guessed_anew(situation, drive, motor, values)
         return drive.with_joint(
             motor, {"friction": values["lost_motion"] * drive.gain[motor], "excess": values["excess_at_rest"]}
         )
@@ -106,15 +114,17 @@ class Delay(LoopExplanation):
 
     def parameters(self, situation: Situation, motor: int) -> tuple[Parameter, ...]:
         """The delay."""
-        return (Parameter("delay", "s", (max(situation.joints[motor].delay, 0.03),), -0.05, 0.5),)
+        joint = situation.joints[motor]
+        late = Parameter("delay", "s", (max(joint.delay, 0.03), 0.03, 0.08), -0.05, 0.5)
+        return (late, _frequency(situation, motor)) if joint.guessed else (late,)
 
     def changed(self, situation: Situation, drive: Drive, motor: int, values: Values) -> Drive:
         """With a delay."""
-        return drive.with_joint(motor, {"delay": values["delay"]})
+        return _guessed_anew(situation, drive, motor, values).with_joint(motor, {"delay": values["delay"]})
 
     def remedy(self, situation: Situation, parameters: Sequence[Mapping[str, Any]]) -> str:
         """Send commands earlier."""
-        late = float(np.median([row["value"] for row in parameters]))
+        late = float(np.median([row["value"] for row in parameters if row["name"] == "delay"]))
         return (
             f"the robot moves {1e3 * late:.0f} ms after its command: send commands that much earlier (set "
             "calm:motor:delay, so that calmotion optimize does it), or shorten buffers of the bus and the driver"

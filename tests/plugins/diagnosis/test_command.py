@@ -127,3 +127,48 @@ def test_a_shot_knows_its_command_and_refuses_what_it_does_not_have(calmotion, t
     done = calmotion("diagnose", shot, "--recording", file)
     assert done.returncode != 0 and "/Robot/Knee" in done.stderr and HINGE in done.stderr
     assert TIP
+
+
+def test_a_dataset_of_lerobot_has_commands_and_motion(calmotion, tmp_path, motion):
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    times = np.arange(0.0, 8.0, 1.0 / 30.0)
+    asked, real = np.degrees(motion(times)), np.degrees(loop(motion, 4.0, 0.1)(times))
+    columns = {"action": list(asked), "observation.state": list(real), "timestamp": times, "episode_index": 0 * times}
+    for folder in ("data", "meta"):
+        (tmp_path / folder).mkdir()
+    parquet.write_table(pyarrow.table(columns), tmp_path / "data" / "file.parquet")
+    names = ["shoulder_pan.pos", "elbow_flex.pos"]
+    (tmp_path / "meta" / "info.json").write_text(json.dumps({"features": {"observation.state": {"names": names}}}))
+    done = calmotion("diagnose", "--recording", tmp_path / "data" / "file.parquet", "--json")
+    assert done.returncode == 0, done.stderr
+    first = json.loads(done.stdout)["causes"][0]
+    assert first["cause"] == "servo_gains" and "/elbow_flex" in {row["path"] for row in first["parameters"]}
+    parquet.write_table(pyarrow.table({"timestamp": times}), tmp_path / "other.parquet")
+    done = calmotion("diagnose", "--recording", tmp_path / "other.parquet")
+    assert done.returncode != 0 and "has no such column" in done.stderr and "observation.state" in done.stderr
+
+
+def test_a_spectrum_and_an_accelerometer_alone_tell_where_it_rings(calmotion, tmp_path):
+    f = np.arange(0.0, 200.0, 0.5)
+    psd = 1.0 / ((1.0 - (f / 52.0) ** 2) ** 2 + (0.1 * f / 52.0) ** 2) + 0.1
+    table = np.column_stack([f, psd, 0.1 * psd, 0.1 * psd, 1.2 * psd])
+    file = tmp_path / "resonances_x.csv"
+    np.savetxt(file, table, delimiter=",", header="freq,psd_x,psd_y,psd_z,psd_xyz", comments="")
+    found = json.loads(calmotion("diagnose", "--recording", file, "--json").stdout)["causes"][0]
+    values = {row["name"]: row["value"] for row in found["parameters"]}
+    assert found["cause"] == "unknown" and "encoders" in found["remedy"]
+    assert values["frequency"] == pytest.approx(52.0, abs=1.0) and values["damping"] == pytest.approx(0.05, rel=0.2)
+    times = np.arange(0.0, 6.0, 1.0 / 800.0)
+    rings = 2e3 * np.exp(-2.0 * (times % 1.5)) * np.sin(2.0 * np.pi * 7.0 * (times % 1.5))
+    noise = np.random.default_rng(1).normal(0.0, 30.0, (len(times), 2))
+    file = tmp_path / "accelerometer.csv"
+    head = "#time,accel_x,accel_y,accel_z"
+    np.savetxt(file, np.column_stack([times, rings, noise]), delimiter=",", header=head, comments="")
+    done = calmotion("diagnose", "--recording", f"{file}@/Hand", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)["causes"][0]
+    values = {row["name"]: row["value"] for row in found["parameters"]}
+    assert found["cause"] == "unknown" and "shot" in found["remedy"]
+    assert values["frequency"] == pytest.approx(7.0, abs=0.5)
