@@ -4,7 +4,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-import trimesh
 from calmotion.mesh import tetrahedra as t
 from calmotion.mesh.grids.contacts import without_contacts
 
@@ -44,30 +43,3 @@ def test_each_element_keeps_its_corners(helpers):
     # every point is one of elements that hang together by faces at it
     again, same = without_contacts(apart, parted)
     assert again is apart and same is parted
-
-
-def closed(*boxes):
-    """Points and triangles of the union of boxes, each given by two corners."""
-    made = [trimesh.creation.box(bounds=np.asarray(corners, float)) for corners in boxes]
-    whole = trimesh.boolean.union(made) if len(made) > 1 else made[0]
-    return np.array(whole.vertices), np.array(whole.faces, np.int32)
-
-
-# cubes beside each other on a diagonal, and the solid that they were made for
-CUBES = ((0, 0, 0), (1, 1, 0))
-APART = [(0, 0, 0), (0.98, 0.98, 1)], [(1.02, 1.02, 0), (2, 2, 1)]
-
-
-@pytest.mark.parametrize(
-    ("bridge", "stays"),
-    [
-        ([], False),
-        ([[(0.5, 0.5, 0.0), (1.5, 1.5, 1.0)]], True),  # a block between the two
-        ([[(0.5, 0.5, 0.4), (1.5, 1.5, 0.43)]], False),  # a foil, thinner than the mesh follows anything
-    ],
-    ids=["gap", "block", "foil"],
-)
-def test_a_contact_stays_where_the_solid_connects_its_sides(helpers, bridge, stays):
-    points, tets = joined(helpers, *CUBES)
-    apart, parted = without_contacts(points, tets, *closed(*APART, *bridge), 0.1)
-    assert (apart is points) == stays and t.connected_parts(parted) == (1 if stays else 2)

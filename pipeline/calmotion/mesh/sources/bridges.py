@@ -10,6 +10,7 @@ import numpy as np
 from calmotion.mesh.repair.closing import Part, connected_pieces
 from calmotion.mesh.repair.uniting import manifold_of, part_of
 from calmotion.mesh.sources.sampling import sampled
+from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles, unit_normals
 
 NARROW, WIDE = 2e-3, 2e-2  # gaps across which triangles that face each other are joined, of the size of the body
 _SINK = 0.05  # overlap of a bridge with both sides, of the gap
@@ -39,14 +40,15 @@ def bridged(solids: Sequence[Part], largest: float = NARROW) -> tuple[Part | Non
     widest = 0.0
     for k, solid in enumerate(solids):
         x = solid.points[solid.triangles]
+        normals, _ = unit_normals(x)
         begun = len(prisms)
         for other in [other for i, other in enumerate(solids) if i != k]:
             if largest > NARROW and solid.volume > other.volume:
                 continue
-            for i, gap in _near(x, other.points[other.triangles], largest):
+            gaps, _ = NearbyTriangles(other.points, other.triangles, largest).faced(x.mean(axis=1), normals, 1e-7)
+            for i in np.flatnonzero(gaps <= largest):
+                gap, normal = float(gaps[i]), normals[i]
                 widest = max(widest, gap)
-                normal = np.cross(x[i, 1] - x[i, 0], x[i, 2] - x[i, 0])
-                normal /= np.linalg.norm(normal)
                 sink = _SINK * gap + 1e-7
                 prisms.append(np.vstack([x[i] - sink * normal, x[i] + (gap + sink) * normal]))
         if largest > NARROW and begun < len(prisms):
@@ -121,32 +123,3 @@ def _extent(points: np.ndarray) -> float:
 
 def _solids(part: Part) -> list[Part]:
     return [piece for piece in connected_pieces(part.points, part.triangles) if piece.volume > 1e-12]
-
-
-def _near(x: np.ndarray, facing: np.ndarray, largest: float) -> list[tuple[int, float]]:
-    """Triangles with another solid within the largest gap, along the normal at their center: index and distance."""
-    from calmotion.mesh.surfaces.distances import ray_length
-
-    low, high = x.min(axis=(0, 1)) - largest, x.max(axis=(0, 1)) + largest
-    facing = facing[((facing.max(axis=1) > low) & (facing.min(axis=1) < high)).all(axis=1)]
-    if len(facing) == 0:
-        return []
-    low, high = facing.min(axis=(0, 1)) - largest, facing.max(axis=(0, 1)) + largest
-    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    length = np.linalg.norm(normal, axis=1)
-    inside = ((x.max(axis=1) > low) & (x.min(axis=1) < high)).all(axis=1) & (length > 0.0)
-    near = []
-    boxes_low, boxes_high = facing.min(axis=1), facing.max(axis=1)
-    for i in np.flatnonzero(inside):
-        n = normal[i] / length[i]
-        middle = x[i].mean(axis=0)
-        # only triangles whose boxes the ray can hit: testing all of them would take quadratic time
-        end = middle + largest * n
-        candidates = (
-            (boxes_high >= np.minimum(middle, end) - 1e-9) & (boxes_low <= np.maximum(middle, end) + 1e-9)
-        ).all(1)
-        if candidates.any():
-            gap = ray_length(middle - 1e-7 * n, n, facing[candidates], 0.0)
-            if gap <= largest:
-                near.append((int(i), gap))
-    return near

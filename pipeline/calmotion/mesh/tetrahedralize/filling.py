@@ -89,7 +89,6 @@ def filled(
     refuse_too_many(shape, size, time, body.path)
     volumes: list[float] = []
     best: FEMesh | None = None
-    distance = 0.0
     notes: tuple[str, ...] = ()
     begun, dense = time.used, len(solid.triangles) > DENSE
     for number in range(_ATTEMPTS):
@@ -122,7 +121,7 @@ def filled(
         quality = measure_quality(points, tets, surface_volume=solid.volume, repairs=(*solid.repairs, *notes))
         volumes.append(quality.volume)
         if best is None or quality.volume_error < best.quality.volume_error:
-            best, distance = FEMesh(index, points, tets, quality), attempt.distance
+            best = FEMesh(index, points, tets, quality)
         # a mesh that is closer to the surface takes about twice as long
         late = time.used - begun > _LATE * time.limit and best.quality.volume_error <= _ACCEPTED
         enough = MAX_VOLUME_ERROR if number or dense else _GOOD_VOLUME
@@ -130,7 +129,7 @@ def filled(
             break
         size *= 0.8 if best.quality.volume_error > MAX_VOLUME_ERROR else 1.0
     assert best is not None
-    return _whole(_accepted(best, solid, volumes, body.path), body.path, solid, distance)
+    return _whole(_accepted(best, solid, volumes, body.path), body.path)
 
 
 def _attempt(solid: Solid, shape: Shape, size: float, number: int, longer: float) -> _Attempt:
@@ -226,7 +225,7 @@ def _accepted(mesh: FEMesh, solid: Solid, volumes: list[float], path: str) -> FE
     return replace(mesh, quality=replace(mesh.quality, volume_error=error, repairs=notes))
 
 
-def _whole(mesh: FEMesh, path: str, solid: Solid, distance: float) -> FEMesh:
+def _whole(mesh: FEMesh, path: str) -> FEMesh:
     """The mesh without what a connection thinner than the distance to the surface made.
 
     Those are contacts in points and edges, and small parts that they held.
@@ -240,7 +239,7 @@ def _whole(mesh: FEMesh, path: str, solid: Solid, distance: float) -> FEMesh:
         points, tets = without_unused_points(mesh.points, kept)
         notes = (*mesh.quality.repairs, f"removed loose parts of the mesh, {100.0 * lost:.2g}% of the volume")
         mesh = replace(mesh, points=points, tets=tets, quality=replace(mesh.quality, volume=volume, repairs=notes))
-    points, tets = without_contacts(mesh.points, mesh.tets, solid.points, solid.triangles, distance)
+    points, tets = without_contacts(mesh.points, mesh.tets)
     return replace(mesh, points=points, tets=tets)
 
 

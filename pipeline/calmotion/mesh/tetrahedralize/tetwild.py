@@ -12,7 +12,6 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.mesh.tetrahedra import flat_tets, surface_volume
-from calmotion.mesh.tetrahedralize.flat_tets import unflattened
 from calmotion.support.caching.cache_folder import MESHES
 from calmotion.support.caching.caches import key_of, store_arrays, stored_arrays
 from calmotion.support.files import temporary_folder
@@ -68,9 +67,8 @@ def tetrahedralize(
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Tetrahedra of a closed surface.
 
-    A surface has one mesh, since fTetWild draws from a fixed sequence. A flat element, which it sometimes
-    makes, gets a volume by a small move of a corner; where that is not possible, the mesh is made again with another
-    sequence.
+    A surface has one mesh, since fTetWild draws from a fixed sequence. Where it makes a flat element, the mesh is made
+    again with another sequence.
 
     Args:
         points: [m], shape [n, 3].
@@ -112,7 +110,7 @@ def tetrahedralize(
                 if use_cache:
                     _keep_hopeless(exceeded, time.limit - time.used)
                 raise
-            mesh = unflattened(made, tets), tets
+            mesh = made, tets
             if not flat_tets(*mesh).any():
                 break
         assert mesh is not None
