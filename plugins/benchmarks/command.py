@@ -20,6 +20,7 @@ WHAT = {
     "baselines": ("optimizer.baselines", "input shapers, a filter and the optimised curves"),
     "motor-commands": ("motors.commands", "optimised commands of servos, replayed in MuJoCo"),
     "diagnose": ("accuracy.diagnosis", "known faults of random arms, found from noisy recordings"),
+    "tempo": ("motors.tempo", "time and error that slower motors cost, against TOPP-RA and one tempo"),
     "live": ("motors.live", "streams that are calmed while they are played, and input shapers"),
     "speed": ("speed.stages", "where the time of a run goes"),
     "robots": ("speed.robots", "processor time by stage and memory of robots with two flexible links"),

@@ -13,6 +13,7 @@ from .curves import plot_convergence, plot_errors, plot_motors
 from .filmstrip import draw_filmstrip
 from .robustness import plot_robustness
 from .spectra import plot_spectra
+from .tempo import plot_tempo
 
 MOTORS_ON_A_PAGE = 8
 Progress = Callable[[float, str], None]
@@ -64,6 +65,8 @@ def draw_figures(
         if len(result.steps) > 1:
             progress(0.4, "convergence")
             written.append(save(plot_convergence(result), target / "convergence.png", dpi))
+        if result.retimed is not None and result.retimed.animation.tempo is not None:
+            written.append(save(plot_tempo(character, result.retimed), target / "tempo.png", dpi))
         if result.robustness is not None and character.targets:
             progress(0.45, "robustness")
             written.append(save(plot_robustness(character, result.robustness), target / "robustness.png", dpi))

@@ -13,6 +13,8 @@ import synthetic
 from calmotion.errors import ShotError
 from calmotion.host import PluginError
 from calmotion.model.outputs import SystemModes
+from calmotion.model.retiming.retimed import Retimed
+from calmotion.model.retiming.tempo import Stretch, TempoReport, TimeMap
 from calmotion.model.robust.robots import Compromise, Robustness
 from calmotion.model.run import OutputPaths
 from calmotion.testing import host_with, run_operator
@@ -55,6 +57,19 @@ def test_a_simulation_alone_has_no_convergence_and_draws_twice_the_same(tmp_path
     assert [Path(path).name for path in first] == ["errors.png", "spectra.png", "motors.png", "filmstrip.png"]
     for one, other in zip(first, second, strict=True):
         assert Path(one).read_bytes() == Path(other).read_bytes()
+
+
+def test_a_performance_at_another_tempo_has_its_tempo_with_reasons(tmp_path, figures):
+    tempo = TimeMap(np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9) + 0.1 * np.linspace(0.0, 1.0, 9) ** 2)
+    character, animation = synthetic.character(), synthetic.animation()
+    report = TempoReport(1.0, 0.08, (Stretch(0.2, 0.8, 1.2, ((0, "velocity"),)),), ((0.5, 0.02),))
+    retimed = Retimed(dataclasses.replace(animation, tempo=tempo), character, report)
+    paths = draw(tmp_path, dataclasses.replace(synthetic.result(), retimed=retimed), {"figures.plot": {"dpi": 60}})
+    assert "tempo.png" in [Path(path).name for path in paths]
+    axes = sys.modules[f"{figures.__name__}.tempo"].plot_tempo(character, retimed).axes[0]
+    line = axes.get_lines()[0]
+    assert line.get_xdata()[-1] == pytest.approx(1.1) and line.get_ydata()[-1] == pytest.approx(100.0 / 1.2)
+    assert [text.get_text() for text in axes.texts] == [f"velocity of {character.motors[0].path}"]
 
 
 def test_errors_are_drawn_in_millimetres_and_degrees_from_the_first_frame_on(figures):

@@ -78,6 +78,7 @@ from calmotion.model.result import Result as Result
 from calmotion.model.result import Simplification as Simplification
 from calmotion.model.result import Simulation as Simulation
 from calmotion.model.result import Skin as Skin
+from calmotion.model.retiming.retimed import Retimed as Retimed
 from calmotion.model.retiming.tempo import TempoSettings as TempoSettings
 from calmotion.model.robust.robots import Robustness as Robustness
 from calmotion.model.robust.settings import RobustSettings as RobustSettings

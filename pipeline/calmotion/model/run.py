@@ -31,6 +31,7 @@ class RunSettings:
         avoid_reversals: Weight of the squared ways of the targets across the play of gears, over squared errors; 0:
             play does not count.
         retime: How the tempo may change; None: not at all.
+        limited_by_tempo: Whether a tempo keeps the limits that it can, so that a search need not.
         robust: Settings of an optimisation for a set of robots; None: for the nominal robot alone.
     """
 
@@ -50,6 +51,7 @@ class RunSettings:
     robust: RobustSettings | None = None
     avoid_reversals: float = 0.0
     retime: TempoSettings | None = None
+    limited_by_tempo: bool = False
 
     @property
     def scheme(self) -> str:

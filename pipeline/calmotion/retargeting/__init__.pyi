@@ -12,7 +12,9 @@ from calmotion.retargeting.problem.posing import SMOOTHNESS as SMOOTHNESS
 from calmotion.retargeting.problem.problem import Evaluation as Evaluation
 from calmotion.retargeting.problem.problem import RetargetProblem as RetargetProblem
 from calmotion.retargeting.retiming.retime import optimize_with_tempo as optimize_with_tempo
+from calmotion.retargeting.retiming.rigid_robot import tempo_input as tempo_input
 from calmotion.retargeting.retiming.settings import pinned_times as pinned_times
+from calmotion.retargeting.retiming.tempo import find_tempo as find_tempo
 from calmotion.retargeting.robust.measure import errors_on as errors_on
 from calmotion.retargeting.robust.scenarios import payload_bodies as payload_bodies
 from calmotion.retargeting.robust.scenarios import random_scenarios as random_scenarios

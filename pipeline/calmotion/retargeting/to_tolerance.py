@@ -89,7 +89,7 @@ def optimize_to_tolerance(
         try:
             latest = _searched(reduced, of_step, searches, checkpoint, memory)
             searches.ended()
-            result = with_modes(latest if result is None else _continued(result, latest), shot.bodies)
+            result = with_modes(latest if result is None else continued(result, latest), shot.bodies)
             if result.interrupted:
                 break
             tracks = found_tracks(result, animation)
@@ -140,7 +140,7 @@ def _robustly(
 ) -> Result:
     """The result for a set of robots, begun from that for the nominal one."""
     animation = shot.animation
-    robust = retarget_robustly(shot.with_tracks(animation.tracks), of_step, nominal, _continued, searches)
+    robust = retarget_robustly(shot.with_tracks(animation.tracks), of_step, nominal, continued, searches)
     if robust.interrupted:
         return robust
     reduced = shot.with_tracks(found_tracks(robust, animation))
@@ -204,7 +204,7 @@ def _searched(
     progress.ended()
     motors = tuple(replace(motor, idle=False) for motor in character.motors)
     every = shot.with_tracks(found_tracks(first, shot.animation)).with_character(replace(character, motors=motors))
-    return _continued(first, _search(every, options, progress, checkpoint, memory))
+    return continued(first, _search(every, options, progress, checkpoint, memory))
 
 
 def _search(
@@ -216,7 +216,7 @@ def _search(
     return replace(found, processor_s=time.process_time() - begin)
 
 
-def _continued(first: Result, second: Result) -> Result:
+def continued(first: Result, second: Result) -> Result:
     """The result of the second search, with the work of both."""
     done = first.steps[-1]
     steps = tuple(

@@ -8,7 +8,7 @@ from calmotion.model.robust.settings import RobustSettings, Uncertainty
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.robust.retarget import retarget_robustly
-from calmotion.retargeting.to_tolerance import _continued
+from calmotion.retargeting.to_tolerance import continued
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.simulation import found_tracks
 from calmotion.workflow.robustness import robustness_report, robustness_row
@@ -76,7 +76,7 @@ def test_the_error_on_the_model_keeps_its_bound_and_that_on_others_does_not_grow
     shot = compile_shot(of(arm), animation, bodies)
     options = RunSettings(step=1 / 120, tolerance=TOLERANCE, robust=robust)
     nominal = optimize_shot(shot, options, ignore_progress)
-    result = retarget_robustly(shot, options, nominal, _continued, ignore_progress)
+    result = retarget_robustly(shot, options, nominal, continued, ignore_progress)
     found = result.robustness
     rows = [robustness_row(result, k)["robustness"] for k in range(len(shot.character.targets))]
     assert robustness_report(result)["scenarios"] and all(np.isfinite(row["robust"]["p95_max_error_m"]) for row in rows)

@@ -23,6 +23,7 @@ from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
+from calmotion.simulation.inputs.tempo import TEMPO_LIMITS
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.preparation import Prepared
 from calmotion.simulation.simulator import Simulator
@@ -173,6 +174,8 @@ def unknowns(
             else "Set it to true on the motors that may change.",
         )
     bounds = motor_bounds(character, np.any(coupling, axis=1))
+    if options.limited_by_tempo:
+        bounds = {name: bound for name, bound in bounds.items() if name not in TEMPO_LIMITS}
     continuous = options.adjoint == "continuous"
     if continuous and ("effort" in bounds or grid.cyclic):
         raise ShotError(

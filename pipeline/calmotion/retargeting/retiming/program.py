@@ -132,8 +132,11 @@ class TempoProgram:
     def excess(self, c: Array) -> float:
         """By how much a limit is exceeded at most, as a share of it, and a duration is missed at most [s]."""
         over = [float(np.max(np.abs(term.value), initial=0.0)) - 1.0 for term in self.terms(c)]
-        missed = np.abs(self._integrals @ c - self._lengths)
-        return float(max([0.0, *over, *missed.tolist()]))
+        return max([0.0, *over, self.missed(c)])
+
+    def missed(self, c: Array) -> float:
+        """By how much a duration is missed at most [s]."""
+        return float(np.max(np.abs(self._integrals @ c - self._lengths), initial=0.0))
 
     def _merit(self, c: Array) -> float:
         over = sum(float(np.sum(np.maximum(np.abs(term.value) - 1.0 + WITHIN, 0.0))) for term in self.terms(c))

@@ -91,9 +91,11 @@ def find_tempo(given: TempoInput, settings: TempoSettings, path: str) -> FoundTe
     frames = int(np.ceil(float(basis.integral(0.0, end) @ c) / given.frame - 1e-6))
     whole = replace(
         program, durations=(*pins, Duration(0.0, end, frames * given.frame)),
-        weights=1.0 / (SPREAD + np.maximum(c - 1.0, 0.0)),
+        weights=1.0 / (SPREAD + np.abs(c - 1.0)),
     )  # fmt: skip
     found = whole.solve(c)
+    if pins and whole.missed(found) > NOTICED:
+        _refuse_missed(path, whole.missed(found))
     report = _report(settings, needed, program, c, basis.time_map(found))
     return FoundTempo(basis.time_map(found), frames + 1, report, whole.excess(found))
 
@@ -139,6 +141,21 @@ def _refuse_contradiction(
             f"{needs:.3f} s at least, {needs - part.length:.3f} s more",
             remedy=f"Leave out one of them, {later}.",
         )
+
+
+def _refuse_missed(path: str, missed: float) -> None:
+    """Refuse pins that no stretch keeps, though the rigid robot could hurry between each two of them.
+
+    Raises:
+        ShotError: With what is missed.
+    """
+    raise ShotError(
+        "the limits of the motors, of the stretch and the pinned times cannot be kept together",
+        path=path,
+        attribute="calm:retime:pinned",
+        found=f"a distance of two of them is off by {missed:.3f} s at least",
+        remedy="Allow parts to be faster with a smaller fastest, or leave out a pinned time.",
+    )
 
 
 def _least_duration(given: TempoInput, part: Duration, fastest: float) -> float:

@@ -48,6 +48,7 @@ class TempoLimits:
     effort: Array
 
 
+TEMPO_LIMITS = ("velocity", "acceleration", "jerk", "effort")  # that a slower tempo helps to keep
 MOST_INSTANTS = 400  # of the linear programme
 FINEST = 1e-9  # of a limit, by which it may be exceeded through rounding
 

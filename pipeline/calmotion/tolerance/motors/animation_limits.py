@@ -27,7 +27,7 @@ from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import ForwardRun, limited_values, run_forward
 from calmotion.simulation.inputs.curves import Curves, sample_curves
-from calmotion.simulation.inputs.tempo import MOST_INSTANTS, MotorEfforts, TempoLimits, needed_tempo
+from calmotion.simulation.inputs.tempo import MOST_INSTANTS, TEMPO_LIMITS, MotorEfforts, TempoLimits, needed_tempo
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.preparation import prepare
 from calmotion.simulation.report import limit_uses
@@ -82,8 +82,7 @@ def exceeded_limits(character: Character, animation: Animation, options: RunSett
 def tempo_limits(character: Character) -> TempoLimits:
     """The limits that a slower tempo helps to keep."""
     bounds, none = motor_bounds(character), np.full(len(character.motors), np.inf)
-    names = ("velocity", "acceleration", "jerk", "effort")
-    return TempoLimits(**{name: bounds[name].upper if name in bounds else none for name in names})
+    return TempoLimits(**{name: bounds[name].upper if name in bounds else none for name in TEMPO_LIMITS})
 
 
 def rigid_efforts(model: Model, grid: TimeGrid, world: Array, curves: Curves, run: ForwardRun) -> MotorEfforts:

@@ -1,0 +1,233 @@
+"""What slower motors cost in time, and in error: `optimize --retime` against one tempo for the whole, and TOPP-RA.
+
+`calmotion bench tempo SHOT ...` gives each motor of a shot limits of speed or effort that are a share of what the
+animation needs, and finds tempo and curves. Added times are compared with the lower bound of the rigid robot, with
+what TOPP-RA adds (where the package `toppra` is there; it knows no efforts here), and with one tempo for the whole.
+Limits are checked on fine samples of the curves, efforts in a simulation by half of the step. The command fails where
+a limit is exceeded by more than a thousandth, or the error is above the tolerance and above that at full tempo.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.errors import ShotError
+from calmotion.model import Character, Result, RunSettings, TempoSettings, commanded_curves, tolerance_of
+from calmotion.retargeting import find_tempo, optimize_with_tempo, tempo_input
+from calmotion.simulation import CompiledShot, simulate_shot
+from calmotion.tolerance import found_tracks
+
+from ..common.parsers import bench_parser, output_options, shots_argument
+from ..common.shots import SAMPLES, load
+
+QUANTITIES = ("velocity", "effort")
+SHARES = (0.8, 0.6, 0.4)
+SLOWEST = 10.0  # largest stretch
+EXCEEDED = 1e-3  # of a limit
+FINE = 20_000  # samples of a curve
+LEAST = 1e-3  # of the largest limit of all motors, that one has at least
+
+
+@dataclass(frozen=True)
+class Row:
+    """One shot with limits.
+
+    Attributes:
+        shot, quantity, share: Which, and what is limited to which share of what the animation needs.
+        lower_bound_s, toppra_s, added_s, uniform_s: Added times [s]; NaN where one is not known.
+        full_tempo_mm, before_mm, after_mm: Largest error of curves that are optimised without limits at full tempo, of
+            the retimed animation, and of the curves found [mm]; NaN where nothing was searched.
+        tolerance_mm: [mm].
+        excess: Of a limit, as a share of it; negative where all are kept.
+        full_tempo_cpu_s, cpu_s: Processor time of both searches [s].
+    """
+
+    shot: str
+    quantity: str
+    share: float
+    lower_bound_s: float
+    toppra_s: float
+    added_s: float
+    uniform_s: float
+    full_tempo_mm: float = np.nan
+    before_mm: float = np.nan
+    after_mm: float = np.nan
+    tolerance_mm: float = np.nan
+    excess: float = np.nan
+    full_tempo_cpu_s: float = np.nan
+    cpu_s: float = np.nan
+
+    @property
+    def kept(self) -> bool:
+        """Whether the limits and the error are."""
+        missed = self.after_mm > max(self.tolerance_mm, self.full_tempo_mm)
+        return not (self.excess > EXCEEDED or missed)
+
+
+def limited_shot(shot: CompiledShot, quantity: str, share: float) -> CompiledShot:
+    """The shot with motors that have a share of what the animation needs.
+
+    Args:
+        quantity: `velocity` or `effort`, which is that of the rigid robot.
+    """
+    free, end = without_limits(shot.character), float(shot.animation.frame_times[-1])
+    if quantity == "velocity":
+        times = np.linspace(0.0, end, FINE)
+        needed = np.abs(commanded_curves(free, replace(shot.animation, current=shot.animation.tracks), None)(times, 1))
+    else:
+        limited = replace(free, motors=tuple(replace(motor, max_torque=1e12) for motor in free.motors))
+        given = tempo_input(shot.with_character(limited), RunSettings(), shot.animation.tracks)
+        if given.efforts is None:
+            raise ShotError("its servos keep their torque by themselves", remedy="Add --limits velocity")
+        needed = np.abs(given.efforts.at_rest + given.efforts.by_square)
+    most = share * needed.max(axis=0)
+    most = np.maximum(most, LEAST * most.max())
+    speeds = most if quantity == "velocity" else np.full(len(most), np.inf)
+    efforts = most if quantity == "effort" else np.full(len(most), np.inf)
+    motors = tuple(
+        replace(motor, max_velocity=float(speed), max_torque=float(effort))
+        for motor, speed, effort in zip(free.motors, speeds, efforts, strict=True)
+    )
+    return shot.with_character(replace(free, motors=motors))
+
+
+def without_limits(character: Character) -> Character:
+    """A character whose motors can do anything, and that does not loop."""
+    motors = tuple(
+        replace(motor, max_velocity=np.inf, max_acceleration=np.inf, max_jerk=np.inf, max_torque=np.inf)
+        for motor in character.motors
+    )
+    return replace(character, motors=motors, retarget=replace(character.retarget, cyclic=False))
+
+
+def measure(name: str, shot: CompiledShot, quantity: str, share: float, full: tuple[float, float] | None) -> Row:
+    """One row.
+
+    Args:
+        full: Error [m] and processor time [s] at full tempo without limits; None: nothing is searched.
+
+    Raises:
+        ShotError: No tempo helps, or the shot cannot be processed.
+    """
+    limited, options = limited_shot(shot, quantity, share), RunSettings(retime=TempoSettings(slowest=SLOWEST))
+    given = tempo_input(limited, options, shot.animation.tracks)
+    found = find_tempo(given, TempoSettings(slowest=SLOWEST), shot.character.path)
+    added = 0.0 if found.map is None else found.map.added
+    toppra = toppra_added(limited) if quantity == "velocity" else np.nan
+    row = Row(
+        name, quantity, share, found.report.lower_bound, toppra, added, found.report.uniform_added,
+        tolerance_mm=1e3 * tolerance_of(shot.character, None),
+    )  # fmt: skip
+    if full is None:
+        return row
+    begin = time.process_time()
+    result = optimize_with_tempo(limited, options, lambda fraction, message: None)
+    spent = time.process_time() - begin
+    assert result.after is not None and result.retimed is not None
+    tempo = result.retimed.animation.tempo
+    return replace(
+        row, added_s=0.0 if tempo is None else tempo.added, full_tempo_mm=1e3 * full[0],
+        before_mm=1e3 * _largest(result.before.position_errors[result.before.motion.judged]),
+        after_mm=1e3 * _largest(result.after.position_errors[result.after.motion.judged]),
+        excess=excess_of(limited, result, quantity), full_tempo_cpu_s=full[1], cpu_s=spent,
+    )  # fmt: skip
+
+
+def excess_of(limited: CompiledShot, result: Result, quantity: str) -> float:
+    """By how much curves exceed limits, as a share of them, by other means than those of the search."""
+    performance = limited.at(result.retimed)
+    motors, animation = performance.character.motors, performance.animation
+    if quantity == "velocity":
+        times = np.linspace(0.0, float(animation.frame_times[-1]), FINE)
+        values = commanded_curves(performance.character, animation, result)(times, 0)
+        reached = np.abs(np.diff(values, axis=0)).max(axis=0) / (times[1] - times[0])
+        return float(np.max(reached / [motor.max_velocity for motor in motors])) - 1.0
+    finer = RunSettings(step=0.5 * result.step_s, pre_roll=result.pre_roll_s)
+    run = simulate_shot(
+        performance.with_tracks(found_tracks(result, animation)), finer, lambda fraction, message: None
+    ).before.motion  # fmt: skip
+    efforts = np.abs(run.motor_efforts[run.judged]).max(axis=0)
+    return float(np.max(efforts / [motor.max_torque for motor in motors])) - 1.0
+
+
+def toppra_added(shot: CompiledShot) -> float:
+    """What TOPP-RA adds for the limits of speed, never faster than the animation [s]; NaN without the package."""
+    try:
+        from toppra import SplineInterpolator, setup_logging
+        from toppra.algorithm import TOPPRA
+        from toppra.constraint import JointVelocityConstraint
+    except ImportError:
+        return np.nan
+    setup_logging("ERROR")
+    end = float(shot.animation.frame_times[-1])
+    times = np.linspace(0.0, end, 120 * int(np.ceil(end)) + 1)
+    curves = commanded_curves(shot.character, replace(shot.animation, current=shot.animation.tracks), None)
+    # a joint that moves as the animation's time does keeps the tempo from exceeding it
+    most = np.array([*(motor.max_velocity for motor in shot.character.motors), 1.0])
+    path = SplineInterpolator(times, np.concatenate([curves(times, 0), times[:, None]], axis=1))
+    program = TOPPRA([JointVelocityConstraint(np.stack([-most, most], axis=1))], path, gridpoints=times)
+    for ends in (1.0, 0.0):  # at rest where it would be too fast there
+        _, speeds, _ = program.compute_parameterization(ends, ends)
+        if speeds is not None:
+            break
+    return float(np.sum(2.0 * np.diff(times) / (speeds[1:] + speeds[:-1]))) - end
+
+
+def _largest(errors: Array) -> float:
+    return float(errors.max(initial=0.0))
+
+
+def _at_full_tempo(shot: CompiledShot) -> tuple[float, float]:
+    begin = time.process_time()
+    free = shot.with_character(without_limits(shot.character))
+    result = optimize_with_tempo(free, RunSettings(), lambda fraction, message: None)
+    assert result.after is not None
+    return _largest(result.after.position_errors[result.after.motion.judged]), time.process_time() - begin
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command."""
+    parser = bench_parser("tempo", __doc__)
+    shots_argument(parser, SAMPLES)
+    parser.add_argument("--shares", metavar="SHARE", type=float, nargs="+", default=SHARES)
+    parser.add_argument("--limits", metavar="QUANTITY", nargs="+", choices=QUANTITIES, default=QUANTITIES)
+    parser.add_argument("--tempo-only", action="store_true", help="find the tempo of the rigid robot, and no curves")
+    output_options(parser)
+    options = parser.parse_args(arguments)
+    rows = []
+    for path in options.shots:
+        shot = load(path)
+        full = None if options.tempo_only else _at_full_tempo(shot)
+        for quantity in options.limits:
+            for share in options.shares:
+                try:
+                    rows.append(measure(Path(path).stem, shot, quantity, share, full))
+                except ShotError as error:
+                    print(f"{Path(path).stem}, {quantity} {share:g}: {error}", file=sys.stderr)
+    if options.json:
+        print(json.dumps([asdict(row) for row in rows]))
+    else:
+        _print(rows)
+    return int(not all(row.kept for row in rows))
+
+
+def _print(rows: Sequence[Row]) -> None:
+    from calmotion.cli import console_on, print_table
+
+    heads = ["shot", "limit", "bound", "TOPP-RA", "added", "uniform", "full tempo", "retimed", "found", "excess", "CPU"]
+    shown = [
+        [
+            row.shot, f"{row.quantity} {row.share:.0%}", f"{row.lower_bound_s:.3f} s", f"{row.toppra_s:.3f} s",
+            f"{row.added_s:.3f} s", f"{row.uniform_s:.2f} s", f"{row.full_tempo_mm:.2f} mm", f"{row.before_mm:.1f} mm",
+            f"{row.after_mm:.2f} mm", f"{row.excess:.1e}", f"{row.full_tempo_cpu_s:.0f}, {row.cpu_s:.0f} s",
+        ]
+        for row in rows
+    ]  # fmt: skip
+    print_table(console_on(sys.stdout), "Added time, and largest errors", heads, shown)
