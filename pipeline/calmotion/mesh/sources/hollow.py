@@ -8,11 +8,14 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.mesh.grids.level_sets import grid_about, zero_surface
+from calmotion.mesh.grids.winding import wound
 from calmotion.mesh.repair.closed_solid import Solid
 from calmotion.mesh.repair.closing import Part, connected_pieces
-from calmotion.mesh.repair.uniting import NotManifold, manifold_of, part_of
+from calmotion.mesh.repair.uniting import NotManifold, manifold_of, part_of, without_detail
 from calmotion.mesh.sources.sampling import sampled
 from calmotion.mesh.surfaces.closed_surfaces import winding_numbers
+from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles
 
 _EDGE = 0.03  # of the largest eigenvalue of the normals around a corner, from which they differ
 _LONGEST = 3.0  # way of a corner, of the thickness
@@ -22,7 +25,6 @@ _NEAR, _PLACES = (
     2_000,
 )  # least distance of a cavity from the surface, of the thickness; places where it is checked
 _CELL, _CELLS = 0.5, 400_000  # grid of a cavity: its cells of the thickness, and their largest number
-_SPACING = 0.25  # of the thickness, between places on the surface from which distances are measured
 _DETAIL = 0.05  # of the thickness, that is removed from a cavity
 
 
@@ -103,48 +105,21 @@ def _offset(outer: Part, wall: float, end: Array | None) -> Part | None:
 
 def _cavity_on_grid(outer: Part, wall: float) -> Part | None:
     """All that is deeper than the wall, as a level set of the distance to the surface; None where nothing is."""
-    import manifold3d
-
     low, high = outer.points.min(axis=0), outer.points.max(axis=0)
     cell = max(_CELL * wall, float(np.prod(high - low) / _CELLS) ** (1.0 / 3.0))
-    counts = np.ceil((high - low) / cell).astype(int) + 1
-    grid = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1)
-    places = low + cell * grid.reshape(-1, 3)
-    depth = np.full(len(places), -wall)
-    inside = winding_numbers(places, outer.points, outer.triangles) > 0.5
-    depth[inside] = _distances(outer, places[inside], wall) - wall
+    counts = np.ceil((high - low) / cell).astype(int) + 3
+    low = low - cell
+    grid = low + cell * np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1)
+    within = wound(outer.points, outer.triangles, low, counts, cell) > 0
+    depth = np.full(tuple(counts), -wall)
+    depth[within] = _distances(outer, grid[within], wall + 2.0 * cell) - wall
     if not (depth > 0.0).any():
         return None
-    values = depth.reshape(tuple(counts))
-    last = counts - 2
-
-    def field(x: float, y: float, z: float) -> float:
-        """The depth at a place, trilinear between the corners of its cell."""
-        u, v, w = (x - low[0]) / cell, (y - low[1]) / cell, (z - low[2]) / cell
-        i, j, k = min(max(int(u), 0), last[0]), min(max(int(v), 0), last[1]), min(max(int(w), 0), last[2])
-        u, v, w = u - i, v - j, w - k
-        c = values[i : i + 2, j : j + 2, k : k + 2]
-        a = c[0] * (1.0 - u) + c[1] * u
-        b = a[0] * (1.0 - v) + a[1] * v
-        return float(b[0] * (1.0 - w) + b[1] * w)
-
-    made = manifold3d.Manifold.level_set(field, [*(low + cell), *(high - cell)], cell).simplify(_DETAIL * wall)
-    return None if made.is_empty() else part_of(made)
+    used, at, tets = grid_about(depth > 0.0, low, cell)
+    return without_detail(Part(*zero_surface(at, depth.ravel()[used], tets)), _DETAIL * wall)
 
 
-def _distances(outer: Part, places: Array, wall: float) -> Array:
-    """Distances from places to a surface, by places on it that are nearer to each other than the wall is thick."""
-    from scipy.spatial import cKDTree
-
-    x = outer.points[outer.triangles]
-    area = 0.5 * float(np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1).sum())
-    points, normals = sampled(outer, min(int(area / (_SPACING * wall) ** 2) + 1, 2_000_000))
-    _, nearest = cKDTree(points).query(places, k=4)
-    # the distance to the planes of the nearest places is exact on flat walls
-    away = places[:, None] - points[nearest]
-    aside = np.linalg.norm(
-        away - np.einsum("nkj,nkj->nk", away, normals[nearest])[..., None] * normals[nearest], axis=2
-    )
-    flat = np.abs(np.einsum("nkj,nkj->nk", away, normals[nearest]))
-    straight = np.linalg.norm(away, axis=2)
-    return np.asarray(np.where(aside < 2.0 * _SPACING * wall, flat, straight).min(axis=1))
+def _distances(outer: Part, places: Array, reach: float) -> Array:
+    """Distances from places to a surface, at most the reach."""
+    closest = NearbyTriangles(outer.points, outer.triangles, reach).closest(places)
+    return np.asarray(np.nan_to_num(np.linalg.norm(places - closest, axis=1), nan=reach))
