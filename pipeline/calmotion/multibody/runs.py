@@ -83,7 +83,7 @@ def simulate(model: Model, values: Array, rates: Array, step: float, integrator:
 
 def from_rest(
     model: Model, joint_values: Array, joint_rates: Array, step: float, workspace: Workspace, integrator: str = "bdf2",
-    world: Array | None = None, progress: Callable[[float], None] | None = None,
+    world: Array | None = None, progress: Callable[[float], None] | None = None, divides: bool = True,
 ) -> Trajectory:  # fmt: skip
     """The states of a model from its static equilibrium.
 
@@ -94,11 +94,13 @@ def from_rest(
         integrator: As of `simulate`.
         world: Moving roots, shape [T, W, 18], or None.
         progress: Called with the fraction that is done.
+        divides: Whether a step that Newton's method cannot solve is divided into smaller ones.
     """
     start = rigid_state(model, start_angles(model, joint_values[0]), None if world is None else world[0])
     return integrate(
-        model.system, start, joint_values, joint_rates, step, workspace, progress, integrator=integrator, world=world
-    )
+        model.system, start, joint_values, joint_rates, step, workspace, progress, integrator=integrator, world=world,
+        divides=divides,
+    )  # fmt: skip
 
 
 def frames_in(model: Model, trajectory: Trajectory) -> tuple[Array, Array]:

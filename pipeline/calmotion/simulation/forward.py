@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cached_property
 
 from calmotion.arrays import Array, IntArray
 from calmotion.model.limits.kinds import kinds_of_limits
-from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.reactions import Reactions, reactions
-from calmotion.multibody.integrators.pieces import integrate_in_pieces
 from calmotion.multibody.integrators.trajectory import Trajectory
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.model.model import Model, start_angles
+from calmotion.multibody.model.model import Model
 from calmotion.multibody.runs import frames_in, from_rest
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.delays import CommandDelay
-
-AT_ONCE = 8192  # instants of a simulation, or of what follows from it, that are held at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +45,7 @@ def reactions_at(model: Model, run: ForwardRun, instants: IntArray | slice) -> R
 def run_forward(
     model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, world: Array | None = None,
     progress: Callable[[float], None] | None = None, integrator: str = "bdf2", steady: SteadyState | None = None,
+    divides: bool = True,
 ) -> ForwardRun:  # fmt: skip
     """Simulate motor curves, from rest or in a loop.
 
@@ -58,38 +55,15 @@ def run_forward(
         world: Moving roots, see `roots.sample_roots`.
         integrator: One of `calmotion.model.run.INTEGRATORS`.
         steady: Finds the motions of a shot that loops.
+        divides: Whether a step that cannot be solved is divided into smaller ones, where the shot does not loop.
     """
     joint_angles, joint_rates = followed(model, angles, rates, h, steady is not None)
     if steady is not None:
         trajectory = steady.find(joint_angles, joint_rates)
     else:
-        trajectory = from_rest(model, joint_angles, joint_rates, h, workspace, integrator, world, progress)
+        trajectory = from_rest(model, joint_angles, joint_rates, h, workspace, integrator, world, progress, divides)
     frames, multiplier = frames_in(model, trajectory), 0.0 if steady is None else steady.floquet_multiplier
     return ForwardRun(trajectory, joint_angles, joint_rates, *frames, angles, multiplier)
-
-
-def run_in_pieces(
-    model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, world: Array | None,
-    integrator: str, size: int, divides: bool = True,
-) -> Iterator[tuple[slice, ForwardRun]]:  # fmt: skip
-    """`run_forward` from rest, to the last bit, of which only a piece is held at once.
-
-    Args:
-        workspace: Nobody else may use it before the last piece.
-        size: Largest number of instants of a piece.
-        divides: Whether a step that Newton's method cannot solve is divided into smaller ones.
-
-    Yields:
-        The instants of a piece, and the run over them.
-    """
-    joint_angles, joint_rates = followed(model, angles, rates, h, False)
-    start = rigid_state(model, start_angles(model, joint_angles[0]), None if world is None else world[0])
-    pieces = integrate_in_pieces(
-        model.system, start, joint_angles, joint_rates, h, workspace, integrator, world, size, divides
-    )  # fmt: skip
-    for rows, trajectory in pieces:
-        frames = frames_in(model, trajectory)
-        yield rows, ForwardRun(trajectory, joint_angles[rows], joint_rates[rows], *frames, angles[rows])
 
 
 def followed(model: Model, angles: Array, rates: Array, h: float, cyclic: bool) -> tuple[Array, Array]:

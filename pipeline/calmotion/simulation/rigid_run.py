@@ -19,7 +19,7 @@ from calmotion.multibody.model.model import Model, body_anchors, compile_model, 
 from calmotion.multibody.model.topology import Tree, chain_members
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.simulation.forward import AT_ONCE, ForwardRun, reactions_at, run_forward
+from calmotion.simulation.forward import ForwardRun, reactions_at, run_forward
 from calmotion.simulation.inputs.contacts import sample_world
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.open_chains import refuse_open_chains, refuse_open_failure
@@ -147,7 +147,8 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
     acceleration = np.gradient(states.V[:, :, :3], h, axis=0) if len(states.c) > 1 else np.zeros_like(states.c)
     angular = np.gradient(omega, h, axis=0) if len(states.c) > 1 else np.zeros_like(omega)
     reach = _reach(model, run)
-    force, moment = _joint_loads(model, run)
+    transmitted = reactions_at(model, run, slice(None))
+    force, moment = transmitted.forces, transmitted.moments
     closed = _in_loops(model)
     component_of = {body: k for k, body in enumerate(tree.body)}
     number = {joint: k for k, joint in enumerate((*tree.joint, *tree.closing))}
@@ -177,16 +178,6 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
             )
         )  # fmt: skip
     return tuple(result)
-
-
-def _joint_loads(model: Model, run: ForwardRun) -> tuple[Array, Array]:
-    """Forces [N] and moments [N m] of all joints, shape [T, J, 3] each; see `Reactions`."""
-    parts = []
-    for start in range(0, len(run.joint_angles), AT_ONCE):
-        found = reactions_at(model, run, slice(start, start + AT_ONCE))
-        parts.append((found.forces, found.moments))
-    forces, moments = (np.concatenate(own) for own in zip(*parts, strict=True))
-    return forces, moments
 
 
 def _in_loops(model: Model) -> set[int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
-from calmotion.simulation.forward import AT_ONCE, ForwardRun, reactions_at, run_forward, run_in_pieces
+from calmotion.simulation.forward import ForwardRun, reactions_at, run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.open_chains import open_joints
 from calmotion.simulation.preparation import Prepared, failure_error, prepare
@@ -81,34 +81,15 @@ def simulate_at(
     angles, rates = sample_tracks(shot.animation.current, grid)
     steady = SteadyState(model, prepared.world, grid.h, workspace) if grid.cyclic else None
     try:
-        if steady is not None:
-            whole = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.scheme, steady)
-            return _at_frames(prepared, [(slice(0, len(angles)), whole)], options.scheme, elastic)
-        pieces = run_in_pieces(
-            model, workspace, angles, rates, grid.h, prepared.world, options.scheme, AT_ONCE, divides
-        )
-        return _at_frames(prepared, pieces, options.scheme, elastic)
+        run = run_forward(
+            model, workspace, angles, rates, grid.h, prepared.world, None, options.scheme, steady, divides
+        )  # fmt: skip
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
-
-
-def _at_frames(
-    prepared: Prepared, pieces: Iterable[tuple[slice, ForwardRun]], integrator: str, wanted: bool
-) -> StepRun:
-    """What counts of a simulation, from its pieces."""
-    grid, positions, efforts, gap = prepared.grid, [], [], 0.0
-    elastic: list[tuple[NDArray[np.float32], ...]] = []
-    for rows, run in pieces:
-        frames = grid.frames[(grid.frames >= rows.start) & (grid.frames < rows.stop)] - rows.start
-        positions.append(run.target_positions[frames])
-        efforts.append(_efforts(prepared, run, frames))
-        if wanted:
-            parts = elastic_by_body(prepared.model, run.trajectory.states.u)
-            elastic.append(tuple(part.astype(np.float32) for part in parts))
-        gap = max(gap, run.trajectory.max_joint_gap)
+    parts = elastic_by_body(model, run.trajectory.states.u) if elastic else []
     return StepRun(
-        grid.h, np.concatenate(positions), tuple(np.concatenate(parts) for parts in zip(*elastic, strict=True)),
-        integrator, gap, np.concatenate(efforts), order_of(prepared.character),
+        grid.h, run.target_positions[grid.frames], tuple(part.astype(np.float32) for part in parts), options.scheme,
+        run.trajectory.max_joint_gap, _efforts(prepared, run, grid.frames), order_of(shot.character),
     )  # fmt: skip
 
 
