@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from calmotion.errors import ShotError
-from calmotion_plugins.benchmarks.common.tables import read_rows, write_rows
 
 calibration = pytest.importorskip("calmotion_plugins.benchmarks.accuracy.calibration")  # needs the plugin calibration
 HEADS, Recovered, main, table_of = (
@@ -23,35 +21,6 @@ def test_the_table_counts_intervals_that_cover_the_truth():
     # the interval of the third does not tell 1%
     assert modulus == ["modulus", "3", "67%", "2%", "3%", "0.5%", "3", "1%: 1 of 2"] and len(modulus) == len(HEADS)
     assert delay == ["delay", "1", "100%", "1 ms", "1 ms", "2 ms", "0", "1 ms: 0 of 0"]
-
-
-def test_trials_are_resumed_from_the_table_of_the_same_real_arm(tmp_path, monkeypatch, capsys):
-    ran = []
-    monkeypatch.setattr(
-        calibration, "tried", lambda number, finer: [row(number, "modulus", 0.01, 0.01)] * (ran.append(number) or 1)
-    )
-    table = str(tmp_path / "rows.csv")
-    assert main(["--trials", "2", "--finer-mesh", "--csv", table]) == 0
-    assert main(["--trials", "4", "--finer-mesh", "--csv", table, "--resume"]) == 0
-    assert ran == [0, 1, 2, 3]
-    assert read_rows(table, Recovered) == [row(number, "modulus", 0.01, 0.01) for number in range(4)]
-    with pytest.raises(ShotError, match="finer mesh"):
-        main(["--trials", "5", "--csv", table, "--resume"])
-    with pytest.raises(SystemExit):
-        main(["--resume"])
-    assert "--csv FILE" in capsys.readouterr().err
-
-
-def test_a_table_with_other_columns_or_values_is_refused(tmp_path):
-    table = tmp_path / "rows.csv"
-    table.write_text("trial,kind\n0,modulus\n")
-    with pytest.raises(ShotError, match="columns"):
-        read_rows(str(table), Recovered)
-    write_rows(str(table), Recovered, [row(0, "modulus", 0.01, 0.01)])
-    table.write_text(table.read_text().replace("True", "yes", 1))
-    with pytest.raises(ShotError, match="line 2") as refused:
-        read_rows(str(table), Recovered)
-    assert refused.value.attribute == "finer_mesh"
 
 
 @pytest.mark.long

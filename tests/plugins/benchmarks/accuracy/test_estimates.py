@@ -1,11 +1,7 @@
 """Random shots by error over estimate: drawn alike every time, measured against regular meshes."""
 
-import csv
-import json
-
 import numpy as np
 import pytest
-from calmotion.errors import ShotError
 from calmotion_plugins.benchmarks.accuracy import estimates
 from calmotion_plugins.benchmarks.accuracy.estimates import Judged, counts, drawn
 
@@ -36,39 +32,3 @@ def test_every_shot_is_counted_once():
     assert [int(n) for _, n, _ in table[:-1]] == [1, 0, 0, 2, 1, 1, 1, 0, 3, 3]
     assert table[0][0] == "0 to 0.05" and table[6] == ["above 1.5", "1", "17%"]
     assert [table[-3], table[-1]] == [["0.05 to 1", "3", "50.0%"], ["largest", "7.00", "-"]]
-
-
-@pytest.mark.parametrize(("ratio", "reference", "status"), [(0.4, 1e-5, 0), (1.6, 1e-5, 1), (1.6, 1e-3, 0)])
-def test_the_command_fails_where_an_error_is_far_above_its_estimate(
-    monkeypatch, capsys, tmp_path, ratio, reference, status
-):
-    def judged(number):
-        if number == 1:
-            raise ShotError("it bends too far", path="/Arm")
-        return row(number, ratio, reference)
-
-    monkeypatch.setattr(estimates, "judged", judged)
-    files = ["--csv", str(tmp_path / "rows.csv"), "--markdown", str(tmp_path / "table.md")]
-    assert estimates.main(["--count", "3", "--json", *files]) == status
-    out, err = capsys.readouterr()
-    assert [r["ratio"] for r in json.loads(out)["rows"]] == pytest.approx([ratio, ratio]) and "refused" in err
-    with open(tmp_path / "rows.csv", newline="") as file:
-        assert [int(r["shot"]) for r in csv.DictReader(file)] == [0, 2]
-    assert (tmp_path / "table.md").read_text().startswith("| error over estimate | shots | share |")
-
-
-def test_a_campaign_goes_on_with_the_shots_that_its_table_does_not_have(monkeypatch, tmp_path):
-    measured = []
-
-    def judged(number):
-        measured.append(number)
-        return row(number, 0.5)
-
-    monkeypatch.setattr(estimates, "judged", judged)
-    resumed = ["--csv", str(tmp_path / "rows.csv"), "--resume"]
-    assert estimates.main(["--first", "2", "--count", "2", *resumed]) == 0
-    assert estimates.main(["--count", "4", *resumed]) == 0 and measured == [2, 3, 0, 1]
-    with open(tmp_path / "rows.csv", newline="") as file:
-        assert [int(r["shot"]) for r in csv.DictReader(file)] == [0, 1, 2, 3]
-    with pytest.raises(SystemExit):
-        estimates.main(["--resume"])

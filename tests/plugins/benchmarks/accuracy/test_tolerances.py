@@ -1,12 +1,8 @@
 """Tolerances of the optimisation, measured: they are kept, and one that is not is told."""
 
-import csv
-import dataclasses
-import json
-
 import pytest
 from calmotion.testing import beam_arm, quintic, shot_of
-from calmotion_plugins.benchmarks.accuracy import reference_bench, tolerances
+from calmotion_plugins.benchmarks.accuracy import reference_bench
 from calmotion_plugins.benchmarks.accuracy.tolerances import Tolerances
 from calmotion_plugins.benchmarks.common.shots import Unreduced
 
@@ -40,35 +36,6 @@ def test_results_keep_their_tolerance(rows):
         assert row.kept and row.error_m <= row.tolerance_m == tolerance
         assert row.shake_after_m < 0.2 * row.shake_before_m
     assert rows[1].coordinates >= rows[0].coordinates
-
-
-def test_the_command_reports_whether_tolerances_are_kept(shot, rows, monkeypatch, capsys, tmp_path):
-    found = list(rows)
-    monkeypatch.setattr(tolerances, "load_unreduced", lambda path: shot)
-    warmed = []
-    monkeypatch.setattr(Tolerances, "warm", lambda self, *arguments: warmed.append(arguments))
-    monkeypatch.setattr(Tolerances, "kept", lambda self, tolerance, command: found.pop(0))
-    arguments = [
-        "arm.usda",
-        "--tolerances",
-        "10mm",
-        "0.001",
-        "--optimize",
-        "--json",
-        "--csv",
-        str(tmp_path / "rows.csv"),
-        "--markdown",
-        str(tmp_path / "rows.md"),
-    ]
-    assert tolerances.main(arguments) == 0 and warmed == [(0.01, "optimize")]
-    assert [row["kept"] for row in json.loads(capsys.readouterr().out)["rows"]] == [True, True]
-    with open(tmp_path / "rows.csv", newline="") as file:
-        assert [float(row["error_m"]) for row in csv.DictReader(file)] == [row.error_m for row in rows]
-    lines = (tmp_path / "rows.md").read_text().splitlines()
-    assert len(lines) == 4 and lines[0].startswith("| shot | tolerance | error |")
-    assert [line.split(" | ")[1] for line in lines[2:]] == ["10 mm", "1 mm"]
-    found += [rows[0], dataclasses.replace(rows[1], error_m=2e-3)]
-    assert tolerances.main(arguments) == 1
 
 
 def test_a_reference_with_finer_meshes_knows_how_far_its_reduction_may_be_off(shot):

@@ -1,11 +1,7 @@
 """Maps of stability: every cell runs or is refused with a reason, and the boundary of an integrator is where it is."""
 
-import csv
-import json
-
 import pytest
 from calmotion.model.run import INTEGRATORS
-from calmotion_plugins.benchmarks.integrators import stability, stability_map
 from calmotion_plugins.benchmarks.integrators.stability import largest_steps
 from calmotion_plugins.benchmarks.integrators.stability_map import (
     MAPS,
@@ -55,19 +51,3 @@ def test_a_boundary_is_the_largest_step_below_which_all_run():
     cells = [cell(1.0, 1 / 24, RUNS), cell(1.0, 1 / 48, REFUSED), cell(1.0, 1 / 120, RUNS), cell(1.0, 1 / 240, RUNS)]
     cells += [cell(2.0, 1 / 24, RUNS), cell(2.0, 1 / 240, REFUSED)]
     assert largest_steps(cells) == {1.0: 1 / 120, 2.0: None}
-
-
-def test_the_command_writes_cells_and_a_table(capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(stability_map, "MAPS", {"load": rows_of("load", 1e-6)})
-    monkeypatch.setattr(stability_map, "STEPS", {"bdf2": (1 / 48,), "rk4": (1 / 24,)})
-    table = tmp_path / "cells.csv"
-    assert stability.main(["--json", "--only", "load", "--csv", str(table)]) == 0
-    report = json.loads(capsys.readouterr().out)
-    stable, refused = report["cells"]
-    assert stable["outcome"] == RUNS and stable["map"] == "load" and stable["step_s"] == 1 / 48 and stable["wall_s"] > 0
-    assert refused["outcome"] == REFUSED and refused["why"].startswith("/Arm/") and refused["error_m"] is None
-    assert [row["integrator"] for row in csv.DictReader(table.open())] == ["bdf2", "rk4"]
-    monkeypatch.setattr(stability_map, "REACH", 0.1)
-    assert stability.main(["--only", "load"]) == 1
-    out = capsys.readouterr().out
-    assert "the target flew away" in out and "1 cells fail" in out and "Largest stable step" in out

@@ -19,11 +19,6 @@ def shot(tmp_path_factory):
     return write_arm(tmp_path_factory.mktemp("arm") / "arm.usda")
 
 
-def rows_of(file):
-    with open(file, newline="") as text:
-        return list(csv.DictReader(text))
-
-
 @pytest.mark.long
 def test_the_survey_has_a_row_for_each_link_and_says_what_became_of_it(shot, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "cache"))
@@ -59,26 +54,6 @@ def test_a_link_that_is_refused_says_why_and_one_whose_process_ends_too(shot, tm
     heard = capsys.readouterr()
     assert "fault: its process ended (signal SIGSEGV)" in heard.err and "min left" in heard.err
     assert "arm fore: its process ended" in heard.out
-
-
-def test_a_survey_goes_on_with_the_links_that_its_table_has_not(shot, tmp_path, capsys):
-    file = tmp_path / "links.csv"
-    command = [f"{shot}:upper", f"{shot}:fore", "--geometry-only", "--csv", str(file)]
-    assert meshing.main(command) == 0
-    before = rows_of(file)
-    text = file.read_text().splitlines(keepends=True)
-    kept = text[1].replace("visual surface", "clay")
-    file.write_text(text[0] + kept)  # of another source; the second is missing
-    capsys.readouterr()
-    assert meshing.main([*command, "--resume"]) == 0
-    told = capsys.readouterr().err
-    assert before[1]["link"] in told and f" {before[0]['link']}:" not in told
-    after = rows_of(file)
-    assert [row["link"] for row in after] == [row["link"] for row in before] and after[0]["source"] == "clay"
-    assert meshing.main([*command, "--resume"]) == 0 and "clay" in capsys.readouterr().out  # of the table alone
-    with pytest.raises(SystemExit):
-        meshing.main([str(shot), "--resume"])
-    assert "--resume needs --csv FILE" in capsys.readouterr().err
 
 
 def test_copies_and_mirror_images_are_surveyed_once(shot):
