@@ -296,9 +296,9 @@ def test_options_reach_the_plugins_in_si_units(run, command):
         seen.append(context.get(Source))
         return (synthetic.character(), synthetic.animation(), PROVENANCE)
 
-    run(command, "a.usda", "--step", "2ms", "--tolerance", "1mm", "--integrator", "radau", "--pre-roll", "0.5",
+    run(command, "a.usda", "--step", "2ms", "--tolerance", "1mm", "--integrator", "rk4", "--pre-roll", "0.5",
         "--quiet", read=read)  # fmt: skip
-    assert seen == [Source("a.usda", command, RunSettings(0.001, 0.002, 0.5, "radau"))]
+    assert seen == [Source("a.usda", command, RunSettings(0.001, 0.002, 0.5, "rk4"))]
 
 
 @pytest.mark.parametrize(

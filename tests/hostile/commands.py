@@ -103,7 +103,6 @@ CASES: dict[str, Case] = {
     "an integrator that is none": simulated("--integrator euler", "bdf2", statuses=USAGE),
     "rk4 with a long step on stiff links": simulated("--integrator rk4 --step 40ms", make=SOFT, statuses=(0, 1)),
     "rk4 with a short step": simulated("--integrator rk4 --step 1ms", make=SOFT, statuses=(0, 1)),
-    "radau": simulated("--integrator radau", statuses=DONE),
     "keep and leave out the same": simulated("--keep modes --leave-out modes", "modes"),
     "keep all and leave out all": simulated("--keep all --leave-out all", "all"),
     "keep the modes and leave out all else": simulated("--keep modes --leave-out all", statuses=DONE),

@@ -145,7 +145,7 @@ CASES = {
     "a cyclic shot that does not close": (simulate, open_loop, {}, "targetPosition"),
     "a pre-roll of a cyclic shot": (simulate, shot_settings(cyclic=True), {"pre_roll": 1.0}, "--pre-roll"),
     "an integrator that cannot be cyclic": (
-        simulate, shot_settings(cyclic=True), {"integrator": "radau"}, "--integrator"
+        simulate, shot_settings(cyclic=True), {"integrator": "rk4"}, "--integrator"
     ),
     "locked motors": (optimize, motor_settings(optimize=False), {}, "calm:motor:optimize"),
     "too short for kept ends": (optimize, short, {}, "calm:retarget:endpoints"),

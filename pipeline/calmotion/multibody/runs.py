@@ -71,7 +71,7 @@ def simulate(model: Model, values: Array, rates: Array, step: float, integrator:
     Args:
         values, rates: Inputs of the motors [rad or m] and their rates, shape [T, M].
         step: Time between two instants [s].
-        integrator: `bdf2`, `newmark`, `generalized-alpha`, `rk4` or `radau`.
+        integrator: `bdf2`, `newmark`, `generalized-alpha` or `rk4`.
 
     Raises:
         SimulationFailure: No equilibrium, or a step that cannot be solved.

@@ -33,7 +33,7 @@ _MORE = 1.1  # of what is allowed: where a run with half the step tells more, th
 
 
 def chooses_step(character: Character, options: RunSettings) -> bool:
-    """Whether the step follows from the tolerance; it does not for cyclic motions, RK4 and Radau."""
+    """Whether the step follows from the tolerance; it does not for cyclic motions and RK4."""
     if options.step is not None or character.retarget.time_step is not None:
         return False
     return options.scheme in IMPLICIT and not character.retarget.cyclic

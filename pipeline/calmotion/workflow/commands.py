@@ -47,7 +47,7 @@ def simulate(
         shot: The shot, or its USD file.
         tolerance: Accuracy of the simulation at the targets, [m] or text with a unit (`"1mm"`); None: the shot's own.
         step: Time step, [s] or text with a unit; None: from the tolerance.
-        integrator: `bdf2`, `newmark`, `generalized-alpha`, `rk4` or `radau`; None: automatic.
+        integrator: `bdf2`, `newmark`, `generalized-alpha` or `rk4`; None: automatic.
         pre_roll: Time that eases into the motion, [s] or text with a unit; None: automatic.
         motors: `authored`: as the models of the motors say; `ideal`: joints follow their curves exactly.
         shaper: Input shaper (`zv`, `zvd`, `zv2`, `zvd2`) or `lowpass` filter for the motors' tracks, to compare with.

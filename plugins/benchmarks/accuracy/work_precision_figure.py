@@ -10,7 +10,7 @@ import numpy as np
 from .reference_bench import Point, front
 
 COLORS = {
-    "bdf2": "#0072b2", "newmark": "#d55e00", "generalized-alpha": "#e69f00", "rk4": "#999999", "radau": "#009e73",
+    "bdf2": "#0072b2", "newmark": "#d55e00", "generalized-alpha": "#e69f00", "rk4": "#999999",
 }  # fmt: skip
 STYLES = {
     **{name: (color, "o-") for name, color in COLORS.items()},

@@ -14,7 +14,6 @@ from .reference_bench import BASE, TOLERANCES, Bench, Point, Reference, setting_
 
 STEPS = (1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 960, 1 / 1920)
 FINER_STEPS = (1 / 3840, 1 / 7680)  # too, where directions are fine enough: the tightest tolerances ask for them
-RADAU_STEPS = (1 / 60, 1 / 120)  # of higher order, far dearer, and not compiled: few, with the fewest coordinates
 MODES = (1, 2, 4, 8, 16)
 LEVELS = (5e-4, 5e-6)  # what holding bodies to directions may change in the runs that vary step and integrator [m]
 DIRECTIONS = (1e-3, 1e-4, 1e-5, 1e-6)  # and in those that vary it
@@ -32,7 +31,6 @@ def forward_points(bench: Bench, reference: Reference) -> list[Point]:
         for integrator in ("bdf2", "newmark", "generalized-alpha")
         for step in steps
     ]
-    points += [bench.measure(reference, "radau", f"1/{1 / h:.0f} s", held[0], h, "radau") for h in RADAU_STEPS]
     fine = 0.5 * MAX_STEP
     for allowed in DIRECTIONS:
         points.append(

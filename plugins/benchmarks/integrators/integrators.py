@@ -2,7 +2,7 @@
 
 `calmotion bench integrators [--json]` measures
 
-- errors of positions and velocities against the step, on a flexible arm with a driven joint, against Radau IIA at a
+- errors of positions and velocities against the step, on a flexible arm with a driven joint, against RK4 at a
   fine step;
 - the outcome for two thin steel links in a fast motion at the working step: RK4 fails at once, even
   with steps thousands of times smaller, Newmark fails later, BDF2 runs to the end.
@@ -29,11 +29,11 @@ RK4_PARTS = (1, 1000, 4000)  # of the working step
 SECOND_ORDER = ("bdf2", "newmark", "generalized-alpha")
 # steps in a sample of the motion; explicit steps must resolve the fastest mode
 STEPS: dict[str, tuple[int, ...]] = {name: (8, 16, 32, 64) for name in SECOND_ORDER}
-STEPS |= {"rk4": (32, 64, 128), "radau": (1, 2, 4, 8)}
+STEPS |= {"rk4": (32, 64, 128)}
 # a motion that starts a little later starts from rest, as its spline rings before it; and one that is sampled densely
 # has small jumps of its third derivative, whose waves only small steps resolve
 RATE, LATER = 60.0, 0.25
-FINEST = 24
+FINEST = 512
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def orders(scene: Scene, steps: dict[str, tuple[int, ...]] = STEPS, finest: int 
         finest: Those of the reference.
     """
     frame = float(scene.animation.frame_times[1])
-    reference = scene.run(frame / finest, "radau")
+    reference = scene.run(frame / finest, "rk4")
     found = []
     for integrator, counts in steps.items():
         scene.run(frame / counts[0], integrator, 2.0 * frame)  # compiles

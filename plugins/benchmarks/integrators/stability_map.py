@@ -26,8 +26,6 @@ STEPS: dict[str, tuple[float, ...]] = {
     "newmark": IMPLICIT,
     "generalized-alpha": IMPLICIT,
     "rk4": (1 / 24, 1 / 240, 1 / 2400, 1 / 24000, 1 / 72000, 1 / 240000, 1 / 720000, 1 / 2400000, 1 / 7200000),
-    # dense, of order 5, for references: ten times the time of the others, and exact long before their steps
-    "radau": IMPLICIT[:3],
 }
 # below this step [s] only so many steps, before the arm moves: what blows up does so within some hundred
 BRIEFLY, BEGINNING = 1 / 2400, 1000

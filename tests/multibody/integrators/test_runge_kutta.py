@@ -10,7 +10,7 @@ from calmotion.multibody.integrators.workspace import Workspace
 
 
 def test_it_is_of_fourth_order_in_positions_and_velocities(flexible_tree):
-    exact = flexible_tree(160, "radau").states
+    exact = flexible_tree(2560, "rk4").states
     errors = []
     for steps in (160, 320):
         states = flexible_tree(steps, "rk4").states
@@ -30,10 +30,9 @@ def swing(integrator, h, seconds=10.0):
     return target_frames(model, states.c, states.q, states.u)[0][-1, 0], trajectory
 
 
-@pytest.mark.parametrize("integrator, h", [("rk4", 1e-3), ("radau", 2e-2)])
-def test_a_pendulum_comes_to_its_published_place(integrator, h):
+def test_a_pendulum_comes_to_its_published_place():
     """Pendulum of 1 m released level: (-0.27508746, -0.96141921) at t = 10 s; here to the other side."""
-    tip, trajectory = swing(integrator, h)
+    tip, trajectory = swing("rk4", 1e-3)
     assert np.abs(tip[[0, 2]] - [0.27508746, -0.96141921]).max() < 3e-8
     assert trajectory.max_joint_gap < 1e-8
     assert np.abs(np.linalg.norm(trajectory.states.q, axis=2) - 1.0).max() < 1e-9

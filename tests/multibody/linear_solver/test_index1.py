@@ -10,8 +10,8 @@ from calmotion.multibody.model.system import State, allocate_blocks
 @pytest.fixture(scope="module")
 def moving(flexible_tree):
     """A state in motion, inputs there, and its accelerations by differences."""
-    steps, n = 160, 100
-    states = flexible_tree(steps, "radau").states
+    steps, n = 640, 400
+    states = flexible_tree(steps, "rk4").states
     h = flexible_tree.duration / steps
     # fourth-order difference
     V = states.V[n - 2 : n + 3]

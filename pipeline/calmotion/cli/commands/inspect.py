@@ -39,7 +39,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "with status 1 if there are any",
     )
     command.add_argument("--verbose", action="store_true", help="also print all simplifications and their reasons")
-    simulation_options(command, "bdf2, newmark, generalized-alpha, rk4 or radau (default: automatic)")
+    simulation_options(command, "bdf2, newmark, generalized-alpha or rk4 (default: automatic)")
 
 
 def run(args: argparse.Namespace, output: Output) -> int:

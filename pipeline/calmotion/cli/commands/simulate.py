@@ -27,7 +27,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     run_options(command)
     simulation_options(
         command,
-        "bdf2, newmark, generalized-alpha, rk4 or radau (default: generalized-alpha, which needs half as many steps, "
+        "bdf2, newmark, generalized-alpha or rk4 (default: generalized-alpha, which needs half as many steps, "
         "or bdf2 where that fails)",
     )
 

@@ -1,1 +1,1 @@
-"""BDF2, Newmark, generalised-alpha, RK4 and Radau IIA behind one interface, and Newton's method."""
+"""BDF2, Newmark, generalised-alpha and RK4 behind one interface, and Newton's method."""

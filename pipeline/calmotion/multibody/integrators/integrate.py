@@ -1,7 +1,7 @@
 """All integrators behind one interface.
 
 `bdf2` (the default, and the one with derivatives), `newmark` and `generalized-alpha` are implicit, on the index-2 form;
-`rk4` is explicit, on the index-1 form, and `radau` of order 5, for reference solutions.
+`rk4` is explicit, on the index-1 form.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import IntegrationError
 from calmotion.multibody.failure import Reason, SimulationFailure
-from calmotion.multibody.integrators import radau, runge_kutta
+from calmotion.multibody.integrators import runge_kutta
 from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.multibody.integrators.simulation import largest_gap, simulate
 from calmotion.multibody.integrators.trajectory import Inputs, Trajectory, copy_of_instant
@@ -40,7 +40,7 @@ def integrate(
 ) -> Trajectory:  # fmt: skip  # parameters: those of `simulate`
     """`simulation.simulate` by any integrator of `INTEGRATORS`; same arguments, results and errors.
 
-    Between instants `rk4` and `radau` use cubics through angles and rates, which is exact for a cubic spline with
+    Between instants `rk4` uses cubics through angles and rates, which is exact for a cubic spline with
     knots on instants.
 
     Raises:
@@ -68,18 +68,14 @@ def integrate(
     first, solved = equilibrium(system, start, angles[0], ws) if from_equilibrium else (start, 0)
     times: Array = h * np.arange(total, dtype=np.float64)
     drive = hermite_drive(times, angles, rates)
-    if integrator == "radau":
-        states = radau.integrate(system, first, drive, times, ws)
-    else:
-        states = State(*[np.zeros((total,) + part.shape) for part in first])
-        for part, value in zip(states, first, strict=True):
-            part[0] = value
-        inputs = stage_inputs(drive, times, runge_kutta.STAGES)
-        slopes = runge_kutta.allocate_slopes(system)
-        instant, component = runge_kutta.advance(system, h, states, inputs, ws, slopes, DIVERGED)
-        if component >= 0:
-            last = copy_of_instant(states, instant - 1)
-            raise SimulationFailure(instant * h, component, Reason.DIVERGED, last)
+    states = State(*[np.zeros((total,) + part.shape) for part in first])
+    for part, value in zip(states, first, strict=True):
+        part[0] = value
+    inputs = stage_inputs(drive, times, runge_kutta.STAGES)
+    slopes = runge_kutta.allocate_slopes(system)
+    instant, component = runge_kutta.advance(system, h, states, inputs, ws, slopes, DIVERGED)
+    if component >= 0:
+        raise SimulationFailure(instant * h, component, Reason.DIVERGED, copy_of_instant(states, instant - 1))
     world = rooted(None, total)
     gap = largest_gap(system, Inputs(angles, rates, world), states, ws.work)
     if progress is not None:

@@ -15,7 +15,7 @@ def test_the_front_has_the_settings_that_no_other_beats():
 def points():
     return [
         Point("a", "bdf2", "fast and wrong", 0.1, 1, 0.1, 2e-3),
-        Point("a", "radau", "fails", 0.1, 1, np.nan, np.nan),
+        Point("a", "rk4", "fails", 0.1, 1, np.nan, np.nan),
         Point("a", "newmark", "fastest", 0.1, 1, 0.5, 9e-4),
         Point("a", "tolerance", "1 mm", 0.1, 1, 0.8, 5e-4),
     ]

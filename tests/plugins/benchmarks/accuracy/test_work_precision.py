@@ -28,7 +28,6 @@ def points(bench, reference):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(work_precision_points, "STEPS", (1 / 60, 1 / 120, 1 / 240, 1 / 480))
         patch.setattr(work_precision_points, "FINER_STEPS", (1 / 960,))
-        patch.setattr(work_precision_points, "RADAU_STEPS", (1 / 60,))
         patch.setattr(work_precision_points, "MODES", (2, 8))
         patch.setattr(work_precision_points, "LEVELS", (5e-6,))
         patch.setattr(work_precision_points, "DIRECTIONS", (1e-4,))

@@ -33,11 +33,11 @@ def test_options_have_the_same_meaning_for_each_shot(command):
 
 def test_simulations_refuse_options_of_searches():
     parser = build_parser()
-    simulated = ["batch", "shot.usda", "-o", "out", "--simulate", "--integrator", "radau"]
+    simulated = ["batch", "shot.usda", "-o", "out", "--simulate", "--integrator", "newmark"]
     args = parser.parse_args(simulated)
     line = forwarded(args)
-    assert command_of(args) == "simulate" and line == ["--integrator=radau"]
-    assert parser.parse_args(["simulate", "shot.usda", *line]).integrator == "radau"
+    assert command_of(args) == "simulate" and line == ["--integrator=newmark"]
+    assert parser.parse_args(["simulate", "shot.usda", *line]).integrator == "newmark"
     for given in (["--scenarios", "5"], ["--robust"]):
         with pytest.raises(SettingError, match=f"{given[0]} belongs to `calmotion optimize`"):
             forwarded(parser.parse_args([*simulated, *given]))
