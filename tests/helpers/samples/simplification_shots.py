@@ -21,7 +21,6 @@ from calmotion.model import (
     Motor,
     Target,
     TetGeometry,
-    Track,
 )
 from calmotion.model.character import WORLD
 from calmotion.testing import beam_arm, beam_mesh, quintic, shot_of
@@ -59,12 +58,6 @@ def plastic_arm(rate: float = 24.0) -> SimplificationShot:
     """Two plastic links that swing, animated at so many frames a second."""
     character, meshes = beam_arm(2, length=0.3, thickness=0.014, payload=0.2)
     return SimplificationShot("arm", _with_geometry(character, meshes), _swing(rate=rate), meshes)
-
-
-def firm_arm() -> SimplificationShot:
-    """The same of thicker plastic, with less than a twentieth of the deflection."""
-    character, meshes = beam_arm(2, length=0.3, thickness=0.03, payload=0.1)
-    return SimplificationShot("firm arm", _with_geometry(character, meshes), _swing(), meshes)
 
 
 def mixed_arm(cells: int = 8, across: int = 2) -> SimplificationShot:
@@ -162,16 +155,6 @@ def arm_with_head(features: int = 0) -> SimplificationShot:
     motors = (*character.motors, *(Motor(k, joints[k].path, _ANGLE) for k in added))
     character = replace(character, bodies=bodies, joints=tuple(joints), motors=motors)
     return SimplificationShot("arm with a head", character, _swing(motors=len(motors)), shot.meshes)
-
-
-def held_arm() -> SimplificationShot:
-    """The plastic arm, at rest for two seconds before it moves, its sag not counting as an error."""
-    shot = plastic_arm()
-    character = replace(shot.character, retarget=replace(shot.character.retarget, reference="static"))
-    times = np.arange(round(4.0 * 24) + 1) / 24.0
-    values = quintic(0.8, 0.4, 2.2)(times)
-    tracks = (Track(times, values),) * 2
-    return SimplificationShot("pausing arm", character, Animation(times, tracks, tracks), shot.meshes)
 
 
 def _frame(x: float, y: float = 0.0, z: float = 0.0, rotation: Array = IDENTITY) -> Frame:
