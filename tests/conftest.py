@@ -112,7 +112,9 @@ def pytest_configure(config):
 # While one of two processes compiles the kernels, the other does what needs none of them: each begins with an eighth of
 # all tests. Two that need the same kernel at once would both compile it.
 COMPILING = "multibody"
-WITHOUT_KERNELS = {"host", "refusals", "rigging", "views", "usd", "mesh", "linear_algebra", "reduction", "support"}
+WITHOUT_KERNELS = {
+    "host", "refusals", "catalogs", "rigging", "views", "usd", "mesh", "linear_algebra", "reduction", "support",
+}  # fmt: skip
 WITH_KERNELS = {
     "test_equivalence.py", "test_length_motors_and_roots.py", "test_sources_end_to_end.py", "test_template.py",
     "test_compilation.py", "test_kernel_cache.py", "test_cubature.py", "test_choice.py",

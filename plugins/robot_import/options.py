@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from calmotion.catalogs import Material
 from calmotion.model import MotorTracks
-from calmotion.rigging import Material
 from calmotion.usd import is_applied, is_rigid_body
 
 from .robot_motors import named

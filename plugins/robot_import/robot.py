@@ -11,10 +11,10 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
+from calmotion.catalogs import Material, known_materials, material_named
 from calmotion.errors import ShotError
 from calmotion.host import Host, SettingError, has_no_unit, open_host, parse_quantity
 from calmotion.model import Animation, Character, MotorTracks, Provenance, Source
-from calmotion.rigging import Material, known_materials, material_named
 from calmotion.support import try_writing
 from calmotion.usd import EXTENSIONS, read_shot, refuse_input_as_output, relative_asset, write_layer
 from calmotion.version import __version__

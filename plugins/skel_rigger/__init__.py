@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from calmotion.catalogs import MATERIALS
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
 from calmotion.model import OutputPaths, Rig, Source
-from calmotion.rigging import MATERIALS
 
 
 class RigSkeleton(Operator):

@@ -67,7 +67,7 @@ def test_the_licence_is_kept_apart(repository):
 
 
 def test_materials_are_those_of_the_rigger():
-    from calmotion.rigging.materials import MATERIALS
+    from calmotion.catalogs.materials import MATERIALS
 
     (node,) = [n for n in ast.parse((EXTENSION / "settings.py").read_text()).body if isinstance(n, ast.Assign)]
     assert set(ast.literal_eval(node.value)) == set(MATERIALS)

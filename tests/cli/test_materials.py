@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 
-from calmotion.rigging.materials import MATERIALS
+from calmotion.catalogs.materials import MATERIALS
 
 
 def test_materials_are_listed_with_their_sources(calmotion):

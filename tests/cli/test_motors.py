@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 
-from calmotion.rigging.motor_types import motor_types
+from calmotion.catalogs.motor_types import motor_types
 
 
 def test_motors_are_listed_and_one_is_shown_with_the_source_of_each_value(calmotion):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from calmotion.rigging.motor_types import motor_types
+from calmotion.catalogs.motor_types import motor_types
 from calmotion.usd.reading import read_shot
 from sample_shots import path_of
 

@@ -6,6 +6,7 @@ import os
 
 import pytest
 from calmotion import ShotError
+from calmotion.catalogs.materials import read_materials
 from calmotion.host import SettingError
 from calmotion.host.choices import FILE_NAME as DISABLED
 from calmotion.host.choices import configuration_folder, disabled_plugins
@@ -13,7 +14,6 @@ from calmotion.host.errors import PluginError
 from calmotion.host.manifest import FILE_NAME as MANIFEST
 from calmotion.host.manifest import read_manifest
 from calmotion.host.settings import read_settings_file
-from calmotion.rigging.materials import read_materials
 from calmotion.support.reading import read_toml
 
 

@@ -5,7 +5,7 @@ FLOORS = (
     ("arrays", "errors", "public_names", "version"),
     ("support",),
     ("model",),
-    ("mesh", "linear_algebra", "views"),
+    ("catalogs", "mesh", "linear_algebra", "views"),
     ("reduction", "rigging"),
     ("multibody", "usd"),
     ("simulation",),

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import chain, compiled
+from calmotion.catalogs.motor_types import motor_types
 from calmotion.model.motor import Coulomb, DirectCurrent, Directional, Load, Quadratic, Rotor, Stribeck, StribeckLoad
 from calmotion.multibody.model.system import FRICTION, FRICTION_SPEED, FRICTION_TERMS, SERVO_COLUMNS
 from calmotion.multibody.motors.friction import gear_friction, largest_friction
-from calmotion.rigging.motor_types import motor_types
 from motor_runs import INERTIA, LENGTH, MASS, G, pendulum, pitch, run, smooth
 from scipy.integrate import solve_ivp
 

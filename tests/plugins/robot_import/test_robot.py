@@ -114,7 +114,7 @@ def test_wrong_options_are_refused_before_the_robot_is_converted(robot, tmp_path
 
 
 def test_walls_have_units():
-    from calmotion.rigging.materials import MATERIALS
+    from calmotion.catalogs.materials import MATERIALS
 
     found = flexible_links("*fore* = pa12 , 2.5mm", MATERIALS)
     assert (found.pattern, found.name, found.thickness) == ("*fore*", "nylon", 0.0025)
@@ -150,8 +150,8 @@ def test_the_real_converter_makes_a_shot(robot, tmp_path):
 
 @pytest.mark.parametrize("text", ["*fore*=abs,3", "*fore*=abs, 0.5"])
 def test_a_wall_needs_a_unit(text):
+    from calmotion.catalogs.materials import MATERIALS
     from calmotion.host import SettingError
-    from calmotion.rigging.materials import MATERIALS
 
     with pytest.raises(SettingError, match="no unit") as error:
         flexible_links(text, MATERIALS)

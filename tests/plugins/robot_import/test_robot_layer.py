@@ -6,9 +6,9 @@ import functools
 
 import numpy as np
 import pytest
+from calmotion.catalogs.materials import MATERIALS
 from calmotion.errors import ShotError
 from calmotion.model import MotorTracks
-from calmotion.rigging.materials import MATERIALS
 from calmotion.usd.reading.shot import read_shot
 from calmotion_plugins.robot_import.options import FlexibleLinks, RobotOptions
 from calmotion_plugins.robot_import.robot_layer import robot_layer

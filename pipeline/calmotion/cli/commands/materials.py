@@ -23,7 +23,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.rigging.materials import known_materials, material_named
+    from calmotion.catalogs.materials import known_materials, material_named
 
     known = known_materials(args.materials)
     if args.name:

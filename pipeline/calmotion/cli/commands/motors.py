@@ -11,7 +11,7 @@ from calmotion.cli import Output, console_on, json_option, print_table, say
 from calmotion.model.motor import Coulomb
 
 if TYPE_CHECKING:
-    from calmotion.rigging.motor_types import MotorType
+    from calmotion.catalogs.motor_types import MotorType
 
 EXAMPLES = (("calmotion motors xm430-w350", "one motor, each value with its source"),)
 
@@ -28,8 +28,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.catalogs.motor_types import likely_motor_types, motor_type_named, motor_types
     from calmotion.errors import ShotError
-    from calmotion.rigging.motor_types import likely_motor_types, motor_type_named, motor_types
 
     known: Mapping[str, MotorType] = motor_types(args.motors)
     if args.name:
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 def _row(motor: MotorType) -> dict[str, Any]:
     """A motor for programs: values in SI, with their units and sources."""
-    from calmotion.rigging.motor_types import QUANTITIES
+    from calmotion.catalogs.motor_types import QUANTITIES
 
     units = {
         name: QUANTITIES[name].linear_si if motor.linear else QUANTITIES[name].si for name in motor.values
@@ -106,7 +106,7 @@ def _print(known: Mapping[str, MotorType], output: Output) -> None:
 
 
 def _print_one(motor: MotorType, output: Output) -> None:
-    from calmotion.rigging.motor_types import QUANTITIES
+    from calmotion.catalogs.motor_types import QUANTITIES
 
     console = console_on(output.stream)
     names = ", ".join([motor.name, *motor.aliases])

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.arrays import Array, IntArray
+from calmotion.catalogs.materials import Material
 from calmotion.model import MassProperties, Provenance
 from calmotion.rigging.links import Link, tip_of
-from calmotion.rigging.materials import Material
 from calmotion.usd import gf
 from calmotion.usd.reading.bodies.moments import surface_moments
 from calmotion.usd.reading.skeletons import BoundSkeleton

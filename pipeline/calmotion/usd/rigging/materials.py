@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from calmotion.rigging.materials import Material
+from calmotion.catalogs.materials import Material
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:

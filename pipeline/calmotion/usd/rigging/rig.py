@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.arrays import Array
+from calmotion.catalogs.materials import MATERIALS
 from calmotion.errors import ShotError
 from calmotion.model.outputs import Rig, RiggedJoint
 from calmotion.rigging.links import Link, make_links, targets_of
-from calmotion.rigging.materials import MATERIALS
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
 from calmotion.usd.diagnostics import quiet
@@ -34,7 +34,7 @@ class RigOptions:
     """How a robot is made.
 
     Attributes:
-        material: Name of the material of its links, one of `calmotion.rigging.materials.MATERIALS`.
+        material: Name of the material of its links, one of `calmotion.catalogs.materials.MATERIALS`.
         angle_tolerance: Largest residual angle between a joint and its hinges [rad].
         servo_share: Mass of a servo between two hinges, over that of the link that they turn.
         flexible: Names of the flexible links, `all`, or empty.

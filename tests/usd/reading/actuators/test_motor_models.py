@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.catalogs.motor_types import motor_types
 from calmotion.model.motor import Rotor
-from calmotion.rigging.motor_types import motor_types
 from calmotion.usd.reading import read_shot
 from pxr import Sdf, UsdPhysics, Vt
 from small_shots import ELBOW, SHOULDER, Scale, set_float, write_arm

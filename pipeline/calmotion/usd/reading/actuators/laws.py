@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
+from calmotion.catalogs.motor_types import MotorType
 from calmotion.errors import ShotError
 from calmotion.model.motor import FRICTION_LAWS, Coulomb, DirectCurrent
-from calmotion.rigging.motor_types import MotorType
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dialects import Spelling, authored

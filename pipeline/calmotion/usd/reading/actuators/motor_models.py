@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.catalogs.motor_types import MotorType
 from calmotion.errors import ShotError
 from calmotion.model.motor import MODELS, ON_ERROR, ON_JOINT, PRESCRIBED, DirectCurrent
-from calmotion.rigging.motor_types import MotorType
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dialects import GAINS, POSITION_ACTUATOR, Spelling, authored

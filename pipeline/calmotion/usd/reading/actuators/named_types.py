@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from calmotion.catalogs.motor_types import MotorType, likely_motor_types, motor_type_named, motor_types
 from calmotion.errors import ShotError
-from calmotion.rigging.motor_types import MotorType, likely_motor_types, motor_type_named, motor_types
 from calmotion.usd import schemas
 from calmotion.usd.reading.joints import JointPrim
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.catalogs.motor_types import MotorType
 from calmotion.errors import ShotError
 from calmotion.model.motor import PRESCRIBED, SERVO, DirectCurrent, Rotor
-from calmotion.rigging.motor_types import MotorType
 from calmotion.usd.dialects import ARMATURE, FRICTION, VISCOUS_FRICTION, Spelling, authored
 from calmotion.usd.reading.actuators.laws import friction_law
 from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.catalogs.motor_types import MotorType
 from calmotion.errors import ShotError
-from calmotion.rigging.motor_types import MotorType
 from calmotion.usd import schemas
 from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, authored, number_of
 from calmotion.usd.reading.actuators.mujoco_actuators import actuators_beside, numbers_of, reachable, token_of

@@ -6,7 +6,7 @@ import math
 
 import pytest
 from calmotion import ShotError
-from calmotion.rigging.motor_types import (
+from calmotion.catalogs.motor_types import (
     GROUPS,
     QUANTITIES,
     likely_motor_types,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from calmotion.catalogs.materials import GROUPS, MATERIALS, material_named, materials, read_materials
 from calmotion.errors import ShotError
-from calmotion.rigging.materials import GROUPS, MATERIALS, material_named, materials, read_materials
 
 
 @pytest.mark.parametrize("name", MATERIALS)
