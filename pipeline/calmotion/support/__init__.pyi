@@ -14,6 +14,7 @@ from calmotion.support.foreign_files import refuse_lfs_pointers as refuse_lfs_po
 from calmotion.support.foreign_files import remedy_for as remedy_for
 from calmotion.support.interrupts import answer as answer
 from calmotion.support.interrupts import check as check
+from calmotion.support.interrupts import deferred as deferred
 from calmotion.support.memory import available_memory as available_memory
 from calmotion.support.memory import too_large as too_large
 from calmotion.support.naming import distinct_names as distinct_names
@@ -21,6 +22,8 @@ from calmotion.support.naming import grouped_notes as grouped_notes
 from calmotion.support.naming import nearest as nearest
 from calmotion.support.operating_system import PIPES as PIPES
 from calmotion.support.operating_system import locked as locked
+from calmotion.support.operating_system import processors as processors
+from calmotion.support.operating_system import use_processors as use_processors
 from calmotion.support.reading import read_text as read_text
 from calmotion.support.reading import read_toml as read_toml
 from calmotion.support.time_columns import TIME_UNITS as TIME_UNITS

@@ -21,11 +21,6 @@ from calmotion.workflow.run import again as again
 from calmotion.workflow.run import carry_out as carry_out
 from calmotion.workflow.run import compiled_run as compiled_run
 from calmotion.workflow.run import no_input as no_input
-from calmotion.workflow.running.workers import LOCAL as LOCAL
-from calmotion.workflow.running.workers import executor_on as executor_on
-from calmotion.workflow.running.workers import finished as finished
-from calmotion.workflow.running.workers import refuse_unknown_place as refuse_unknown_place
-from calmotion.workflow.running.workers import result_of as result_of
 from calmotion.workflow.shot import Given as Given
 from calmotion.workflow.shot import Path as Path
 from calmotion.workflow.shot import Shot as Shot

@@ -21,8 +21,14 @@ from calmotion.model.run import Source
 from calmotion.support.memory import peak_memory
 from calmotion.version import __version__
 from calmotion.workflow.reactions import contact_rows, reaction_rows
-from calmotion.workflow.robustness import robustness_report, robustness_row
-from calmotion.workflow.targets import main_target, remaining_errors, still_targets, target_errors
+from calmotion.workflow.targets import (
+    main_target,
+    remaining_errors,
+    robustness_report,
+    robustness_row,
+    still_targets,
+    target_errors,
+)
 
 
 def left_out_row(row: Simplification) -> dict[str, Any]:

@@ -17,12 +17,13 @@ from typing import Any
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
 from calmotion.support import Fault, answer, try_writing, write_text
-from calmotion.workflow import LOCAL, Progress, executor_on, finished, plain, refuse_unknown_place, result_of
+from calmotion.workflow import Progress, plain
 from filelock import FileLock, Timeout
 
 from .attempt import attempt, attempts, kill_running, stored_report
 from .jobs import EXTRAS, LOGS, Job, forget, is_done, jobs_for
 from .report import DIED, KEPT, WAITING, BatchResult, JobResult
+from .workers import LOCAL, executor_on, finished, refuse_unknown_place, result_of
 
 MOST_ATTEMPTS = 3
 REPORT, PAGE, LOCK = "batch.json", "batch.md", ".batch.lock"

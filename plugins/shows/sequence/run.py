@@ -13,11 +13,12 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.support import write_text
 from calmotion.version import __version__
-from calmotion.workflow import LOCAL, Progress, plain
+from calmotion.workflow import Progress, plain
 
 from ..batch.jobs import Job, jobs_for
 from ..batch.report import BatchResult, JobResult
 from ..batch.run import run_jobs
+from ..batch.workers import LOCAL
 from .clips import Clip, Plan, pace_of, read_clips, read_plan, transition
 
 SHOTS, REPORT, PAGE = "shots", "sequence.json", "sequence.md"

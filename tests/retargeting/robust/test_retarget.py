@@ -11,7 +11,7 @@ from calmotion.model.tolerance import tolerance_of
 from calmotion.retargeting.run_checks import check_search
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.workflow.robustness import robustness_row
+from calmotion.workflow.targets import robustness_row
 from posed import ignore_progress
 
 OPTIONS = RunSettings(step=1 / 120, robust=RobustSettings("worst", 7, 20, 8.0, 2))

@@ -11,7 +11,7 @@ from calmotion.retargeting.robust.retarget import retarget_robustly
 from calmotion.retargeting.to_tolerance import continued
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.simulation import found_tracks
-from calmotion.workflow.robustness import robustness_report, robustness_row
+from calmotion.workflow.targets import robustness_report, robustness_row
 from posed import ignore_progress
 
 TOLERANCE = 6e-3

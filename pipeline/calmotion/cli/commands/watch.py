@@ -53,7 +53,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.host import SettingError
     from calmotion.support import interrupts
     from calmotion.workflow.commands import optimize, simulate
-    from calmotion.workflow.running.watch import Watch
+    from calmotion.workflow.watch import Watch
 
     if args.optimize and not args.output:
         raise SettingError("optimize writes a layer", path="-o", remedy="Name it with -o LAYER.")
@@ -92,7 +92,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
 def _tell(result: SimulationResult, report: dict[str, Any], args: argparse.Namespace, output: Output) -> int:
     """Print one line for a run; the exit status that it has alone."""
     from calmotion.cli.run import status_of
-    from calmotion.workflow.running.watch import largest_error
+    from calmotion.workflow.watch import largest_error
 
     if output.json:
         output.object(report)

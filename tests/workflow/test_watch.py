@@ -20,8 +20,8 @@ from calmotion.model import Animation, Character, FEMeshes, ModelChoices, Result
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.tolerance.reduced_bodies import ConvergedReduction, RunMemory
 from calmotion.workflow.commands import optimize, simulate
-from calmotion.workflow.running.watch import Watch, _growth, largest_error
 from calmotion.workflow.shot import Shot
+from calmotion.workflow.watch import Watch, _growth, largest_error
 from one_hinge import HINGE, ONE_HINGE, TIP
 
 STEP = "10ms"

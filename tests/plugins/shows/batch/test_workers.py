@@ -8,7 +8,7 @@ from concurrent.futures import Executor, Future
 import pytest
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
-from calmotion.workflow.running.workers import executor_on, finished, result_of
+from calmotion_plugins.shows.batch.workers import executor_on, finished, result_of
 
 
 @pytest.mark.posix

@@ -15,9 +15,7 @@ from typing import Any
 
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
-from calmotion.support import interrupts
-from calmotion.support.operating_system import processors, use_processors
-from calmotion.support.worker_processes import Fault
+from calmotion.support import Fault, check, deferred, processors, use_processors
 from calmotion.version import __version__
 
 LOCAL, _DASK = "local", "dask://"
@@ -72,7 +70,7 @@ def executor_on(
     try:
         yield executor, count
     finally:
-        with interrupts.deferred():
+        with deferred():
             executor.shutdown(wait=False, cancel_futures=True)
             give_up()
             executor.shutdown(wait=True)
@@ -95,7 +93,7 @@ def finished(
             call = calls.popleft()
             running[executor.submit(*call)] = call
         ended = wait(running, timeout=_TICK, return_when=FIRST_COMPLETED).done
-        interrupts.check()
+        check()
         for future in ended:
             yield running.pop(future), future
         yield None
@@ -141,7 +139,7 @@ def _client(address: str) -> Iterator[Any]:
             )  # fmt: skip
         yield client
     finally:
-        with interrupts.deferred():
+        with deferred():
             client.close(timeout=5)
 
 
