@@ -75,11 +75,6 @@ class Regulator:
         """Of the commands from the intended motion, shape [m]."""
         return self._x[: len(self._deviating)]
 
-    def targets(self) -> Array:
-        """Weighted deviation of the targets from the delayed intended motion, as the linear model has it."""
-        assert self._gains is not None
-        return np.asarray(self._gains.targets @ self._x)
-
     def advance(self, window: Window) -> tuple[Array, IntArray]:
         """The commands of the next tick, shape [M], and what limits acted, see `MotorLimits.kept`."""
         gains, h, m = self._gains, self._limits.tick, len(self._deviating)

@@ -11,28 +11,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import RunSettings
-from calmotion.multibody import Model, Workspace
-from calmotion.simulation import (
-    CompiledShot,
-    Curves,
-    Prepared,
-    best_delay,
-    modes_of,
-    prepare,
-    rigid_motion,
-    run_forward,
-    sample_curves,
-    shaped,
-    static_motion,
-)
-from calmotion_plugins.live import Live, LiveSettings
-from scipy.interpolate import CubicSpline
+from calmotion.simulation import CompiledShot, Curves, modes_of, prepare, shaped
+from calmotion_plugins.live import LiveSettings, Trial
 
 from ..common.parsers import bench_parser, output_options, shots_argument
 from ..common.shots import SAMPLES, load
@@ -66,60 +52,22 @@ class Row:
     tick_99_ms: float = 0.0
 
 
-class _Robot:
-    """A robot on which commands are tried."""
-
-    def __init__(self, prepared: Prepared, frequencies: float):
-        system, self._grid, self._world = prepared.model.system, prepared.grid, prepared.world
-        square = frequencies**2
-        stiffer = system._replace(stiffness=square * system.stiffness, data=square * system.data)
-        self._model: Model = replace(prepared.model, system=stiffer)
-        curves = sample_curves(prepared.shot.animation.current, prepared.grid)
-        rigid = rigid_motion(prepared.model, curves.angles, curves.rates, self._grid.h, self._world, False)
-        always = np.ones(len(self._grid.times), bool)
-        self._intended = static_motion(prepared.model, rigid, curves.angles, always, self._world).target_positions
-
-    def left(self, angles: Array, rates: Array, delay: float | None) -> tuple[float, Array]:
-        """Delay [s] and distances [m] with curves of shape [T, M]; with the best delay where none is given."""
-        grid = self._grid
-        workspace = Workspace.for_system(self._model.system)
-        found = run_forward(self._model, workspace, angles, rates, grid.h, self._world).target_positions
-        if delay is None:
-            return best_delay(found, self._intended, grid.judged, grid.h)
-        late = np.maximum(np.arange(len(found)) - round(delay / grid.h), 0)
-        return delay, np.linalg.norm(found - self._intended[late], axis=2)[grid.judged]
-
-
 def compare(name: str, shot: CompiledShot, frequencies: tuple[float, ...] = FREQUENCIES) -> Iterator[Row]:
     """All methods on one robot."""
     prepared = prepare(shot, RunSettings())
     grid, modes = prepared.grid, modes_of(prepared)
-    curves = sample_curves(shot.animation.current, grid)
-    streams = [
-        _streamed(shot, CubicSpline(grid.times, curves.angles), grid.times, share / modes[0][0]) for share in SHARES
-    ]
+    trial = Trial(prepared)
+    curves, longest = trial.curves, 1.0 / modes[0][0]
+    streams = [trial.streamed(shot, LiveSettings(rate=RATE, lookahead=share * longest)) for share in SHARES]
     for factor in frequencies:
-        robot = _Robot(prepared, factor)
+        robot = Trial(prepared, factor)
         yield _row(name, "as animated", factor, robot.left(curves.angles, curves.rates, 0.0))
         for kind in KINDS:
             made: Curves = shaped(curves, grid, kind, *modes)
             yield _row(name, kind, factor, robot.left(made.angles, made.rates, None))
-        for share, (angles, rates, late, ticks) in zip(SHARES, streams, strict=True):
-            found = robot.left(angles, rates, late)
+        for share, (angles, rates, report) in zip(SHARES, streams, strict=True):
+            found, ticks = robot.left(angles, rates, report["latency_s"]), report["tick_s"]
             yield _row(name, f"live, {share:g} of the period", factor, found, ticks["median"], ticks["p99"])
-
-
-def _streamed(
-    shot: CompiledShot, motion: CubicSpline, times: Array, lookahead: float
-) -> tuple[Array, Array, float, dict[str, float]]:
-    """Commands and their rates at the instants of a simulation, their delay [s], and times of ticks [s]."""
-    ticks = np.arange(times[0], times[-1] + 1.0 / RATE, 1.0 / RATE)
-    with Live(shot, LiveSettings(rate=RATE, lookahead=lookahead, background=False)) as live:
-        live.reset(motion(times[0]))
-        found = np.array([live.step(tick, motion(min(tick, times[-1]))) for tick in ticks])
-        report = live.report()
-    played = CubicSpline(ticks, found)
-    return played(times), played(times, 1), report["latency_s"], report["tick_s"]
 
 
 def _row(

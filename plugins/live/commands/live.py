@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..session import Live
 
 EXAMPLES = (
+    ("calmotion live robot.usda --table", "which look-ahead buys what?"),
     ("calmotion live robot.usda --rate 250 --lookahead 120", "JSON lines in and out"),
     ("calmotion live robot.usda --in osc://127.0.0.1:9000 --out osc://127.0.0.1:9001", "faders over OSC"),
     ("calmotion live robot.usda --replay calm_root.usda", "play the motion of a shot as a stream"),
@@ -69,6 +70,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="what ticks follow: the wall's clock (default of a pipe and of OSC), or the time stamps of the samples, "
         "as fast as they can be read (default of a file and of --replay)",
     )
+    command.add_argument(
+        "--table",
+        action="store_true",
+        help="play nothing: simulate what look-aheads from 20 ms to the longest period leave of the shake",
+    )
     command.add_argument("--seconds", metavar="S", type=quantity("s", positive=True), help="stop after this time")
 
 
@@ -95,6 +101,8 @@ def run(args: argparse.Namespace, output: Output) -> int:
     from ..opening import live
     from ..session import LiveSettings
 
+    if args.table:
+        return worth_of_lookahead(args, output)
     listens, sends = osc_place(args.source, "--in"), osc_place(args.sink, "--out")
     if args.json and not sends:
         raise SettingError(
@@ -121,6 +129,31 @@ def run(args: argparse.Namespace, output: Output) -> int:
         _tell(robot, source)
         if args.json:
             print(json.dumps(robot.report()))
+    return 0
+
+
+def worth_of_lookahead(args: argparse.Namespace, output: Output) -> int:
+    """Print what look-aheads are worth to the robot of a shot, here and for `calmotion inspect --live`."""
+    from calmotion.cli import console_on, print_table
+    from calmotion.workflow import Hooks
+
+    from ..lookahead import as_json, cells, worth_of_lookahead
+    from ..opening import compiled
+    from ..session import LiveSettings
+
+    asked = LiveSettings(rate=getattr(args, "rate", 250.0), uncertainty=getattr(args, "uncertainty", 0.0))
+    shot = opened_shot(args)
+    with progress_display(args) as display:
+        robot = compiled(shot, assignments(args), Hooks(progress=display, on_operator=display.done))
+    rows, notes = worth_of_lookahead(robot, asked)
+    if output.json:
+        output.object({"lookahead": as_json(rows), "notes": list(notes)})
+        return 0
+    title = f"The motion of the shot as a stream, {asked.rate:g} commands a second; errors of the simulated robot"
+    heads = ("look-ahead", "behind by", "rms error", "largest error", "what limits it")
+    print_table(console_on(output.stream), title, heads, cells(rows))
+    for note in notes:
+        notice(note)
     return 0
 
 

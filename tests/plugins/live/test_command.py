@@ -52,6 +52,15 @@ def test_the_animation_of_a_shot_is_played_as_a_stream(calmotion, shot):
     assert len(done.stdout.splitlines()) > 10
 
 
+@pytest.mark.parametrize("command", [("live", "--table"), ("inspect", "--live")])
+def test_a_table_tells_what_look_aheads_are_worth(calmotion, shot, command):
+    name, option = command
+    told = calmotion(name, shot, option, "--quiet").stdout
+    assert "as sent" in told and "20 ms" in told
+    rows = json.loads(calmotion(name, shot, option, "--quiet", "--json").stdout)["lookahead"]
+    assert rows[0]["lookahead_s"] is None and {"latency_s", "rms_m", "largest_m", "limited"} <= set(rows[0])
+
+
 @pytest.mark.parametrize(
     "options, said",
     [

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.host import SettingError
-from calmotion.model import Follows, Rotor, RunSettings
+from calmotion.model import Follows, Rotor, RunSettings, Track
 from calmotion.multibody import Workspace
 from calmotion.simulation import (
     Curves,
@@ -20,7 +20,7 @@ from calmotion.simulation import (
     shaped,
 )
 from calmotion.testing import small_shot
-from calmotion_plugins.live import Live, LiveSettings
+from calmotion_plugins.live import Live, LiveSettings, worth_of_lookahead
 from scipy.interpolate import CubicSpline
 
 RATE = 250.0
@@ -98,6 +98,22 @@ def test_a_stream_leaves_a_quarter_of_what_the_best_shaper_does(stream):
         made = shaped(curves, grid, kind, frequencies, ratios)
         shapers.append(left(shot, CubicSpline(grid.times, made.angles), intended, grid.times))
     assert live <= 0.25 * min(shapers), (live, shapers)
+
+
+def test_the_table_of_look_aheads_tells_what_a_simulation_finds(stream):
+    motion, intended, ticks, times = stream
+    shot = robot()
+    tracks = tuple(Track(ticks, intended(ticks)[:, k]) for k in range(2))
+    frames = np.arange(0.0, 5.99, 1.0 / 24.0)
+    shot = compile_shot(shot.character, replace(shot.animation, frame_times=frames, tracks=tracks, current=tracks))
+    rows, _ = worth_of_lookahead(shot, LiveSettings(rate=RATE))
+    assert rows[0].lookahead_s is None and rows[-1].lookahead_s > 0.15, "from none to a period"
+    assert rows[0].rms_m == pytest.approx(left(shot, intended, intended, times), rel=0.02)
+    row = next(row for row in rows if row.lookahead_s and row.lookahead_s > 0.06)
+    commands, latency, _ = streamed(shot, motion, 6.0, lookahead=row.lookahead_s)
+    assert latency == row.latency_s
+    found = left(shot, CubicSpline(ticks, commands), intended, times, latency)
+    assert row.rms_m == pytest.approx(found, rel=0.1) and found < 0.2 * rows[0].rms_m
 
 
 def test_after_the_stream_rests_the_commands_are_its_own(stream):

@@ -38,6 +38,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="check the shot before publishing: run every cheap check and USD's validators, list all findings, and end "
         "with status 1 if there are any",
     )
+    command.add_argument(
+        "--live",
+        action="store_true",
+        help="tell instead what a look-ahead is worth where the motion is a stream; as calmotion live --table",
+    )
     command.add_argument("--verbose", action="store_true", help="also print all simplifications and their reasons")
     simulation_options(command, "bdf2, newmark, generalized-alpha or rk4 (default: automatic)")
 
@@ -46,6 +51,11 @@ def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.reports.inspection import print_inspection
     from calmotion.workflow.commands import inspect
 
+    if args.live:
+        from calmotion.cli.commands.table import all_commands
+
+        status: int = all_commands()["live"].load().worth_of_lookahead(args, output)
+        return status
     shot = opened_shot(args)
     with progress_display(args) as display:
         inspection = inspect(

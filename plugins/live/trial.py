@@ -1,0 +1,73 @@
+"""A motion as a stream, and what its commands leave of the shake of the whole simulated robot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from calmotion.arrays import Array
+from calmotion.multibody import Model, Workspace
+from calmotion.simulation import (
+    CompiledShot,
+    Prepared,
+    best_delay,
+    rigid_motion,
+    run_forward,
+    sample_curves,
+    static_motion,
+)
+from scipy.interpolate import CubicSpline
+
+from .session import Live, LiveSettings
+
+
+class Trial:
+    """A robot on which commands are tried.
+
+    Args:
+        prepared: The robot and the motion that is intended, on a time grid.
+        frequencies: Those of the robot, over those of the model.
+    """
+
+    def __init__(self, prepared: Prepared, frequencies: float = 1.0):
+        system, self._grid, self._world = prepared.model.system, prepared.grid, prepared.world
+        square = frequencies**2
+        stiffer = system._replace(stiffness=square * system.stiffness, data=square * system.data)
+        self._model: Model = replace(prepared.model, system=stiffer)
+        self.curves = sample_curves(prepared.shot.animation.current, prepared.grid)
+        angles, rates = self.curves.angles, self.curves.rates
+        rigid = rigid_motion(prepared.model, angles, rates, self._grid.h, self._world, False)
+        always = np.ones(len(self._grid.times), bool)
+        self._intended = static_motion(prepared.model, rigid, angles, always, self._world).target_positions
+
+    def left(self, angles: Array, rates: Array, delay: float | None) -> tuple[float, Array]:
+        """What commands leave.
+
+        Args:
+            angles, rates: At the instants of the grid, shape [T, M].
+            delay: Of the commands [s]; None: the one with which they leave least.
+
+        Returns:
+            The delay [s], and distances of the targets from the delayed intended motion with the sag of each pose [m],
+            shape [judged T, K].
+        """
+        grid = self._grid
+        workspace = Workspace.for_system(self._model.system)
+        found = run_forward(self._model, workspace, angles, rates, grid.h, self._world).target_positions
+        if delay is None:
+            return best_delay(found, self._intended, grid.judged, grid.h)
+        late = np.maximum(np.arange(len(found)) - round(delay / grid.h), 0)
+        return delay, np.linalg.norm(found - self._intended[late], axis=2)[grid.judged]
+
+    def streamed(self, shot: CompiledShot, settings: LiveSettings) -> tuple[Array, Array, dict[str, Any]]:
+        """The motion as a stream: commands and rates at the instants of the grid, shape [T, M], and the report."""
+        times, tick = self._grid.times, 1.0 / settings.rate
+        motion = CubicSpline(times, self.curves.angles)
+        ticks = np.arange(times[0], times[-1] + tick, tick)
+        with Live(shot, replace(settings, background=False)) as live:
+            live.reset(motion(times[0]))
+            found = np.array([live.step(instant, motion(min(instant, times[-1]))) for instant in ticks])
+            report = live.report()
+        played = CubicSpline(ticks, found)
+        return played(times), played(times, 1), report
