@@ -14,7 +14,7 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PAGES = REPOSITORY / "docs" / "tutorials"
-FOLLOWED = ("usd", "urdf", "skinned_character", "calibration", "two_workers")
+FOLLOWED = ("usd", "urdf", "skinned_character", "calibration", "two_workers", "puppeteer")
 
 
 def script(page: str) -> str:
@@ -61,7 +61,7 @@ def test_the_commands_of_a_tutorial_are_accepted(page, capsys):
         pytest.skip(f"the plugins that bring {', '.join(absent)} are not there")
     for line in lines:
         try:
-            build_parser().parse_args(shlex.split(line)[1:])
+            build_parser().parse_args(shlex.split(re.split(" [<>] ", line)[0])[1:])
         except SystemExit:
             pytest.fail(f"{line}: {capsys.readouterr().err}")
 
@@ -127,6 +127,15 @@ def test_a_show_on_two_workers(tmp_path):
     for folder in ("calm", "farm"):
         jobs = json.loads((tmp_path / "work" / folder / "batch.json").read_text())["jobs"]
         assert len(jobs) == 2 and all(job["outcome"] in ("done", "kept") for job in jobs)
+
+
+@pytest.mark.long
+def test_a_puppeteer(tmp_path):
+    printed = follow("puppeteer", tmp_path)
+    rest = json.loads(printed.splitlines()[-1])
+    assert rest["joints"]["/Bartender/Joints/Elbow"] == pytest.approx(-0.9, abs=0.02) and rest["late"] == 0
+    assert "as sent" in printed
+    assert (tmp_path / "work" / "live.rrd").stat().st_size > 100_000
 
 
 def needs_converters():

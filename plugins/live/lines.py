@@ -52,6 +52,9 @@ class Sink(ABC):
     def send(self, time_s: float, commands: Mapping[str, float], live: Live) -> None:
         """One tick's commands [rad or m], by the paths of the joints."""
 
+    def close(self) -> None:  # noqa: B027
+        """The stream has ended; most have nothing to close."""
+
 
 def sample_of(line: str) -> Sample:
     """A sample from a line such as `{"t": 0.1, "joints": {"/Arm/Elbow": 0.3}}`.

@@ -61,6 +61,7 @@ class Live:
         joints: Paths of the motors' joints, the order of arrays.
         start: The pose of the first frame [rad or m], shape [M].
         tick_s: Time between two commands [s].
+        character, model, world: The robot, as the engine has it; moving roots stand as in the first frame.
         unknown: How often a sample had a joint that the robot does not have, by its path.
         notes: What is left out for this robot.
 
@@ -76,8 +77,8 @@ class Live:
         self.joints = tuple(motor.path for motor in character.motors)
         self.tick_s = 1.0 / settings.rate
         self._window_ticks = 1 + round(settings.lookahead * settings.rate)
-        self._model = shot.model
-        self._world = prepare(shot, RunSettings(pre_roll=0.0)).world[0]
+        self.character, self.model = character, shot.model
+        self.world = prepare(shot, RunSettings(pre_roll=0.0)).world[0]
         self._follows = [(k, motor.follows) for k, motor in enumerate(character.motors) if motor.follows is not None]
         self._limits = MotorLimits.of(character, self.tick_s)
         self._deviating: IntArray = leaders(character)
@@ -85,7 +86,7 @@ class Live:
         self._weighting = self._weighting_of(shot)
         period = 1.0 / settings.sender_rate if settings.sender_rate else self.tick_s
         self._stream = Stream(self._limits, settings.lookahead, period)
-        forces = VelocityForces(self._model, self._world)
+        forces = VelocityForces(self.model, self.world)
         self._window = Window(self._window_ticks, self._limits, forces)
         self._regulator = Regulator(self._coupling, self._deviating, self._limits)
         self._renewal = Renewal(self._gains, settings.background)
@@ -191,6 +192,11 @@ class Live:
         self._spent.append(time.perf_counter() - begin)
         return commands
 
+    @property
+    def played(self) -> Array:
+        """The intended motion of the moment, which is that of `latency_s` ago [rad or m], shape [M]."""
+        return self._window.played
+
     def report(self) -> dict[str, Any]:
         """What happened since the last `reset`: ticks, events of the stream, limits that acted, times of ticks."""
         spent = np.array(self._spent) if self._spent else np.zeros(1)
@@ -262,7 +268,7 @@ class Live:
         )
 
     def _gains(self, position: Array) -> Gains:
-        pose = pose_model(self._model, position, self._world, LiveSettings.HIGHEST * self.settings.rate)
+        pose = pose_model(self.model, position, self.world, LiveSettings.HIGHEST * self.settings.rate)
         return gains_at(pose, self._coupling, self._weighting)
 
     def _refuse_slow(self) -> None:

@@ -3,6 +3,7 @@
 from calmotion.model.character import WORLD as WORLD
 from calmotion.multibody.analysis.kinematics import rigid_poses as rigid_poses
 from calmotion.multibody.analysis.kinematics import rigid_state as rigid_state
+from calmotion.multibody.analysis.kinematics import target_frames as target_frames
 from calmotion.multibody.analysis.pose_model import PoseModel as PoseModel
 from calmotion.multibody.analysis.pose_model import pose_model as pose_model
 from calmotion.multibody.analysis.reactions import reactions as reactions

@@ -63,6 +63,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         default="-",
         help="where commands go: - (JSON lines on standard output, default) or osc://HOST:PORT",
     )
+    command.add_argument(
+        "--rrd",
+        metavar="PLACE",
+        help="show samples and commands in rerun: a file, or a viewer that runs: rerun+http://127.0.0.1:9876/proxy",
+    )
     command.add_argument("--replay", metavar="LAYER", help="play the animation of a shot or a layer as the stream")
     command.add_argument(
         "--clock",
@@ -125,7 +130,14 @@ def run(args: argparse.Namespace, output: Output) -> int:
         for note in robot.notes:
             notice(note)
         notice(f"commands are {1e3 * robot.latency_s:.0f} ms behind the samples")
-        source = _play(robot, args, stamps, listens, sink)
+        if args.rrd:
+            from ..viewer import Viewer
+
+            sink = Viewer(args.rrd, sink, robot)
+        try:
+            source = _play(robot, args, stamps, listens, sink)
+        finally:
+            sink.close()
         _tell(robot, source)
         if args.json:
             print(json.dumps(robot.report()))

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from one_hinge import ONE_HINGE
+from recordings import read_recording
 
 JOINT = "/Robot/Joint"
 
@@ -50,6 +51,18 @@ def test_the_animation_of_a_shot_is_played_as_a_stream(calmotion, shot):
     done = calmotion("live", shot, "--replay", shot, "--lookahead", "40ms", "--quiet")
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.splitlines()) > 10
+
+
+def test_a_recording_has_every_command_and_the_robot(calmotion, shot, joint, tmp_path):
+    done = calmotion("live", shot, "--replay", shot, "--rrd", tmp_path / "live.rrd", "--quiet")
+    assert done.returncode == 0, done.stderr
+    columns = read_recording(tmp_path / "live.rrd")
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    shown = columns[f"/motors{joint}/command", "Scalars:scalars"][-1]
+    np.testing.assert_allclose(np.ravel(shown), np.degrees([row["joints"][joint] for row in rows]), atol=1e-9)
+    assert ("/robot/command/targets", "Points3D:positions") in columns
+    refused = calmotion("live", shot, "--replay", shot, "--rrd", tmp_path, "--quiet")
+    assert refused.returncode == 2 and "this recording cannot be written" in refused.stderr
 
 
 @pytest.mark.parametrize("command", [("live", "--table"), ("inspect", "--live")])

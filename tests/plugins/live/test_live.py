@@ -130,13 +130,14 @@ def test_a_rigid_robot_gets_the_stream_as_it_is(stream):
     np.testing.assert_allclose(commands[late:], [motion(k / RATE) for k in range(1000 - late)], atol=1e-12)
 
 
-def test_no_command_is_beyond_a_limit_whatever_arrives():
+@pytest.mark.parametrize("ticks", [4000, pytest.param(round(3600 * RATE), marks=pytest.mark.long)])
+def test_no_command_is_beyond_a_limit_whatever_arrives(ticks):
     random = np.random.default_rng(5)
     shot = robot(max_velocity=3.0, max_acceleration=60.0)
     with Live(shot, LiveSettings(rate=RATE, lookahead=0.06, background=False)) as live:
         live.reset(np.zeros(2))
         found, value = [np.zeros(2)], np.zeros(2)
-        for k in range(4000):
+        for k in range(ticks):
             value = value + 0.02 * random.normal(size=2) + (random.random() < 5e-3) * random.normal(size=2)
             arrived = random.random() > 0.1
             sample = np.where(random.random(2) < 0.01, np.nan, value)
