@@ -19,8 +19,7 @@ from .session import Live
 
 TIME = "time"
 VIEWER = "rerun+"  # how places of viewers begin
-# Name, place in a row, colour.
-SHOWN = (("as sent", 1, (213, 94, 0)), ("command", 2, (0, 114, 178)))
+COLORS = {"as sent": (213, 94, 0), "command": (0, 114, 178)}
 
 
 class Viewer(Sink):
@@ -53,15 +52,16 @@ class Viewer(Sink):
                 ) from error  # fmt: skip
             self._recording.save(place, default_blueprint=blueprint)
         for motor in live.character.motors:
-            for name, _, color in SHOWN:
+            for name, color in COLORS.items():
                 style = rr.SeriesLines(colors=[color], names=[name])
                 self._recording.log(f"motors{motor.path}/{name}", style, static=True)
-        self._rows: list[tuple[float, Array, Array]] = []
+        self._rows: list[tuple[float, dict[str, Array]]] = []
 
     def send(self, time_s: float, commands: Mapping[str, float], live: Live) -> None:
         """One tick's commands, which are also kept for the next picture."""
         self._sink.send(time_s, commands, live)
-        self._rows.append((time_s, live.played.copy(), np.array([commands[path] for path in live.joints])))
+        values = {"as sent": live.played.copy(), "command": np.array([commands[path] for path in live.joints])}
+        self._rows.append((time_s, values))
         if self._rows[-1][0] - self._rows[0][0] >= Viewer.FRAME_S - 0.5 * live.tick_s:
             self._draw()
 
@@ -76,14 +76,14 @@ class Viewer(Sink):
         if not self._rows:
             return
         times = rr.TimeColumn(TIME, duration=[row[0] for row in self._rows])
-        for name, number, _ in SHOWN:
+        for name in COLORS:
             for k, motor in enumerate(self._live.character.motors):
-                values = [measure_of(motor).factor * float(row[number][k]) for row in self._rows]
+                values = [measure_of(motor).factor * float(angles[name][k]) for _, angles in self._rows]
                 columns = rr.Scalars.columns(scalars=values)
                 self._recording.send_columns(f"motors{motor.path}/{name}", [times], columns)
         self._recording.set_time(TIME, duration=self._rows[-1][0])
-        for name, number, color in SHOWN:
-            lines, points = _figure(self._live, self._rows[-1][number])
+        for name, color in COLORS.items():
+            lines, points = _figure(self._live, self._rows[-1][1][name])
             self._recording.log(f"robot/{name}/links", rr.LineStrips3D(lines, colors=[color]))
             targets = rr.Points3D(points, colors=[color], radii=rr.Radius.ui_points(4.0))
             self._recording.log(f"robot/{name}/targets", targets)

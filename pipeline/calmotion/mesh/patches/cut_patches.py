@@ -81,8 +81,8 @@ def with_rims(
             done = [(rim.center, rim.radius) for rim in rims]
             points, tets, radius = _cut_to_area(points, tets, center, patch.radius, done, axis)
             for ball in patch.balls:
-                held = _held(points, boundary_triangles(tets), [*done, (center, radius)])
-                points, tets = cut(points, tets, *ball, held)
+                kept = _held(points, boundary_triangles(tets), [*done, (center, radius)])
+                points, tets = cut(points, tets, *ball, kept)
             rims.append(_Rim(patch, frame.position, center, radius, axis))
     found: dict[int, tuple[Array, list[IntArray]]] = {}
     for rim in rims:
