@@ -12,7 +12,7 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.support import nearest, refuse_lfs_pointers, refuse_special, remedy_for
 
 from .attributes import Element, judged
-from .mjcf import elements, locks, parts, refuse_missing_meshes
+from .mjcf import elements, locks, nested_copy, parts, refuse_missing_meshes, several_joints
 from .repairs import (
     PACKAGE,
     faults,
@@ -43,7 +43,7 @@ class Description:
         unread: What of the robot is not read, as sentences for the user.
         locks: Joints of an MJCF that an equality holds at one value [rad or m].
         soft_limits: Narrower limits of joints of a URDF, which its safety controllers keep [rad or m].
-        faults: What of a URDF is repaired in a copy before it is converted, as sentences for the user.
+        faults: What is repaired in a copy before it is converted, as sentences for the user.
     """
 
     path: str
@@ -74,7 +74,11 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
         listed = elements(files)
         unread = judged(MJCF, listed)
         refuse_missing_meshes(files)
-        return Description(path, MJCF, unread=unread, locks=locks(listed))
+        several = several_joints(files)
+        told = (
+            (f"joints of one body are those of bodies one inside the other: {', '.join(several)}",) if several else ()
+        )
+        return Description(path, MJCF, unread=unread, locks=locks(listed), faults=told)
     if root.tag != "robot":
         raise ShotError(
             "this is neither a URDF nor an MJCF robot", path=path, found=f"<{root.tag}>",
@@ -108,7 +112,7 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
 
 
 def repaired(description: Description, folder: str, broken_meshes: Sequence[str] = ()) -> Description:
-    """A description of a repaired copy of a URDF.
+    """A description of a repaired copy of a URDF, or of an MJCF with several joints in a body.
 
     Args:
         description: The robot.
@@ -116,6 +120,8 @@ def repaired(description: Description, folder: str, broken_meshes: Sequence[str]
         broken_meshes: OBJ files that cannot be converted as they are.
     """
     root, _ = _root(description.path)
+    if description.kind == MJCF:
+        return replace(description, path=nested_copy(root, description.path, folder, lambda file: _root(file)[0]))
 
     def file(name: str) -> str:
         return mesh_file(name, description.path, description.packages)

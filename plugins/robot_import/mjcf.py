@@ -13,6 +13,8 @@ from calmotion.support import is_special, refuse_lfs_pointers
 from .attributes import Element
 
 _JOINTS = ("joint", "freejoint")
+_PLACES = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
+_LIGHT, _LIGHT_INERTIA = "1e-6", "1e-9"  # of a body between two joints [kg], [kg m^2]
 _INNER = ("body", "frame", "replicate")  # what contains bodies
 _FOLDERS = ("meshdir", "texturedir", "assetdir")
 _SHOWN = 4  # missing files in a message
@@ -107,14 +109,9 @@ def refuse_missing_meshes(found: Sequence[Part]) -> None:
 
 
 def elements(found: Sequence[Part]) -> list[Element]:
-    """The elements of a robot's files, with their defaults; equalities that are switched off have no effect.
-
-    Raises:
-        ShotError: A body with several joints.
-    """
+    """The elements of a robot's files, with their defaults; equalities that are switched off have no effect."""
     classes: dict[str, Settings] = {_MAIN: {}}
     for part in found:
-        _refuse_several_joints(part)
         for node in part.root.findall("default"):
             _collect(node, classes, {})
     return [
@@ -135,17 +132,97 @@ def locks(listed: Sequence[Element]) -> dict[str, float]:
     }
 
 
-def _refuse_several_joints(part: Part) -> None:
-    """MuJoCo moves several joints of a body one after the other, and a converter ties each of them to the same two
-    bodies, so that together they hold what they should move."""
-    for body in part.root.iter("body"):
-        joints = [node.get("name", node.tag) for node in body if node.tag in _JOINTS]
-        if len(joints) > 1:
-            raise ShotError(
-                "a body with several joints is not supported", path=part.path,
-                attribute=f"body {body.get('name', '')}", found=", ".join(joints),
-                remedy="Give each joint a body of its own, one inside the other, with a small mass in between",
-            )  # fmt: skip
+def several_joints(found: Sequence[Part]) -> list[str]:
+    """Names of the bodies of a robot that have several joints.
+
+    MuJoCo moves them one after the other, and a converter ties each of them to the same two bodies, so that together
+    they hold what they should move: `nested_copy` gives each a body of its own.
+
+    Raises:
+        ShotError: One of them is free, or inertias follow from geometry alone, of which these bodies have none.
+    """
+    names = []
+    by_geometry = any(c.get("inertiafromgeom") == "true" for part in found for c in part.root.iter("compiler"))
+    for part in found:
+        for body in part.root.iter("body"):
+            joints = _joints_of(body)
+            if len(joints) < 2:
+                continue
+            free = any(node.tag == "freejoint" or node.get("type") == "free" for node in joints)
+            if free or by_geometry:
+                raise ShotError(
+                    "a body with several joints is not supported" + ("" if free else " where inertiafromgeom is true"),
+                    path=part.path, attribute=f"body {body.get('name', '')}",
+                    found=", ".join(node.get("name", node.tag) for node in joints),
+                    remedy="Give each joint a body of its own, one inside the other, with a small mass in between",
+                )  # fmt: skip
+            names.append(body.get("name", "") or "without a name")
+    return names
+
+
+def nested_copy(root: xml.Element, path: str, folder: str, parse: Callable[[str], xml.Element]) -> str:
+    """Write a copy of a robot in one file, in which no body has several joints.
+
+    Args:
+        root: Of the robot; it is changed.
+        path: Its file.
+        folder: Where the copy is written.
+        parse: Gives the root of another file.
+
+    Returns:
+        The copy, which names folders by their whole paths.
+    """
+    home = os.path.dirname(os.path.abspath(path))
+    _expand(root, home, parse)
+    for node in root.iter("compiler"):
+        for name in _FOLDERS:
+            if name in node.attrib:
+                node.set(name, os.path.join(home, node.get(name, "")))
+    if not any(node.get(name) for node in root.iter("compiler") for name in ("meshdir", "assetdir")):
+        root.insert(0, xml.Element("compiler", {"meshdir": home}))
+    for parent in list(root.iter()):
+        for place, body in enumerate(parent):
+            if body.tag == "body" and len(_joints_of(body)) > 1:
+                parent[place] = _nested(body)
+    copy = os.path.join(folder, os.path.basename(path))
+    xml.ElementTree(root).write(copy, encoding="utf-8")
+    return copy
+
+
+def _expand(node: xml.Element, home: str, parse: Callable[[str], xml.Element]) -> None:
+    """Put the content of included files in the place of what includes them; MuJoCo looks for them beside the robot."""
+    for child in list(node):
+        if child.tag == "include":
+            place = list(node).index(child)
+            own = parse(os.path.join(home, child.get("file", "")))
+            _expand(own, home, parse)
+            node[place : place + 1] = list(own)
+        else:
+            _expand(child, home, parse)
+
+
+def _nested(body: xml.Element) -> xml.Element:
+    """Bodies within each other, each with one joint of a body; the first joint is that of the outermost."""
+    placed = {name: body.attrib.pop(name) for name in _PLACES if name in body.attrib}
+    joints, outer, inner = _joints_of(body), None, None
+    for joint in joints[:-1]:
+        body.remove(joint)
+        light = xml.Element("body", {"name": f"{body.get('name', 'body')}_{joint.get('name', len(body))}"})
+        if "childclass" in body.attrib:
+            light.set("childclass", body.attrib["childclass"])
+        moments = " ".join([_LIGHT_INERTIA] * 3)
+        light.extend([xml.Element("inertial", {"pos": "0 0 0", "mass": _LIGHT, "diaginertia": moments}), joint])
+        if inner is not None:
+            inner.append(light)
+        outer, inner = outer if outer is not None else light, light
+    assert outer is not None and inner is not None
+    inner.append(body)
+    outer.attrib.update(placed)
+    return outer
+
+
+def _joints_of(body: xml.Element) -> list[xml.Element]:
+    return [node for node in body if node.tag in _JOINTS]
 
 
 def _collect(node: xml.Element, classes: dict[str, Settings], inherited: Settings) -> None:

@@ -218,12 +218,12 @@ class _Import:
         self._refuse_foreign_folder()
         with temporary_folder(self._layer) as work:
             parts = os.path.join(work, os.path.basename(self._folder))
-            converted, warnings, changes = self._converted(work, parts, python)
+            converted, warnings, changes, description = self._converted(work, parts, python)
             FilePath(parts, _MARKER).touch()
             asset = f"./{os.path.basename(parts)}/{os.path.basename(converted)}"
             options = self._options
             if options.mjcf:
-                options = replace(options, compiled=compiled_values(self._description.path, python))
+                options = replace(options, compiled=compiled_values(description.path, python))
             layer, notes = robot_layer(converted, asset, options)
             layer.documentation = f"The robot of {os.path.basename(self._description.path)}, imported by Calmotion."
             draft = os.path.join(work, os.path.basename(self._layer))
@@ -235,19 +235,21 @@ class _Import:
         told += (*_doubts(character), *character.notes)
         return ImportedRobot(self._layer, self._folder, character, animation, told, provenance.names)
 
-    def _converted(self, work: str, parts: str, python: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
-        """The converted robot, warnings of the converter, and what was repaired for it."""
+    def _converted(
+        self, work: str, parts: str, python: str
+    ) -> tuple[str, tuple[str, ...], tuple[str, ...], Description]:
+        """The converted robot, warnings of the converter, what was repaired for it, and what was converted."""
         description, changes = self._description, self._description.faults
         if changes:
             description = repaired(description, _folder(work, "repaired"))
         try:
-            return *convert(description, parts, python), changes
+            return *convert(description, parts, python), changes, description
         except BrokenMeshes as broken:
             shutil.rmtree(parts, ignore_errors=True)
             description = repaired(description, _folder(work, "cleaned"), broken.files)
             names = ", ".join(os.path.basename(file) for file in broken.files)
             changes += (f"meshes with loose points or normals are converted without these: {names}",)
-            return *convert(description, parts, python), changes
+            return *convert(description, parts, python), changes, description
 
     def _move(self, parts: str, draft: str) -> None:
         """Put the converted robot and its layer in their places.

@@ -203,9 +203,11 @@ def test_what_would_be_another_robot_is_refused(read, tmp_path, name, included):
     assert os.path.basename(str(refused.value.path)) == "robot.xml"
 
 
-def test_a_body_has_one_joint(read):
+def test_joints_of_one_body_are_told_and_refused_where_nothing_gives_the_bodies_between_a_mass(read):
+    several = robot().replace("<joint", f"{HINGE.format('hip_x')}<joint")
+    assert read(several).faults == ("joints of one body are those of bodies one inside the other: b",)
     with pytest.raises(ShotError, match="several joints") as refused:
-        read(robot().replace("<joint", f"{HINGE.format('hip_x')}<joint"))
+        read(several.replace("<worldbody>", '<compiler inertiafromgeom="true"/><worldbody>'))
     assert refused.value.attribute == "body b" and refused.value.found == "hip_x, hip" and refused.value.remedy
 
 

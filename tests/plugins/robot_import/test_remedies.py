@@ -87,8 +87,9 @@ COUPLED = MJCF.replace(BODY, TWO).replace("</mujoco>", "<equality>{}</equality><
 FOLLOWS = '<joint joint1="turn" joint2="lift" polycoef="0 1 {} 0 0"/>'
 FRAMES = '<frame pos="0 0 1"><frame pos="0 1 0">{}</frame></frame>'
 SEVERAL = BODY.replace("<geom", '<joint name="turn" axis="0 0 1"/><geom')
-NESTED = f"""<body name="first"><joint name="lift" axis="0 1 0"/><inertial pos="0 0 0" mass="1e-3"
-diaginertia="1e-6 1e-6 1e-6"/>{BODY.replace("lift", "turn")}</body>"""
+BY_GEOMETRY = MJCF.replace("<worldbody>", '<compiler inertiafromgeom="true"/><worldbody>')
+NESTED = f"""<body name="first"><joint name="lift" axis="0 1 0"/><geom size="0.005" mass="1e-3"/>
+{BODY.replace("lift", "turn")}</body>"""
 MESHED = '<mujoco model="m"><asset><mesh name="a" file="arm.stl" {}/></asset>' + MJCF[18:].replace(
     'type="box" size="0.2 0.01 0.01"', 'type="mesh" mesh="a"'
 )
@@ -130,8 +131,8 @@ CASES = {
                                          COUPLED.format(FOLLOWS.format(0))),
     "a frame within a frame": Case(mjcf(BODY, FRAMES.format(BODY)), "frame within a frame", "as one frame",
                                    mjcf(BODY, f'<frame pos="0 1 1">{BODY}</frame>')),
-    "a body with several joints": Case(mjcf(BODY, SEVERAL), "several joints", "one inside the other",
-                                       mjcf(BODY, NESTED)),
+    "a body with several joints": Case(mjcf(BODY, SEVERAL, BY_GEOMETRY), "several joints", "one inside the other",
+                                       mjcf(BODY, NESTED, BY_GEOMETRY)),
     "a body without mass": Case(mjcf('size="0.2 0.01 0.01"', 'size="0.2 0.01 0.01" mass="0"'), "without mass moves",
                                 "a geom with a mass", mjcf('size="0.2 0.01 0.01"', 'size="0.2 0.01 0.01" mass="1"')),
     "a mesh that is moved": Case(MESHED.format('refpos="0 0 1"'), "wrong side", "remove the attribute",
