@@ -87,7 +87,8 @@ def choose_law(
             path=path,
             attribute="physics:youngsModulus",
             found=f"{material.youngs_modulus:.3g} Pa",
-            remedy="Check it, in units of the stage, and the masses that the body carries. Bodies with more than "
+            remedy="Check it, in units of the stage, the masses that the body carries, and steps of the animation, of "
+            "which `calmotion inspect` tells those beyond the limits of motors. Bodies with more than "
             f"{UNPHYSICAL:g} times hang like ropes, and cannot be simulated; here a modulus of "
             f"{material.youngs_modulus * deflection / (UNPHYSICAL * size):.2g} Pa is the least.",
         )
