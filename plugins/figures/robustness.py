@@ -46,21 +46,13 @@ def _distributions(axes: Axes, found: Robustness, target: int) -> None:
 
 
 def _trade_off(axes: Axes, found: Robustness, target: int) -> None:
-    """Curves for the model, the robust ones and further ones, joined in the order of their error on the model."""
+    """The curves for the model and the robust ones, joined."""
     names = ("nominal", "robust")
-    points = [(found.nominal[name][target], _largest(found.drawn[name], target)) for name in names]
-    further = [(row.nominal[target], _largest(row.drawn, target)) for row in found.compromises]
-    line = 1e3 * np.array(sorted([*points, *further]))
-    axes.plot(line[:, 0], line[:, 1], color="#bbbbbb", linewidth=1.0, zorder=1)
-    for name, (x, y) in zip(names, points, strict=True):
-        axes.plot(1e3 * x, 1e3 * y, "o", color=SHOWN[name][1], markersize=6.0)
-    for row, (x, y) in zip(found.compromises, further, strict=True):
-        axes.plot(1e3 * x, 1e3 * y, "o", color=AFTER, markersize=4.0, fillstyle="none")
-        axes.annotate(
-            f"within {1e3 * row.allowed:.3g} mm", (1e3 * x, 1e3 * y), xytext=(4, 4), textcoords="offset points",
-            fontsize=SMALL - 1.0,
-        )  # fmt: skip
-    axes.set_xlim(0.0, 1.25 * float(line[:, 0].max()))  # room for the last label
+    points = 1e3 * np.array([(found.nominal[name][target], _largest(found.drawn[name], target)) for name in names])
+    axes.plot(points[:, 0], points[:, 1], color="#bbbbbb", linewidth=1.0, zorder=1)
+    for name, point in zip(names, points, strict=True):
+        axes.plot(*point, "o", color=SHOWN[name][1], markersize=6.0)
+    axes.set_xlim(0.0, 1.25 * float(points[:, 0].max()))
     axes.set_ylim(bottom=0.0)
 
 

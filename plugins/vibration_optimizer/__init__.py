@@ -182,7 +182,7 @@ class OptimizeShot(Operator):
             7,
             minimum=1,
             maximum=999,
-            description="Number of these robots; with 1 + 2 n for n uncertain parameters they have their covariance",
+            description="Number of these robots, the model among them",
         ),
         Property(
             "avoid_reversals",
@@ -225,15 +225,6 @@ class OptimizeShot(Operator):
             minimum=0.0,
             description="Largest error that robust curves may have on the model, over the tolerance; the smaller, the "
             "larger it is on other robots",
-        ),
-        Property(
-            "tradeoff",
-            int,
-            0,
-            minimum=0,
-            maximum=99,
-            description="Number of further robust curves in the report; from each to the next, the error that is "
-            "allowed on the model doubles",
         ),
     )
 
@@ -298,7 +289,7 @@ class OptimizeShot(Operator):
             retime=self._tempo(context) if values.retime else None,
             robust=None
             if values.robust == "off"
-            else RobustSettings(values.robust, values.scenarios, values.draws, values.nominal_error, values.tradeoff),
+            else RobustSettings(values.robust, values.scenarios, values.draws, values.nominal_error),
         )
 
     @staticmethod

@@ -80,8 +80,6 @@ from calmotion.model.result import Simulation as Simulation
 from calmotion.model.result import Skin as Skin
 from calmotion.model.retiming.retimed import Retimed as Retimed
 from calmotion.model.retiming.tempo import TempoSettings as TempoSettings
-from calmotion.model.robust.robots import Robustness as Robustness
-from calmotion.model.robust.settings import RobustSettings as RobustSettings
 from calmotion.model.run import LONG_SHOT as LONG_SHOT
 from calmotion.model.run import SHAPERS as SHAPERS
 from calmotion.model.run import InputLayer as InputLayer
@@ -92,3 +90,5 @@ from calmotion.model.run import Source as Source
 from calmotion.model.table import columns as columns
 from calmotion.model.tolerance import reach as reach
 from calmotion.model.tolerance import tolerance_of as tolerance_of
+from calmotion.model.uncertainty import Robustness as Robustness
+from calmotion.model.uncertainty import RobustSettings as RobustSettings

@@ -123,3 +123,28 @@ class Animation:
     weights: tuple[WeightTrack, ...] = ()
     free: tuple[FreeTrack, ...] = ()
     tempo: TimeMap | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """When a joint to the world holds: a foot that stands, a hand that holds on.
+
+    Attributes:
+        times: [s] after the first frame of the shot, strictly increasing, shape [k].
+        active: Whether it holds from each time on, and before the first as from it, shape [k], bool.
+        friction: Coefficient of friction with the ground; -1: not known.
+    """
+
+    times: Array
+    active: BoolArray
+    friction: float = -1.0
+
+    def holds_at(self, time: float) -> bool:
+        """Whether it holds from a time [s] on."""
+        return bool(self.held(np.array([time + 1e-9]))[0])
+
+    def held(self, times: Array) -> BoolArray:
+        """Whether it holds at each of some times [s], none of which is one at which it comes or goes."""
+        at = np.maximum(np.searchsorted(self.times, times, "right") - 1, 0)
+        held: BoolArray = self.active[at]
+        return held

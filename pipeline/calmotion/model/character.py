@@ -12,12 +12,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from calmotion.arrays import Array, IntArray
-from calmotion.model.contact import Contact
+from calmotion.model.animation import Contact
 from calmotion.model.materials.parts import Part
 from calmotion.model.materials.printed import Core
 from calmotion.model.motor import PRESCRIBED, Motor
 from calmotion.model.retiming.tempo import TempoSettings
-from calmotion.model.robust.settings import Uncertainty
+from calmotion.model.uncertainty import Uncertainty
 
 WORLD = -1
 

@@ -11,7 +11,7 @@ from calmotion.model.animation import Animation
 from calmotion.model.budget import BudgetEntry
 from calmotion.model.limits.use import LimitUse
 from calmotion.model.retiming.retimed import Retimed
-from calmotion.model.robust.robots import Robustness
+from calmotion.model.uncertainty import Robustness
 
 
 @dataclass(frozen=True, eq=False)

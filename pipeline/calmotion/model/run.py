@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from calmotion.model.budget import SEARCH_SHARE
 from calmotion.model.retiming.tempo import TempoSettings
-from calmotion.model.robust.settings import RobustSettings
+from calmotion.model.uncertainty import RobustSettings
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Character, OptimizerStep, Result
 from calmotion.model.limits.bounds import Excess, excesses, motor_bounds
-from calmotion.model.robust.robots import Scenario
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import tolerance_of
+from calmotion.model.uncertainty import Scenario
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.retargeting.avoided_reversals import play_of, with_reversals

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calmotion.model.robust.known_factors import KnownFactors
+from calmotion.model.uncertainty import KnownFactors
 from calmotion.usd import stages
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model import Character, Result, Simulation
-from calmotion.model.robust.robots import CURVES
+from calmotion.model.uncertainty import CURVES
 
 _STILL = 1e-3  # of the tolerance: what moves by less stands still
 
@@ -115,7 +115,7 @@ def robustness_row(result: Result, target: int) -> dict[str, Any]:
 
 
 def robustness_report(result: Result) -> dict[str, Any]:
-    """The robots of a robust search and of its measurement, and the trade-off; empty without `--robust`."""
+    """The robots of a robust search and of its measurement; empty without `--robust`."""
     found = result.robustness
     if found is None:
         return {}
@@ -123,15 +123,5 @@ def robustness_report(result: Result) -> dict[str, Any]:
         "robust": found.kind,
         "scenarios": [{"parameters": dict(s.factors), "weight": s.weight} for s in found.scenarios],
         "draws": len(found.drawn["robust"]),
-        "tradeoff": [
-            {
-                "nominal_weight": row.weight,
-                "nominal_allowed_m": row.allowed,
-                "nominal_max_error_m": row.nominal.tolist(),
-                "p95_max_error_m": np.quantile(row.drawn, 0.95, axis=0, method="higher").tolist(),
-                "worst_max_error_m": row.drawn.max(axis=0).tolist(),
-            }
-            for row in found.compromises
-        ],
         "failed_draws": {name: int(np.sum(~np.isfinite(found.drawn[name]).all(axis=1))) for name in CURVES},
     }

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from calmotion.errors import IntegrationError
 from calmotion.model import Body, Character, Frame, Joint, MassProperties
-from calmotion.model.contact import Contact
+from calmotion.model.animation import Contact
 from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.kinematics import rigid_state, target_jacobians
 from calmotion.multibody.analysis.reactions import reactions

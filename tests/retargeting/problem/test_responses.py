@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.model.robust.robots import Scenario
 from calmotion.model.run import RunSettings
+from calmotion.model.uncertainty import Scenario
 from calmotion.retargeting.problem.sweeps import Sweeps
 from calmotion.retargeting.robust.worst_case import _posed, power_mean
 from calmotion.simulation.compiled_shot import compile_shot

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.model.robust.robots import Scenario
+from calmotion.model.uncertainty import Scenario
 from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.robust.scenarios import shot_of
 from calmotion.simulation.compiled_shot import compile_shot

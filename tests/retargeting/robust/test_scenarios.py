@@ -5,9 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.model.motor import DRIVE
-from calmotion.model.robust.known_factors import KnownFactors
-from calmotion.model.robust.robots import Scenario
-from calmotion.model.robust.settings import Uncertainty
+from calmotion.model.uncertainty import KnownFactors, Scenario, Uncertainty
 from calmotion.reduction.damping import damped
 from calmotion.retargeting.robust.scenarios import (
     payload_bodies,

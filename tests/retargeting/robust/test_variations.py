@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.model.robust.settings import RobustSettings, Uncertainty
 from calmotion.model.run import RunSettings
+from calmotion.model.uncertainty import RobustSettings, Uncertainty
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.robust.retarget import retarget_robustly
 from calmotion.retargeting.to_tolerance import continued
@@ -65,7 +65,6 @@ VARIATIONS = {
     "limits": (limited, WORST),
     "nothing allowed": (same, dataclasses.replace(WORST, nominal_error=0.0)),
     "very much allowed": (same, dataclasses.replace(WORST, nominal_error=100.0)),
-    "a further set of curves": (same, dataclasses.replace(WORST, tradeoff=1)),
     "a mean of one robot": (same, dataclasses.replace(WORST, kind="mean", scenarios=1)),
 }
 

@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.model.robust.robots import Scenario
 from calmotion.model.run import RunSettings
+from calmotion.model.uncertainty import RobustSettings, Scenario
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.robust import retarget
-from calmotion.retargeting.robust.choice import chosen_scenarios
 from calmotion.retargeting.robust.measure import errors_on
+from calmotion.retargeting.robust.robots import farthest
 from calmotion.retargeting.robust.scenarios import uncertain_parameters
 from calmotion.retargeting.robust.worst_case import LeastMaximum, least_maximum
 from calmotion.simulation.compiled_shot import compile_shot
@@ -28,7 +28,7 @@ def started(arm, animation, bodies):
     """The shot, nominal curves, and the robots."""
     shot = compile_shot(arm, animation, bodies)
     tracks = found_tracks(optimize_shot(shot, OPTIONS, ignore_progress), animation)
-    return shot, tracks, chosen_scenarios(shot, OPTIONS, tracks, uncertain_parameters(shot), 3, "worst")
+    return shot, tracks, (Scenario(), *farthest(shot, OPTIONS, tracks, uncertain_parameters(shot), 2))
 
 
 @pytest.fixture(scope="module")
@@ -78,11 +78,13 @@ def test_curves_that_no_others_are_better_than_are_returned(started, monkeypatch
     assert all(one is other for one, other in zip(searched(started, ALLOWED).tracks, started[1], strict=True))
 
 
-def test_a_robot_that_cannot_be_simulated_is_named(started):
+def test_a_robot_that_cannot_be_simulated_is_named(started, monkeypatch):
     shot, tracks, scenarios = started
     name = next(name for name in scenarios[1].factors if name.startswith("modulus"))
+    monkeypatch.setattr(retarget, "farthest", lambda *_: (Scenario({name: 1e-9}),))
+    options = dataclasses.replace(OPTIONS, robust=RobustSettings())
     with pytest.raises(ShotError, match="times 1e-09 cannot be simulated"):
-        retarget._worst(shot, OPTIONS, tracks, (scenarios[0], Scenario({name: 1e-9})), ALLOWED, ignore_progress)
+        retarget._worst(shot, options, tracks, uncertain_parameters(shot), ALLOWED, ignore_progress)
 
 
 def test_curves_are_simulated_as_they_are(started, worst):
@@ -116,7 +118,7 @@ def test_a_loop_is_searched_by_sweeps(arm, animation, bodies):
     character, cyclic = looped(arm, animation)
     shot, options = compile_shot(character, cyclic, bodies), RunSettings(step=1 / 60)
     tracks = found_tracks(optimize_shot(shot, options, ignore_progress), cyclic)
-    scenarios = chosen_scenarios(shot, options, tracks, uncertain_parameters(shot), 3, "worst")
+    scenarios = (Scenario(), *farthest(shot, options, tracks, uncertain_parameters(shot), 2))
     found = least_maximum(shot, options, tracks, scenarios, 2.0 * ALLOWED, ignore_progress)
     before = errors_on(shot, options, {"": tracks}, scenarios)[""]
     assert found.errors[1:].max() < 0.95 * before[1:].max()

@@ -6,7 +6,7 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.model.contact import Contact
+from calmotion.model.animation import Contact
 from calmotion.simulation.inputs.contacts import held_steps
 from calmotion.simulation.inputs.time_grid import make_grid
 from steppers import ROBOT, write_stepper

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.model.robust.settings import Uncertainty
+from calmotion.model.uncertainty import Uncertainty
 from calmotion.usd.reading import read_shot
 from pxr import Gf, Sdf, UsdGeom, UsdPhysics
 from small_shots import BASE, FORE, Scale, set_float, write_arm

@@ -123,14 +123,10 @@ def print_robustness(console: Console, report: dict[str, Any]) -> None:
         return
     heads, rows = ("nominal", "median", "p95", "worst"), []
     names = {"before": "as animated", "nominal": "optimised for the model", "robust": "robust"}
-    for index, target in enumerate(report["targets"]):
+    for target in report["targets"]:
         for name, shown in names.items():
             values = [target["robustness"][name][f"{head}_max_error_m"] for head in heads]
             rows.append([target["path"], shown, *(_length_or_failed(value) for value in values)])
-        for row in report["tradeoff"]:
-            values = [row[f"{head}_max_error_m"][index] for head in ("nominal", "p95", "worst")]
-            told = [_length_or_failed(value) for value in values]
-            rows.append([target["path"], f"model within {length(row['nominal_allowed_m'])}", told[0], "", *told[1:]])
     title = f"Largest error on {report['draws']} random robots"
     print_table(console, title, ["target", "curves", "model", "median", "95%", "worst"], rows, texts=2)
     if all(target["robustness"]["robust"] == target["robustness"]["nominal"] for target in report["targets"]):

@@ -1,17 +1,16 @@
-"""Motor curves on a set of robots: where their targets are, and how far from where they should be."""
+"""Motor curves on a set of robots: how far their targets are from where they should be."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Track
-from calmotion.model.robust.robots import Scenario
 from calmotion.model.run import RunSettings
+from calmotion.model.uncertainty import Scenario
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.parallel import in_parallel
 from calmotion.multibody.sensitivity.linearization import processors
@@ -24,7 +23,6 @@ from calmotion.simulation.simulator import Simulator
 from calmotion.support import interrupts
 
 Curves = Mapping[str, Sequence[Track]]
-Found = TypeVar("Found")
 _AT_ONCE = 4  # robots for each processor between two reports of progress
 
 
@@ -48,56 +46,36 @@ def errors_on(
     Returns:
         By the name of the curves, shape [S, K] [m]; infinite where a robot cannot be simulated.
     """
-    unknown = np.full(len(shot.character.targets), np.inf)
-
-    def largest(off: Array | None) -> Array:
-        return unknown if off is None else largest_of(off)
-
-    found = deviations_on(shot, options, curves, scenarios, largest, progress)
-    # of no robot at all as well, one row for each
-    return {name: np.array([robot[name] for robot in found]).reshape(len(found), len(unknown)) for name in curves}
-
-
-def largest_of(deviations: Array) -> Array:
-    """The largest deviation of each target, shape [K] [m], of shape [T, K, 3]."""
-    return np.asarray(np.linalg.norm(deviations, axis=2).max(axis=0, initial=0.0))
-
-
-def deviations_on(
-    shot: CompiledShot, options: RunSettings, curves: Curves, scenarios: Sequence[Scenario],
-    of: Callable[[Array | None], Found], progress: Progress = silent,
-) -> list[dict[str, Found]]:  # fmt: skip
-    """A function of the targets' deviations from the intended motion, for all curves on each robot.
-
-    Args:
-        shot, options, curves, scenarios, progress: As of `errors_on`.
-        of: Of the deviations at the judged instants [m], shape [T, K, 3]; None where a robot cannot be simulated.
-    """
-    rows: list[dict[str, Found]] = []
-    size = _AT_ONCE * processors()
+    rows: list[dict[str, Array]] = []
+    size, targets = _AT_ONCE * processors(), len(shot.character.targets)
     for first in range(0, len(scenarios), size):
         interrupts.check()
         some = scenarios[first : first + size]
-        rows += in_parallel(lambda scenario: _on_robot(shot_of(shot, scenario), options, curves, of), some)
+        rows += in_parallel(lambda scenario: _on_robot(shot_of(shot, scenario), options, curves), some)
         progress(len(rows) / len(scenarios), f"measuring the curves on {len(scenarios)} robots")
-    return rows
+    # of no robot at all as well, one row for each
+    return {name: np.array([row[name] for row in rows]).reshape(len(rows), targets) for name in curves}
 
 
-def _on_robot(
-    shot: CompiledShot, options: RunSettings, curves: Curves, of: Callable[[Array | None], Found]
-) -> dict[str, Found]:
+def _on_robot(shot: CompiledShot, options: RunSettings, curves: Curves) -> dict[str, Array]:
+    found = {name: np.full(len(shot.character.targets), np.inf) for name in curves}
     try:
         prepared = prepare(shot, options)
         grid = prepared.grid
         intended = intended_motion(prepared, *sample_tracks(shot.animation.tracks, grid))
         simulator = Simulator(prepared.model, grid.h, prepared.world, grid.cyclic)
     except (ShotError, SimulationFailure):
-        return {name: of(None) for name in curves}
-    found = {}
+        return found
     for name, tracks in curves.items():
         try:
             positions = simulator.run(*sample_tracks(tracks, grid)).target_positions
-            found[name] = of((positions - intended.target_positions)[grid.judged])
         except SimulationFailure:
-            found[name] = of(None)
+            continue
+        off = np.linalg.norm((positions - intended.target_positions)[grid.judged], axis=2)
+        found[name] = off.max(axis=0, initial=0.0)
     return found
+
+
+def largest_weighted(shot: CompiledShot, errors: Array) -> Array:
+    """The largest error of any target as it weighs, shape [S], of errors of the targets, shape [S, K]."""
+    return np.asarray((errors * np.sqrt([t.position_weight for t in shot.character.targets])).max(axis=1))

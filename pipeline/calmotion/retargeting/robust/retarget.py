@@ -10,25 +10,24 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.model import Result, Track
-from calmotion.model.robust.robots import Compromise, Robustness, Scenario
-from calmotion.model.robust.settings import WORST
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import tolerance_of
+from calmotion.model.uncertainty import WORST, Robustness, Scenario
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.retargeting.found_curves import best_so_far
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.retargeting.robust.choice import Candidates, chosen_scenarios
-from calmotion.retargeting.robust.measure import errors_on, silent
+from calmotion.retargeting.robust.measure import errors_on, largest_weighted, silent
+from calmotion.retargeting.robust.robots import farthest, opposite_pairs
 from calmotion.retargeting.robust.scenarios import Parameter, random_scenarios, uncertain_parameters
-from calmotion.retargeting.robust.worst_case import LeastMaximum, beyond_simulation, largest_weighted, least_maximum
+from calmotion.retargeting.robust.worst_case import LeastMaximum, least_maximum
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.simulate import Progress
-from calmotion.support import interrupts
 from calmotion.tolerance.simulation import found_tracks
 
 _SEARCHED = 0.6  # share of the searches in the progress
 SEARCHES = 3  # most for the largest error, each with more robots than the one before
-FARTHER = 2.0  # error that each compromise allows on the nominal robot, over that of the one before
+LARGER = 1.05  # least error of robots that are added over the largest known
+ADDED = 2  # most of them
 Continued = Callable[[Result, Result], Result]
 
 
@@ -59,45 +58,45 @@ def retarget_robustly(
 
     try:
         tracks = found_tracks(nominal, animation)
-        used = chosen_scenarios(shot, options, tracks, parameters, robust.scenarios, robust.kind)
         if robust.kind == WORST:
             begin = time.perf_counter(), time.process_time()
-            worst = _worst(shot, options, tracks, used, allowed, searching)
+            worst = _worst(shot, options, tracks, parameters, allowed, searching)
             used = worst.scenarios
             if any(one is not other for one, other in zip(worst.tracks, tracks, strict=True)):
                 best = continued(nominal, _simulated(shot, options, worst, begin))
         else:
+            used = opposite_pairs(parameters, robust.scenarios)
             best = continued(nominal, _searched(shot.with_tracks(tracks), options, searching, used))
         if best.interrupted:
             return best
         draws = random_scenarios(parameters, robust.draws)
-        measured = replace(best, robustness=_robustness(shot, options, nominal, best, used, draws, progress))
-        if robust.kind == WORST and robust.tradeoff:
-            measured = _with_compromises(shot, options, measured, draws, allowed)
-        return measured
+        return replace(best, robustness=_robustness(shot, options, nominal, best, used, draws, progress))
     except KeyboardInterrupt:
         return best_so_far(best)
 
 
 def _worst(
-    shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], scenarios: tuple[Scenario, ...], allowed: float,
+    shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], parameters: Sequence[Parameter], allowed: float,
     progress: Progress,
 ) -> LeastMaximum:  # fmt: skip
-    """The smallest largest error over some robots, and those on which it turns out larger."""
-    candidates, counts = Candidates.of(shot, options, uncertainties_of(shot)), np.zeros(3, int)
+    """The smallest largest error over the random robots that are farthest off, and those that are so with what was
+    found."""
+    assert options.robust is not None
+    others = farthest(shot, options, tracks, parameters, options.robust.scenarios - 1)
+    counts = np.zeros(3, int)
     for _ in range(SEARCHES):
+        robots = (Scenario(), *others)
         try:
-            found = least_maximum(shot, options, tracks, scenarios, allowed, progress)
+            found = least_maximum(shot, options, tracks, robots, allowed, progress)
         except SimulationFailure as failure:
-            off = errors_on(shot, options, {"": shot.animation.tracks, "now": tracks}, scenarios)
-            worst = int(np.argmax(off[""].max(axis=1) + off["now"].max(axis=1)))
-            raise beyond_simulation(shot, scenarios[worst]) from failure
-        tracks, scenarios = found.tracks, found.scenarios
+            raise _named(shot, options, robots) from failure
+        tracks = found.tracks
         counts += found.search.evaluations, found.search.gradients, found.search.products
-        added, candidates = candidates.worst(tracks, float(largest_weighted(shot, found.errors).max()))
+        known = LARGER * float(largest_weighted(shot, found.errors).max())
+        added = farthest(shot, options, tracks, parameters, ADDED, known)
         if not added:
             break
-        scenarios = (*scenarios, *added)
+        others = (*others, *added)
     evaluations, gradients, products = (int(count) for count in counts)
     return replace(found, search=replace(found.search, evaluations=evaluations, gradients=gradients, products=products))
 
@@ -117,13 +116,25 @@ def _simulated(shot: CompiledShot, options: RunSettings, worst: LeastMaximum, be
     )
 
 
+def _named(shot: CompiledShot, options: RunSettings, robots: Sequence[Scenario], reason: str = "") -> ShotError:
+    """The error that names the robot that cannot be simulated, or that is farthest off, and the reason."""
+    off = errors_on(shot, options, {"": shot.animation.tracks}, robots)[""].max(axis=1)
+    factors = robots[int(np.argmax(off))].factors
+    different = ", ".join(f"{name} times {factor:.3g}" for name, factor in factors.items() if factor != 1.0)
+    return ShotError(
+        f"a robot with {different} cannot be simulated" + (f": {reason}" if reason else ""),
+        path=shot.character.path,
+        attribute="calm:retarget:uncertainty",
+        remedy="Set a smaller uncertainty: the model is near buckling, or near another limit of what stands.",
+    )
+
+
 def _searched(shot: CompiledShot, options: RunSettings, progress: Progress, scenarios: tuple[Scenario, ...]) -> Result:
     """A search for the sum over a set of robots; where it fails, the error tells on which of them."""
     try:
         return optimize_shot(shot, options, progress, None, scenarios)
     except ShotError as error:
-        off = errors_on(shot, options, {"": shot.animation.tracks}, scenarios)[""].max(axis=1)
-        raise beyond_simulation(shot, scenarios[int(np.argmax(off))], error.problem) from error
+        raise _named(shot, options, scenarios, error.problem) from error
 
 
 def uncertainties_of(shot: CompiledShot) -> tuple[Parameter, ...]:
@@ -165,25 +176,3 @@ def _robustness(
 
     drawn = errors_on(shot, options, curves, draws, measured)
     return Robustness(options.robust.kind, scenarios, {name: rows[0] for name, rows in on_nominal.items()}, drawn)
-
-
-def _with_compromises(
-    shot: CompiledShot, options: RunSettings, robust: Result, draws: tuple[Scenario, ...], allowed: float
-) -> Result:
-    """The robust result with as many compromises as wanted, which may be farther and farther off on the nominal robot.
-
-    An interrupt (Ctrl-C) ends them.
-    """
-    found, asked, compromises = robust.robustness, options.robust, list[Compromise]()
-    assert found is not None and asked is not None
-    tracks, scenarios = found_tracks(robust, shot.animation), found.scenarios
-    try:
-        for _ in range(asked.tradeoff):
-            allowed *= FARTHER
-            worst = _worst(shot, options, tracks, scenarios, allowed, silent)
-            tracks, scenarios = worst.tracks, worst.scenarios
-            errors = errors_on(shot, options, {"": tracks}, (*scenarios[:1], *draws))[""]
-            compromises.append(Compromise(scenarios[0].weight, allowed, errors[0], errors[1:]))
-    except KeyboardInterrupt:
-        interrupts.answer()
-    return replace(robust, robustness=replace(found, compromises=tuple(compromises)))

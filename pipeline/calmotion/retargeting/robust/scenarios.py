@@ -16,7 +16,7 @@ from calmotion.arrays import Array
 from calmotion.model import Character
 from calmotion.model.character import ElasticMaterial
 from calmotion.model.motor import PRESCRIBED, Motor
-from calmotion.model.robust.robots import Scenario
+from calmotion.model.uncertainty import Scenario
 from calmotion.reduction.reduced_body import Invariants, ReducedBody
 from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot

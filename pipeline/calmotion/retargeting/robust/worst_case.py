@@ -12,16 +12,16 @@ from typing import ClassVar
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray
-from calmotion.errors import ShotError
 from calmotion.model import Track
-from calmotion.model.robust.robots import Scenario
 from calmotion.model.run import RunSettings
+from calmotion.model.uncertainty import Scenario
 from calmotion.retargeting.avoided_reversals import play_of, with_reversals
 from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.kept_feet import with_kept_feet
 from calmotion.retargeting.problem.limits import FIRST_PENALTY, MARGIN, LimitTerms
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
+from calmotion.retargeting.robust.measure import largest_weighted
 from calmotion.retargeting.robust.robots import robots_of
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.retargeting.solver.norm import PowerMean
@@ -30,22 +30,6 @@ from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.preparation import prepare
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.support import interrupts
-
-
-def beyond_simulation(shot: CompiledShot, scenario: Scenario, reason: str = "") -> ShotError:
-    """The error that says that a robot is too different from the model to be simulated, and the reason."""
-    different = ", ".join(f"{name} times {factor:.3g}" for name, factor in scenario.factors.items() if factor != 1.0)
-    return ShotError(
-        f"a robot with {different} cannot be simulated" + (f": {reason}" if reason else ""),
-        path=shot.character.path,
-        attribute="calm:retarget:uncertainty",
-        remedy="Set a smaller uncertainty: the model is near buckling, or near another limit of what stands.",
-    )
-
-
-def largest_weighted(shot: CompiledShot, errors: Array) -> Array:
-    """The largest error of any target as it weighs, shape [S], of errors of the targets, shape [S, K]."""
-    return np.asarray((errors * np.sqrt([t.position_weight for t in shot.character.targets])).max(axis=1))
 
 
 @dataclass(frozen=True, eq=False)

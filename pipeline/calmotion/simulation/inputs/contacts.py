@@ -7,8 +7,8 @@ import numpy as np
 from calmotion.arrays import Array, BoolArray
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.model import Animation, Character
+from calmotion.model.animation import Contact
 from calmotion.model.character import contact_joints
-from calmotion.model.contact import Contact
 from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.kernels.so3 import matrix_of

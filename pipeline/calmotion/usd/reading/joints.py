@@ -11,7 +11,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import WORLD, Frame
-from calmotion.model.contact import Contact
+from calmotion.model.animation import Contact
 from calmotion.support.naming import nearest
 from calmotion.usd import gf
 from calmotion.usd.reading.bases.joint_ends import refuse_lost_target, refuse_no_place

@@ -11,7 +11,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import RetargetSettings, TempoSettings
-from calmotion.model.robust.settings import Uncertainty
+from calmotion.model.uncertainty import Uncertainty
 from calmotion.usd import gf, schemas
 from calmotion.usd.calibrations import known_factors
 from calmotion.usd.reading.context import Reading, prims_of

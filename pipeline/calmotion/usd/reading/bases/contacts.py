@@ -10,7 +10,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.model import Frame
-from calmotion.model.contact import Contact
+from calmotion.model.animation import Contact
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading, carrying_body, prims_of, refuse_without_transform

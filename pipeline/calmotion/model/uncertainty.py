@@ -1,13 +1,28 @@
-"""What is not known exactly of a robot, and what the user asks for because of it."""
+"""What is not known exactly of a robot, robots that differ from the model, and how motor curves do on them."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
-from calmotion.model.robust.known_factors import KnownFactors
+from calmotion.arrays import Array
 
 MEAN, WORST = "mean", "worst"
+CURVES = ("before", "nominal", "robust")  # as animated; optimised for the nominal robot; optimised for all robots
+
+
+@dataclass(frozen=True)
+class KnownFactors:
+    """What a calibration tells of the factors by which parameters of the robot may differ from the shot.
+
+    Attributes:
+        names: Kind and path of each.
+        covariance: Of the logarithms of the factors, by rows.
+    """
+
+    names: tuple[str, ...] = ()
+    covariance: tuple[tuple[float, ...], ...] = field(default_factory=tuple)
 
 
 @dataclass(frozen=True)
@@ -48,12 +63,40 @@ class RobustSettings:
         draws: Number of random robots on which the curves are measured afterwards.
         nominal_error: Error that a target may have on the nominal robot where the largest error is minimised, over the
             tolerance; curves for the nominal robot alone may have more.
-        tradeoff: Number of further curves, each of which may be twice as far off on the nominal robot as the one
-            before.
     """
 
     kind: str = WORST
     scenarios: int = 7
     draws: int = 200
     nominal_error: float = 2.0
-    tradeoff: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A robot that differs from the model.
+
+    Attributes:
+        factors: Of its parameters, by their names.
+        weight: In the objective; those of all scenarios add up to 1.
+    """
+
+    factors: Mapping[str, float] = field(default_factory=dict)
+    weight: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Robustness:
+    """Motor curves on robots that differ from the model.
+
+    Attributes:
+        kind: Of the optimisation, `mean` or `worst`.
+        scenarios: The robots for which the curves were optimised, the nominal one first.
+        nominal: Largest error of each target on the nominal robot [m], shape [K], by name of the curves (`CURVES`).
+        drawn: The same on random robots that the optimisation did not see, shape [draws, K]; infinite where a robot
+            could not be simulated.
+    """
+
+    kind: str
+    scenarios: tuple[Scenario, ...]
+    nominal: Mapping[str, Array]
+    drawn: Mapping[str, Array]
