@@ -15,7 +15,6 @@ from .signals import Drive
 from .situation import Situation
 
 SWEEPS = 2  # over loops and added explanations
-LEAST_RATE = 8.0  # independent samples a second at least: a slow error is explained by signals that are not as slow
 DESCENTS = 14  # evaluations of the Jacobian of a joint's search
 
 
@@ -76,10 +75,10 @@ def score(situation: Situation, left: Array, count: int) -> float:
     Samples that follow each other are not independent: each block counts with as many as its autocorrelation leaves.
     """
     total, samples = 0.0, 0.0
-    held_out, seconds = ~situation.fitted, situation.h * len(situation.command)
+    held_out = ~situation.fitted
     for block in situation.blocks:
         own = left[block]
-        size = max(independent(situation.error[block]), LEAST_RATE * seconds)
+        size = independent(situation.error[block])
         rows = held_out[block]
         # below the noise (a weighted variance of one) nothing is gained
         total += 0.5 * size * np.log(1.0 + float(np.mean(own[rows] ** 2)) if rows.any() else 1.0)
@@ -176,8 +175,7 @@ def _fit_group(
         return None
     sigma = max(float(np.sqrt(np.mean(target[keep] ** 2))), 1.0)
     scale = 1.0 / (sigma * np.sqrt(float(keep.sum())))
-    seconds = float(len(situation.times) * situation.h)
-    size = max(independent(target), LEAST_RATE * seconds) if single else 10.0 * seconds
+    size = independent(target) if single else float(len(situation.times) * situation.h * 10.0)
 
     def left(x: Array) -> Array:
         values = {key: p.value(float(v)) for (key, p), v in zip(own.items(), x, strict=True)}

@@ -22,11 +22,10 @@ def follow(
         inertia, load, slope: Of the joint, the load without the inertia's share where the joint is near, shape [T].
         near: There, shape [T].
         gains: Gain, damping, share of the command's rate, friction, excess of friction at rest, and the speed over
-            which that is gone, and friction by the load.
+            which that is gone.
         out: Position, speed and acceleration, shape [3, T].
     """
     kp, kd, share, dry, excess, fast = gains[0], gains[1], gains[2], gains[3], gains[4], gains[5]
-    by_load = gains[6]
     y = command[0] - load[0] / kp
     v = 0.0
     out[0, 0], out[1, 0], out[2, 0] = y, v, 0.0
@@ -36,7 +35,7 @@ def follow(
         g = slope[n]
         force = kp * (at - y) + kd * share * 0.5 * (rate[n] + rate[n + 1]) - 0.5 * (load[n] + load[n + 1])
         force += 2.0 * J * v / h - g * (y - 0.5 * (near[n] + near[n + 1]))
-        friction = (dry + by_load * abs(0.5 * (load[n] + load[n + 1]))) * (1.0 + excess * np.exp(-abs(v) / fast))
+        friction = dry * (1.0 + excess * np.exp(-abs(v) / fast))
         if abs(force) <= friction:
             new = 0.0
             middle = 0.0

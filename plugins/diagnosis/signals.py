@@ -86,7 +86,6 @@ class Drive:
     friction: Array
     excess: Array
     delay: Array
-    by_load: Array
 
     def with_joint(self, m: int, values: Mapping[str, float]) -> Drive:
         """With other values of one motor."""

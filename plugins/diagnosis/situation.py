@@ -74,7 +74,7 @@ class Situation:
         least = [HEALTHY * j.critical(j.gain) for j in self.joints]
         damping = np.array([max(j.damping, own) for j, own in zip(self.joints, least, strict=True)])
         none = np.zeros(len(gain))
-        return Drive(gain, damping, np.array([j.share for j in self.joints]), none, none, none, none)
+        return Drive(gain, damping, np.array([j.share for j in self.joints]), none, none, none)
 
     def moved(self, drive: Drive, command: Array | None = None, only: int | None = None) -> Array:
         """Motion of the joints: values, rates and accelerations, shape [3, T, M], or of one of them, [3, T, 1]."""
@@ -90,8 +90,9 @@ class Situation:
             if not np.isfinite(drive.gain[m]):
                 out[:, :, column] = own, rate, np.gradient(rate, self.h)
                 continue
-            own_loop = (drive.gain, drive.damping, drive.share, drive.friction, drive.excess)
-            gains = np.array([*(part[m] for part in own_loop), STRIBECK, drive.by_load[m]])
+            gains = np.array(
+                [drive.gain[m], drive.damping[m], drive.share[m], drive.friction[m], drive.excess[m], STRIBECK]
+            )
             one = np.zeros((3, len(own)))
             follow(
                 self.h,
@@ -117,7 +118,7 @@ class Situation:
     def equivalent(self, motion: Array, drive: Drive) -> Array:
         """The commands under which loops without friction would move as the joints do, shape [T, M]."""
         none = np.zeros(len(self.joints))
-        linear = replace(drive, friction=none, excess=none, by_load=none)
+        linear = replace(drive, friction=none, excess=none)
         rest = motion - self.moved(linear)
         gain, damping = self.finite(drive)
         inertia = np.stack([joint.inertia for joint in self.joints], axis=1)

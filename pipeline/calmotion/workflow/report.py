@@ -157,6 +157,7 @@ def _retime(character: Character, retimed: Retimed | None) -> dict[str, Any] | N
             }
             for part in report.stretches
         ],
+        "lacking_stretch": report.lacking or None,
         "pins": [{"time_s": time, "shift_s": shift} for time, shift in report.pins],
     }  # fmt: skip
 

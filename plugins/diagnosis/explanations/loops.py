@@ -85,22 +85,15 @@ class Friction(LoopExplanation):
     def parameters(self, situation: Situation, motor: int) -> tuple[Parameter, ...]:
         """Lost motion (friction over gain), excess at rest, and where the gain is not known the frequency."""
         joint = situation.joints[motor]
-        lost = Parameter("lost_motion", "rad", (0.01, 0.03, 0.1), 1e-5, 0.5, np.inf, True)
+        lost = Parameter("lost_motion", "rad", (0.01, 0.03), 1e-5, 0.5, np.inf, True)
         excess = Parameter("excess_at_rest", "", (0.3,), 0.0, 2.0, 0.5)
-        by_load = Parameter("by_load", "of the load", (0.0, 0.1, 0.3), -1e-9, 1.0, 0.3)
-        found = (lost, excess, by_load) if joint.load.any() else (lost, excess)
-        return found if joint.gain and not joint.guessed else (*found, _frequency(situation, motor))
+        return (lost, excess) if joint.gain and not joint.guessed else (lost, excess, _frequency(situation, motor))
 
     def changed(self, situation: Situation, drive: Drive, motor: int, values: Values) -> Drive:
         """With friction."""
         drive = _guessed_anew(situation, drive, motor, values)
         return drive.with_joint(
-            motor,
-            {
-                "friction": values["lost_motion"] * drive.gain[motor],
-                "excess": values["excess_at_rest"],
-                "by_load": values.get("by_load", 0.0),
-            },
+            motor, {"friction": values["lost_motion"] * drive.gain[motor], "excess": values["excess_at_rest"]}
         )
 
     def remedy(self, situation: Situation, parameters: Sequence[Mapping[str, Any]]) -> str:

@@ -8,6 +8,7 @@ from calmotion.mesh.surfaces.closed_surfaces import (
     boundary_walks,
     close,
     enclosed_volume,
+    winding_number,
     winding_numbers,
 )
 from calmotion.mesh.tetrahedra import boundary_triangles, surface_volume
@@ -50,10 +51,10 @@ def test_two_holes_that_touch_at_a_corner_are_closed_apart(box):
 
 def test_the_winding_number_distinguishes_inside_outside_and_twice_inside(box):
     points, triangles = box
-    places = np.array([[0.4, 0.5, 0.6], [1.4, 0.5, 0.6]])
-    assert winding_numbers(places, points, triangles) == pytest.approx([1.0, 0.0], abs=1e-12)
+    assert winding_number(np.array([0.4, 0.5, 0.6]), points, triangles) == pytest.approx(1.0)
+    assert winding_number(np.array([1.4, 0.5, 0.6]), points, triangles) == pytest.approx(0.0, abs=1e-12)
     double = np.vstack([triangles, triangles + len(points)])
-    assert winding_numbers(places[:1], np.vstack([points, points + 0.1]), double) == pytest.approx(2.0)
+    assert winding_number(np.array([0.4, 0.5, 0.6]), np.vstack([points, points + 0.1]), double) == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("bent", [0.0, 0.3])
@@ -76,7 +77,7 @@ def test_many_winding_numbers_of_a_large_surface_are_those_of_each_place(bent):
     )
     found = winding_numbers(places, points, triangles)
     assert len(triangles) == 60_000
-    assert np.abs(found - [winding_numbers(place[None], points, triangles)[0] for place in places]).max() < 0.02
+    assert np.abs(found - [winding_number(place, points, triangles) for place in places]).max() < 0.02
     assert found[:60] == pytest.approx(1.0, abs=0.03) and found[60:90] == pytest.approx(0.0, abs=0.03)
 
 

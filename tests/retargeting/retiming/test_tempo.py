@@ -126,6 +126,7 @@ def test_what_may_not_be_slower_keeps_the_largest_stretch():
     times, curve = moves(0.0)
     found = tempo_of(times, curve, limits(velocity=0.4 * PEAK), TempoSettings(slowest=2.0))
     assert found.map.stretch(times).max() <= 2.0 + 1e-9 and found.excess == pytest.approx(0.25, abs=0.01)
+    assert found.report.lacking == pytest.approx(2.5, rel=0.01)
 
 
 def test_slopes_of_the_program_are_those_of_differences():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -59,6 +60,9 @@ def print_retiming(console: Console, retime: dict[str, Any] | None) -> None:
         times = f"{part['from_s']:.2f} to {part['to_s']:.2f} s"
         rows.append([times, f"{part['factor']:.2f}", " and ".join(reasons[:2]) + more])
     print_table(console, "Tempo", ["animation", "times as long", "because of"], rows)
+    if retime["lacking_stretch"]:
+        more = math.ceil(20.0 * retime["lacking_stretch"]) / 20.0
+        say(console, f"limits ask for parts that take {more:g} times as long: --retime slowest={more:g} allows them")
     late = [f"{pin['time_s']:.2f} s {pin['shift_s']:+.3f} s" for pin in retime["pins"]]
     if late:
         say(console, f"pinned times in the performance: {', '.join(late)}")

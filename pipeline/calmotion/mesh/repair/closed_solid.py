@@ -12,7 +12,7 @@ from calmotion.mesh.repair.closing import REMEDY, Part, closed_parts, concatenat
 from calmotion.mesh.repair.uniting import NotManifold, united, without_detail
 from calmotion.mesh.sources.bridges import WIDE, bridged, strutted
 from calmotion.mesh.sources.slits import without_slits
-from calmotion.mesh.surfaces.closed_surfaces import enclosed_volume, winding_numbers
+from calmotion.mesh.surfaces.closed_surfaces import enclosed_volume, winding_number, winding_numbers
 from calmotion.model import SurfaceMesh
 
 # largest share of the surface that is inside out, and where holes of any size are capped; number of sample points
@@ -244,9 +244,7 @@ def _inverted(part: Part) -> Part:
 
 def _contains(solid: Part, point: np.ndarray) -> bool:
     low, high = solid.points.min(axis=0), solid.points.max(axis=0)
-    if not ((point > low) & (point < high)).all():
-        return False
-    return bool(winding_numbers(point[None], solid.points, solid.triangles)[0] > 0.5)
+    return bool(((point > low) & (point < high)).all()) and winding_number(point, solid.points, solid.triangles) > 0.5
 
 
 def _inside_out(whole: Part) -> float:

@@ -11,9 +11,9 @@ from calmotion.mesh.surfaces.orientation import directed_edges
 from calmotion.mesh.surfaces.solid_angles import solid_angles
 from calmotion.mesh.tetrahedra import surface_area
 
-# Number of pairs of triangles and places below which each is exact; distance from which a group counts as a dipole, of
+# Number of triangles, and of places, below which each is counted; distance from which a group counts as a dipole, of
 # its radius
-_FEW, _FAR = 4_000_000, 3.0
+_FEW, _FAR = 2_000, 3.0
 _CELLS = 40_000  # of the grid on which a volume is sampled
 
 
@@ -97,11 +97,19 @@ def close(points: Array, triangles: Indices) -> Closure:
     return Closure(np.vstack(new_points), np.vstack(new_triangles), np.array(areas), np.array(sides, dtype=int))
 
 
+def winding_number(point: Array, points: Array, triangles: Indices) -> float:
+    """Winding number of a surface around a point: 1 inside a closed outward surface, 0 outside.
+
+    Source: van Oosterom and Strackee 1983 (solid angle of a triangle); Jacobson et al. 2013.
+    """
+    return _solid_angle(point, points[triangles]) / (4.0 * np.pi)
+
+
 def winding_numbers(places: Array, points: Array, triangles: Indices) -> Array:
-    """Winding numbers of a surface around places: 1 inside a closed outward surface, 0 outside.
+    """Winding numbers of a surface around many places, where a large surface would take minutes place by place.
 
     Triangles are grouped by the cell of a grid that they are in. A group that is far from a place counts as a dipole,
-    whose error is at most a few thousandths here; near groups are exact, and all where there are few.
+    whose error is at most a few thousandths here; near groups and small surfaces are exact.
 
     Args:
         places: Shape [k, 3].
@@ -111,14 +119,14 @@ def winding_numbers(places: Array, points: Array, triangles: Indices) -> Array:
     Returns:
         Shape [k].
 
-    Source: van Oosterom and Strackee 1983 (solid angle of a triangle); Barill, Dickson, Schmidt, Levin and Jacobson
-    2018, Fast Winding Numbers for Soups and Clouds.
+    Source: Barill, Dickson, Schmidt, Levin and Jacobson 2018, Fast Winding Numbers for Soups and Clouds.
     """
     corners = points[triangles]
+    if len(triangles) < _FEW and len(places) < _FEW:
+        return np.array([_solid_angle(place, corners) for place in places]) / (4.0 * np.pi)
     centers = corners.mean(axis=1)
     low = centers.min(axis=0)
-    extent = max(float(np.ptp(centers, axis=0).max()), np.finfo(float).tiny)
-    width = extent / np.ceil(len(triangles) ** 0.25)  # about sqrt(m) cells have triangles
+    width = float(np.ptp(centers, axis=0).max()) / np.ceil(len(triangles) ** 0.25)  # about sqrt(m) cells have triangles
     cells = np.minimum(((centers - low) / width).astype(np.int64), 2**20 - 1) @ np.array([1 << 40, 1 << 20, 1])
     order = np.argsort(cells, kind="stable")
     corners = np.ascontiguousarray(corners[order])
@@ -129,8 +137,6 @@ def winding_numbers(places: Array, points: Array, triangles: Indices) -> Array:
     middles = np.add.reduceat(centers[order], starts, axis=0) / np.diff(bounds)[:, None]
     offsets = np.linalg.norm(corners - np.repeat(middles, np.diff(bounds), axis=0)[:, None], axis=2).max(axis=1)
     reach = _FAR * np.maximum.reduceat(offsets, starts)
-    if len(triangles) * len(places) < _FEW:
-        reach[:] = np.inf
     angles = np.empty(len(places))
     solid_angles(np.ascontiguousarray(places), corners, bounds, dipoles, middles, reach, angles)
     return angles / (4.0 * np.pi)
@@ -151,3 +157,17 @@ def enclosed_volume(points: Array, triangles: Indices) -> float:
     corner = np.stack(np.meshgrid(*(np.arange(n) for n in cells), indexing="ij"), axis=-1).reshape(-1, 3)
     places = low + size * (corner + np.random.default_rng(4).random(corner.shape)) / cells
     return float(np.prod(size)) * float((winding_numbers(places, points, triangles) > 0.5).mean())
+
+
+def _solid_angle(point: Array, corners: Array) -> float:
+    """Solid angle of triangles, shape [m, 3, 3], at a point."""
+    a, b, c = (corners[:, k] - point for k in range(3))
+    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+    det = np.einsum("ij,ij->i", a, np.cross(b, c))
+    rest = (
+        la * lb * lc
+        + np.einsum("ij,ij->i", a, b) * lc
+        + np.einsum("ij,ij->i", b, c) * la
+        + np.einsum("ij,ij->i", c, a) * lb
+    )
+    return float(2.0 * np.arctan2(det, rest).sum())

@@ -109,9 +109,11 @@ class TempoReport:
         lower_bound: What is added at least for them, where only what must is slower [s].
         stretches: Parts of another tempo.
         pins: Pinned times of the animation, and by how much they are later in the performance [s].
+        lacking: Largest stretch that limits ask for where less is allowed; 0 where what is allowed does.
     """
 
     uniform_added: float
     lower_bound: float
     stretches: tuple[Stretch, ...]
     pins: tuple[tuple[float, float], ...]
+    lacking: float = 0.0

@@ -1,7 +1,7 @@
 """Offsets and tempo together.
 
 A search finds the offsets that calm the robot at the tempo of its rigid robot, without the limits that a tempo keeps.
-The tempo follows anew from these curves and efforts, and the offsets are moved to it, until the curves keep the limits.
+The tempo follows anew with room for what the offsets add, and these are moved to it, until the curves keep the limits.
 """
 
 from __future__ import annotations
@@ -12,12 +12,15 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from calmotion.arrays import Array
+from calmotion.errors import ShotError
 from calmotion.model import Result, Track
 from calmotion.model.curves import Sample, commanded_curves
 from calmotion.model.retiming.performance import retimed, with_contacts_at
 from calmotion.model.retiming.retimed import Retimed
 from calmotion.model.retiming.tempo import TimeMap
 from calmotion.model.run import RunSettings
+from calmotion.retargeting.retiming.program import NOTICED
 from calmotion.retargeting.retiming.rigid_robot import tempo_input
 from calmotion.retargeting.retiming.settings import refuse_tempo
 from calmotion.retargeting.retiming.tempo import FoundTempo, TempoInput, find_tempo
@@ -28,9 +31,10 @@ from calmotion.simulation.simulate import Progress
 from calmotion.tolerance.motors.animation_limits import tempo_limits
 from calmotion.tolerance.pod_subspace import ReferenceRun
 from calmotion.tolerance.reduced_bodies import RunMemory
+from calmotion.tolerance.simulation import found_tracks
 
 ROUNDS = 4  # searches at most, of which the last keeps all limits by itself
-KEPT = 1e-3  # share of a limit by which it counts as kept
+KEPT = 1e-6  # share of a limit by which it counts as kept
 ROOM = 5e-3  # share of a limit by which the tempo stays further within it once offsets are known
 FINE = 8  # instants of a frame at which curves are compared with their limits
 
@@ -54,22 +58,43 @@ def optimize_with_tempo(
     if found.map is None:
         result = optimize_to_tolerance(shot, plain, progress, checkpoint, known, memory)
         return replace(result, retimed=Retimed(shot.animation, shot.character, found.report))
-    performance, done = _Performance.of(shot, given, found), None
+    uniform, bound = found.report.uniform_added, found.report.lower_bound
+    performance, limits, done = _Performance.of(shot, given, found), given.limits, None
+    last = found.excess > NOTICED  # where nothing may be slower, a search has to keep the limits
     for number in range(1, ROUNDS + 1):
-        last = number == ROUNDS or found.excess > KEPT
-        latest = optimize_to_tolerance(
-            performance.shot, replace(plain, limited_by_tempo=not last), progress, checkpoint
-        )  # fmt: skip
+        last = last or number == ROUNDS
+        of_round = replace(plain, limited_by_tempo=not last, robust=None)
+        latest = optimize_to_tolerance(performance.shot, of_round, progress, checkpoint)
         done = latest if done is None else continued(done, latest)
-        if last or done.interrupted or performance.excess(latest) <= KEPT:
+        used = performance.used(latest)
+        if last or done.interrupted or max(float(np.max(share, initial=0.0)) for share in used.values()) <= 1.0 + KEPT:
             break
         progress(0.0, "choosing the tempo for the curves that were found")
-        report = found.report
-        found = find_tempo(performance.input(latest, number * ROOM), settings, shot.character.path)
-        report = replace(found.report, uniform_added=report.uniform_added, lower_bound=report.lower_bound)
-        performance = performance.moved(latest, replace(found, report=report))
+        limits = _narrowed(limits, used)
+        narrow = replace(given, limits=limits, efforts=performance.efforts(latest))
+        try:
+            other = find_tempo(narrow, settings, shot.character.path)
+        except ShotError:  # pinned times leave no room
+            other, last = found, True
+        found = replace(other, report=replace(other.report, uniform_added=uniform, lower_bound=bound))
+        last = last or found.excess > NOTICED
+        performance = performance.moved(latest, found)
     assert done is not None
+    if plain.robust is not None and not done.interrupted:
+        tracks = found_tracks(done, performance.shot.animation)
+        done = continued(done, optimize_to_tolerance(performance.shot.with_tracks(tracks), plain, progress, checkpoint))
     return replace(done, retimed=performance.retimed)
+
+
+def _narrowed(limits: TempoLimits, used: dict[str, Array]) -> TempoLimits:
+    """Limits that leave room for what offsets add to the rates of the animation; what efforts are beside those of the
+    rigid robot, the efforts have.
+
+    Args:
+        used: Shares of the limits that curves reached.
+    """
+    shares = {name: np.maximum(share, 1.0) if name != "effort" else 1.0 for name, share in used.items()}
+    return TempoLimits(**{name: (1.0 - ROOM) * getattr(limits, name) / share for name, share in shares.items()})
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,29 +132,22 @@ class _Performance:
         values = other._curves(None)(frames, 0) + offsets
         return replace(other, shot=other.shot.with_tracks([Track(frames, column) for column in values.T]))
 
-    def excess(self, result: Result) -> float:
-        """The largest excess of the limits that a tempo keeps, as a share of them, on finer instants than those of the
-        search."""
+    def used(self, result: Result) -> dict[str, Array]:
+        """Largest values of what a tempo limits, as shares of the limits, by name, shape [M] each.
+
+        Curves are compared on finer instants than those of the search.
+        """
         assert result.after is not None
         limits, frames = tempo_limits(self.made.character), self.retimed.animation.frame_times
         times = np.linspace(0.0, frames[-1], FINE * (len(frames) - 1) + 1)
         curves, motion = self._curves(result), result.after.motion
         values = [curves(times, 1), curves(times, 2), curves(times, 3), motion.motor_efforts[motion.judged]]
-        bounds = [getattr(limits, name) for name in TEMPO_LIMITS]
-        return max(float(np.max(np.abs(v) / most, initial=0.0)) for v, most in zip(values, bounds, strict=True)) - 1.0
+        return {
+            name: np.max(np.abs(v), axis=0, initial=0.0) / getattr(limits, name)
+            for name, v in zip(TEMPO_LIMITS, values, strict=True)
+        }
 
-    def input(self, result: Result, room: float) -> TempoInput:
-        """What the tempo follows from with the curves of a result.
-
-        Args:
-            room: Share of the limits by which they are narrower.
-        """
-        times, limits = self.given.times, self.given.limits
-        path = CubicSpline(times, self._curves(result)(self.tempo.performed(times), 0))
-        narrow = TempoLimits(**{name: (1.0 - room) * getattr(limits, name) for name in TEMPO_LIMITS})
-        return replace(self.given, curves=path, limits=narrow, efforts=self._efforts(result))
-
-    def _efforts(self, result: Result) -> MotorEfforts | None:
+    def efforts(self, result: Result) -> MotorEfforts | None:
         """Those of the rigid robot, and what the motion of a result takes beside them, by the square of the tempo."""
         efforts, times = self.given.efforts, self.given.times
         if efforts is None:

@@ -97,7 +97,10 @@ def find_tempo(given: TempoInput, settings: TempoSettings, path: str) -> FoundTe
     if pins and whole.missed(found) > NOTICED:
         _refuse_missed(path, whole.missed(found))
     report = _report(settings, needed, program, c, basis.time_map(found))
-    return FoundTempo(basis.time_map(found), frames + 1, report, whole.excess(found))
+    excess = whole.excess(found)
+    if excess > NOTICED:
+        report = replace(report, lacking=float(np.max(needed.stretch)))
+    return FoundTempo(basis.time_map(found), frames + 1, report, excess)
 
 
 def _path(given: TempoInput, basis: StretchBasis) -> Path:
