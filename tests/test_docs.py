@@ -16,6 +16,7 @@ from urllib.parse import urljoin
 import pytest
 from calmotion.cli.commands.table import BROUGHT_BY
 from floors import FLOORS, REQUIRED_PLUGINS
+from prose import sentences, sentences_through_code
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PACKAGE = REPOSITORY / "pipeline" / "calmotion"
@@ -30,6 +31,38 @@ def test_every_path_on_a_page_exists(page):
     named = re.findall(r"`([\w./-]+(?:\.py|/))`", page.read_text())
     made = ("speed_watch/", "build/")  # by commands on these pages
     assert [name for name in named if "/" in name and not name.startswith(made) and not _exists(name)] == []
+
+
+# Turns of phrase that a reader has to read twice.
+RIDDLES = (
+    r"\bwhat\b[^.?(]*\bwhat\b",
+    r"\bwhat is left\b",
+    r"\bwhat was meant\b",
+    r"\bwhere to where\b",
+    r"\bas far off .* as the one before\b",
+    r"\bact against the last\b",
+    r"\bby so much\b",
+    r"\bso much later\b",
+    r"\bmotors? that gives?\b",
+    r"\bwhich is noted\b",
+    r"\band is told\b",
+    r"\bhas no say in\b",
+    r"\btells? (?:it|what|which)\b",
+)
+
+
+@pytest.mark.parametrize(
+    "page",
+    [page for page in PAGES if page.parent.name != "decisions" and page.name != "CHANGELOG.md"],
+    ids=lambda page: str(page.relative_to(REPOSITORY)),
+)
+def test_the_sentences_of_a_page_are_short_and_plain(page):
+    text = page.read_text()
+    long = [f"{len(found.split())} words: {found}" for found in sentences(text) if len(found.split()) > 30]
+    assert long == [], f"{page}: sentences over 30 words"
+    twice = [(riddle, found) for found in sentences(text) for riddle in RIDDLES if re.search(riddle, found, re.I)]
+    assert twice == [], f"{page}: phrases that have to be read twice"
+    assert sentences_through_code(text) == [], f"{page}: a sentence begins before a block of code and ends behind it"
 
 
 BECOME = r"([\d.]+) mm (?:of error )?become ([\d.]+) mm"

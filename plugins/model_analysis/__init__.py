@@ -195,7 +195,7 @@ class EstimateMotorEffects(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.tolerance import effects_of_gains
 
-        context.progress(0.0, "simulating the robot on motors that give")
+        context.progress(0.0, "simulating the robot on compliant motors")
         options = run_settings(context.get(Source), context.get(ModelChoices))
         found = effects_of_gains(_representative(context), options)
         if found is None:

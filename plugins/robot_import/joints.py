@@ -143,7 +143,7 @@ def author_springs(stage: Usd.Stage, units: StageUnits) -> list[str]:
         notes.append(f"dampers of joints without motors are drives that are not optimised: {', '.join(damped)}")
     if driven:
         notes.append(
-            "springs of joints with motors are not read: efforts, and commands of motors that give, are without them: "
+            "springs of joints with motors are not read: efforts, and commands of compliant motors, are without them: "
             f"{', '.join(driven)}"
         )
     if others:

@@ -34,7 +34,7 @@ class Uncertainty:
         modulus: Of Young's modulus of each material.
         damping: Of the damping of each material.
         payload: Of the masses of the rigid bodies at the ends of the chains, all by the same factor.
-        gains: Of the gains of each motor that gives, position and velocity by the same factor.
+        gains: Of the gains of each compliant motor, position and velocity by the same factor.
         calibrated: Of the parameters that a calibration tells, which count instead.
     """
 

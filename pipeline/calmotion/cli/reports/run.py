@@ -38,9 +38,9 @@ def print_notes(console: Console, notes: Sequence[str]) -> None:
 
 
 def print_shares(console: Console, shares: Sequence[dict[str, Any]]) -> None:
-    """The parts of motors that give and of flexible links in the error of the input."""
+    """The parts of compliant motors and of flexible links in the error of the input."""
     rows = [[row["path"], length(row["motors_m"]), length(row["links_m"])] for row in shares]
-    heads = ["target", "motors that give", "links that bend"]
+    heads = ["target", "compliant motors", "links that bend"]
     print_table(console, "Largest error as animated, by its cause alone", heads, rows)
 
 

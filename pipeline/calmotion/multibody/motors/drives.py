@@ -1,4 +1,4 @@
-"""Motors that give: a drive is one elastic coordinate of the body that it moves, a servo with a gear two.
+"""Compliant motors: a drive is one elastic coordinate of the body that it moves, a servo with a gear two.
 
 The marker by which a component hangs on a driven joint is turned about the joint's axis by coordinates of the
 component's own (moved along it, on a slider), and the motor's constraint holds this marker.
@@ -32,7 +32,7 @@ from calmotion.multibody.model.system import LINEAR, System
 
 
 class GivingMotor(NamedTuple):
-    """A motor that gives, and the number of its joint in the system."""
+    """A compliant motor, and the number of its joint in the system."""
 
     joint: int
     motor: Motor
@@ -63,7 +63,7 @@ def giving_motors(system: System, motor: IntArray, motors: Sequence[Motor]) -> l
         item = motors[k]
         if joint >= len(system.parent) and system.law[system.side[joint, 1]] != LINEAR:
             raise ShotError(
-                "a motor that gives and closes a chain cannot hang on a body of large deflection",
+                "a compliant motor that closes a chain cannot hang on a body of large deflection",
                 path=item.path,
                 attribute="calm:motor:model",
                 found=item.model,

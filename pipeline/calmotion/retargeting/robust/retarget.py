@@ -152,7 +152,7 @@ def uncertainties_of(shot: CompiledShot) -> tuple[Parameter, ...]:
             attribute="calm:retarget:uncertainty:modulus, :damping, :payload and :gains",
             found=f"{given.modulus:g}, {given.damping:g}, {given.payload:g} and {given.gains:g}",
             remedy="Set one of them above zero that the robot has: a flexible body has a modulus and a damping, a "
-            "rigid body at the end of a chain is payload, a motor that gives has gains; or leave out --robust.",
+            "rigid body at the end of a chain is payload, a compliant motor has gains; or leave out --robust.",
         )
     return parameters
 
