@@ -32,7 +32,11 @@ def plot_tempo(character: Character, retimed: Retimed) -> Figure:
         )  # fmt: skip
     for time, late in retimed.report.pins:
         axes.axvline(time + late, color=LIMIT, linewidth=1.0)
-    tidy(axes, "tempo [%]", f"{tempo.added:.2f} s longer; rigid links need {retimed.report.lower_bound:.2f} s")
+    tidy(
+        axes,
+        "tempo [%]",
+        f"{tempo.added:.2f} s longer; nowhere faster, rigid links need {retimed.report.lower_bound:.2f} s",
+    )
     axes.set_ylim(bottom=0.0)
     axes.margins(x=0.0)
     axes.set_xlabel("time of the performance [s]", fontsize=SMALL)

@@ -50,8 +50,8 @@ def print_retiming(console: Console, retime: dict[str, Any] | None) -> None:
         return
     say(
         console,
-        f"The performance takes {added:.2f} s more; rigid links need {retime['lower_bound_s']:.2f} s at least, and "
-        f"{retime['uniform_added_s']:.2f} s at one tempo for the whole.",
+        f"The performance takes {added:.2f} s more; rigid links that are nowhere faster need "
+        f"{retime['lower_bound_s']:.2f} s at least, and {retime['uniform_added_s']:.2f} s at one tempo for the whole.",
     )
     rows = []
     for part in parts:
