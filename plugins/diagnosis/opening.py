@@ -186,18 +186,21 @@ def _sensors(
                 "the recording names what the shot does not have", path=channel.path, found=channel.kind,
                 remedy=f"Name one of {', '.join(names[:8])}",
             )  # fmt: skip
-        rows = np.isfinite(channel.values).all(axis=1) & (channel.times >= 0.0) & (channel.times <= end)
+        there = np.flatnonzero(np.isfinite(channel.values).any(axis=0))
+        rows = np.isfinite(channel.values[:, there]).all(axis=1) & (channel.times >= 0.0) & (channel.times <= end)
         if rows.sum() < LEAST_SAMPLES:
             notes.append(f"{channel.name} has {int(rows.sum())} samples during the motion, and is not used")
             continue
-        times, values = channel.times[rows], channel.values[rows]
+        times, values = channel.times[rows], channel.values[rows][:, there]
         noise = channel.sigma if channel.sigma is not None else noise_of(channel.kind, values)
         stale = _stale(channel.kind, times, values)
         if stale:
             notes.append(stale.format(channel.name))
         times, values, noise = _thinned(times, values, noise)
         index = list(names).index(channel.path) if channel.path in names else -1
-        found.append(Sensor(channel.kind, channel.path, index, times, values, max(noise, 1e-12)))
+        found.append(
+            Sensor(channel.kind, channel.path, index, times, values, max(noise, 1e-12), tuple(map(int, there)))
+        )
     if not found:
         raise ShotError(
             "no channel of the recordings can be compared with the motion", path="--recording",

@@ -61,6 +61,7 @@ class Sensor:
         times: [s], shape [n].
         values: Shape [n, c].
         noise: Standard deviation [unit].
+        components: Which of x, y and z the columns of the values are, of markers and accelerometers.
     """
 
     kind: str
@@ -69,6 +70,7 @@ class Sensor:
     times: Array
     values: Array
     noise: float
+    components: tuple[int, ...] = (0, 1, 2)
 
     @property
     def name(self) -> str:

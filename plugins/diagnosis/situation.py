@@ -178,6 +178,7 @@ class Situation:
             if row is None:
                 parts.append(np.zeros(sensor.values.size))
                 continue
+            row = row if row.shape[1] == 1 else row[:, list(sensor.components)]
             at = np.clip(sensor.times / self.h, 0.0, len(self.command) - 1.000001)
             first = at.astype(int)
             share = (at - first)[:, None]

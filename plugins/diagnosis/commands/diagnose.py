@@ -85,9 +85,10 @@ def _print(report: dict[str, Any], console: Console) -> None:
     if first["cause"] == "none":
         say(console, "The robot does what was asked, within the noise of the recording: nothing shakes.")
     else:
+        verb = "explain" if first["cause"] == "links" else "explains"
         say(
             console,
-            f"{NAMES[first['cause']].capitalize()} explains {first['share']:.0%} of the error "
+            f"{NAMES[first['cause']].capitalize()} {verb} {first['share']:.0%} of the error "
             f"({_sure(first['confidence'])}, {first['confidence']:.0%}).",
         )
     say(console, f"What to do: {first['remedy']}")
