@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import ast
 import html
 import json
@@ -63,6 +64,18 @@ def test_the_sentences_of_a_page_are_short_and_plain(page):
     twice = [(riddle, found) for found in sentences(text) for riddle in RIDDLES if re.search(riddle, found, re.I)]
     assert twice == [], f"{page}: phrases that have to be read twice"
     assert sentences_through_code(text) == [], f"{page}: a sentence begins before a block of code and ends behind it"
+
+
+def test_the_sentences_of_the_help_are_short():
+    from calmotion.cli.main import build_parser
+
+    parsers, long = [build_parser()], []
+    while parsers:
+        parser = parsers.pop()
+        for action in parser._actions:
+            parsers += action.choices.values() if isinstance(action, argparse._SubParsersAction) else []
+            long += [(parser.prog, found) for found in sentences(action.help or "") if len(found.split()) > 30]
+    assert long == []
 
 
 BECOME = r"([\d.]+) mm (?:of error )?become ([\d.]+) mm"

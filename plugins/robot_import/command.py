@@ -32,7 +32,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     ):
         command.add_argument(flag, metavar=metavar, action="append", default=[], help=f"{help_text}; may be repeated")
     command.add_argument(
-        "--solid", metavar="MATERIAL", help="material from whose density links without inertia get their mass"
+        "--solid", metavar="MATERIAL", help="material of the links without inertia, whose density gives their mass"
     )
     command.add_argument(
         "--materials", metavar="FILE", action="append", default=[],

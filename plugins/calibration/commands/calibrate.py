@@ -53,7 +53,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     shot_arguments(command, optional=True)
     command.add_argument(
         "--shot", dest="of_shot", metavar="FILE", action=_Named,
-        help="a shot of the robot, in place of SHOT, of which the recordings behind it are; may be repeated: the robot "
+        help="a shot of the robot, in place of SHOT; the recordings that follow are of it. May be repeated: the robot "
         "is the same, and gains may differ from shot to shot by known factors",
     )  # fmt: skip
     command.add_argument(
@@ -95,8 +95,8 @@ def prior_option(command: argparse.ArgumentParser) -> None:
     """Add `--prior` and `--by-motor-type`."""
     command.add_argument(
         "--prior", metavar="KIND=VALUE", action="append", default=[], type=_prior,
-        help="standard deviation of what is known before, relative (modulus=0.3) or in SI (delay=0.005, bias=0.3, "
-        "place=0.002, clock_drift=1e-4); may be repeated",
+        help="standard deviation of a parameter before the recording, relative (modulus=0.3) or in SI "
+        "(delay=0.005, bias=0.3, place=0.002, clock_drift=1e-4); may be repeated",
     )  # fmt: skip
     command.add_argument(
         "--by-motor-type", action="store_true",

@@ -34,7 +34,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         metavar="MS",
         type=_milliseconds,
         default=0.12,
-        help="how late the robot may answer, in ms or with a unit (default: 120)",
+        help="delay of the robot behind the samples, in ms or with a unit (default: 120)",
     )
     command.add_argument(
         "--sender-rate",
@@ -47,7 +47,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         metavar="SHARE",
         type=_share,
         default=0.0,
-        help="share by which the robot's frequencies are not known, such as 0.1: calm for slower and faster ones too",
+        help="uncertainty of the robot's frequencies, such as 0.1: calm for slower and faster robots too",
     )
     command.add_argument(
         "--in",
@@ -72,13 +72,13 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--clock",
         choices=("wall", "stamps"),
-        help="what ticks follow: the wall's clock (default of a pipe and of OSC), or the time stamps of the samples, "
-        "as fast as they can be read (default of a file and of --replay)",
+        help="clock of the ticks. wall: that of the machine (default of a pipe and of OSC); stamps: the time stamps of "
+        "the samples, as fast as they can be read (default of a file and of --replay)",
     )
     command.add_argument(
         "--table",
         action="store_true",
-        help="play nothing: simulate what look-aheads from 20 ms to the longest period leave of the shake",
+        help="play nothing; print the error that look-aheads from 20 ms to the longest period leave",
     )
     command.add_argument("--seconds", metavar="S", type=quantity("s", positive=True), help="stop after this time")
 

@@ -40,12 +40,12 @@ def forwarded_options(command: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--strict",
         action="store_true",
-        help="a shot has failed whose simulation misses its tolerance, or whose curves leave a larger error",
+        help="a shot fails if its simulation misses the tolerance, or its curves leave a larger error",
     )
     group.add_argument("--robust", nargs="?", const="worst", choices=("worst", "mean"), help="robust curves")
     group.add_argument("--scenarios", metavar="N", help="robots of --robust")
     group.add_argument(
-        "--avoid-reversals", metavar="WEIGHT", nargs="?", const="10", help="avoid reversals of gears with play"
+        "--avoid-reversals", metavar="WEIGHT", nargs="?", const="10", help="avoid reversals of gears with backlash"
     )
     group.add_argument("--bake", nargs="?", const="motors", choices=("motors", "simulated"), help="body transforms")
     group.add_argument("--samples-per-second", metavar="HZ", help="more samples than the frames")

@@ -16,7 +16,7 @@ _UNITS = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9}
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    command.description = f"{command.description} All that is in them is made again when it is needed."
+    command.description = f"{command.description} Their content is made again when it is needed."
     actions = command.add_subparsers(title="commands", required=True, metavar="COMMAND")
     info = actions.add_parser("info", help="print the folder, the number of entries and the size of each cache")
     info.set_defaults(action=_info)

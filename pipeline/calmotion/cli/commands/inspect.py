@@ -41,7 +41,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--live",
         action="store_true",
-        help="tell instead what a look-ahead is worth where the motion is a stream; as calmotion live --table",
+        help="print the error that each look-ahead leaves when the motion is streamed; as calmotion live --table",
     )
     command.add_argument("--verbose", action="store_true", help="also print all simplifications and their reasons")
     simulation_options(command, "bdf2, newmark, generalized-alpha or rk4 (default: automatic)")

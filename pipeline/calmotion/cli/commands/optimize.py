@@ -30,8 +30,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         nargs="?",
         const=10.0,
         type=quantity("", positive=True),
-        help="avoid reversals of the torques of gears with play (calm:motor:backlash) where they move the targets: "
-        "weight of the way across the play over that of the error (default: 10)",
+        help="avoid reversals of torque in gears with backlash (calm:motor:backlash) where they move the targets: "
+        "weight of the motion across the backlash over that of the error (default: 10)",
     )
     retime_options(command)
     group = command.add_argument_group(

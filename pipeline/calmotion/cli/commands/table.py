@@ -44,7 +44,7 @@ BUILT_IN = {
     "motors": BuiltIn("motors", "list real motors that a joint can name, with their sources"),
     "materials": BuiltIn("materials", "list materials for flexible links, with their sources"),
     "plugins": BuiltIn("plugins", "list, check, disable and create plugins"),
-    "demo": BuiltIn("demo", "optimise a sample, and show what comes of it"),
+    "demo": BuiltIn("demo", "optimise a sample, and show the result"),
     "warmup": BuiltIn("warmup", "compile the kernels ahead of the first shot"),
     "cache": BuiltIn("cache", "show, clear or prune the caches of kernels, meshes and links"),
     "doctor": BuiltIn("doctor", "check the installation and the machine, and say what to do"),

@@ -60,7 +60,7 @@ def refuse_slipping(
                 path=character.joints[order[joint]].path,
                 attribute="calm:contact:active",
                 found=True,
-                remedy="Hold one foot at a time (let one contact end when the other begins), correct the curves so "
+                remedy="Hold one foot at a time: let one contact end when the other begins. Or correct the curves so "
                 f"that feet stay where they are held, or accept the slip with --tolerance {1e3 * far * ABOVE:.2g}mm",
             )
 
