@@ -11,6 +11,7 @@ from .identification.parameters import robot_parameters as robot_parameters
 from .identification.robots import Robot as Robot
 from .identification.robots import robot_with as robot_with
 from .identification.signals import Signals as Signals
+from .identification.signals import place_of as place_of
 from .identification.signals import signals_of as signals_of
 from .model.estimates import HIGHER_MODES as HIGHER_MODES
 from .model.estimates import Calibration as Calibration

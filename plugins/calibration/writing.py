@@ -26,13 +26,14 @@ from calmotion.usd import (
     refuse_inputs,
     role_of,
     to_doubles,
-    to_strings,
     units_of,
     vector,
     write_layer,
     write_root,
 )
+from scipy.spatial.transform import Rotation
 
+from .layer_metadata import metadata_of
 from .model.estimates import (
     ARMATURE,
     CENTRE,
@@ -91,7 +92,7 @@ def write_calibration(
     author_origin(layer, CALIBRATION, provenance)
     writer = _Writer(layer, Reading(stage, units_of(stage), provenance.start_time_code), character, calibration)
     writer.write()
-    entry = {**layer.customLayerData[METADATA_KEY], ENTRY: _entry(calibration)}
+    entry = {**layer.customLayerData[METADATA_KEY], ENTRY: metadata_of(character, calibration)}
     layer.customLayerData = {**layer.customLayerData, METADATA_KEY: entry}
     layer.documentation = (
         f"Parameters of the robot from {len(calibration.recordings)} recordings; {os.path.basename(output)} lies over "
@@ -264,7 +265,6 @@ class _Writer:
 
     def _vector(self, path: str, name: str, value: np.ndarray) -> None:
         from pxr import Gf, Sdf
-        from scipy.spatial.transform import Rotation
 
         if value.ndim == 2:
             x, y, z, w = (float(part) for part in Rotation.from_matrix(value).as_quat())
@@ -295,36 +295,6 @@ class _Writer:
         given = prim.GetInfo("apiSchemas") if prim.HasInfo("apiSchemas") else Sdf.TokenListOp()
         names = [*given.prependedItems, *([] if schema in given.prependedItems else [schema])]
         prim.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=names))
-
-
-def _entry(calibration: Calibration) -> dict[str, Any]:
-    """What the layer's metadata tell of a calibration."""
-    items = calibration.estimates
-    known = [k for k, item in enumerate(items) if item.of_robot and item.identifiable and _has_factor(item)]
-    relative = np.array([1.0 if items[k].logarithmic else 1.0 / items[k].value for k in known])
-    covariance = calibration.covariance[np.ix_(known, known)] * np.outer(relative, relative)
-    return {
-        "parameters": to_strings(item.name for item in items),
-        "values": to_doubles([item.value for item in items]),
-        "standard_deviations": to_doubles([item.standard_deviation for item in items]),
-        "prior_values": to_doubles([item.nominal for item in items]),
-        "prior_standard_deviations": to_doubles([item.prior for item in items]),
-        "units": to_strings(item.unit for item in items),
-        "identifiable": to_strings(item.name for item in items if item.identifiable),
-        "with_this_model_only": to_strings(item.name for item in items if item.disagrees),
-        "factors": to_strings(items[k].name for k in known),
-        "covariance_of_log_factors": to_doubles(covariance.ravel()),
-        "recordings": to_strings(calibration.recordings),
-        "recordings_sha256": to_strings(calibration.recordings.values()),
-        "channels": to_strings(fit.name for fit in calibration.channels),
-        "residual_rms": to_doubles([fit.rms for fit in calibration.channels]),
-        "validation_rms": to_doubles([fit.validation_rms for fit in calibration.channels]),
-    }
-
-
-def _has_factor(item: Estimate) -> bool:
-    """Whether a parameter can be drawn as a factor of its value: one about zero cannot."""
-    return item.axis < 0 and item.kind != ENCODER_OFFSET and item.value > 3.0 * item.standard_deviation
 
 
 def _validate(temporary: str, written: dict[str, Any]) -> None:

@@ -14,7 +14,7 @@ MISSING = ("", "nan", "na", "null", "none", "-")
 UNITS: Mapping[str, float] = {
     "m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "rad": 1.0, "deg": float(np.radians(1.0)), "turn": 2.0 * np.pi,
     "m/s^2": 1.0, "mm/s^2": 1e-3, "g": 9.80665, "N m": 1.0, "N mm": 1e-3, "N": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6,
-    "ns": 1e-9,
+    "ns": 1e-9, "": 1.0,
 }  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,9 @@ from calmotion.recordings import (
     COMPONENTS,
     EFFORT,
     MARKER,
+    STRAIN,
     Channel,
+    LowPass,
     RecordingRequest,
     SensorRecording,
     hash_of,
@@ -35,10 +38,11 @@ REACTIONS = (".force", ".moment")
 FITTING = {
     MARKER: ("m", "cm", "mm", "in"), ACCELEROMETER: ("m/s^2", "mm/s^2", "g"),
     ANGLE: ("rad", "deg", "turn", "m", "cm", "mm"), EFFORT: ("N m", "N mm", "N"),
+    STRAIN: ("",),
 }  # fmt: skip
 TIMES = ("s", "ms", "us", "ns")
-DEFAULT_UNIT = {MARKER: "m", ACCELEROMETER: "m/s^2", ANGLE: "rad", EFFORT: "N m"}
-KNOWN = ("prim", "kind", "columns", "unit", "noise")
+DEFAULT_UNIT = {MARKER: "m", ACCELEROMETER: "m/s^2", ANGLE: "rad", EFFORT: "N m", STRAIN: ""}
+KNOWN = ("prim", "to", "kind", "columns", "unit", "noise", "low_pass")
 EXAMPLE = (
     "Write a table [[channel]] with prim = \"/Arm/Hand/cup\", kind = \"marker\", columns = [\"x\", \"y\", \"-z\"] and "
     "unit = \"mm\""
@@ -151,8 +155,13 @@ def _mapped(file: str, columns: Mapping[str, Array], map_file: str) -> tuple[lis
                 "there is no such kind of channel", path=map_file, attribute=f"{place}.kind", found=kind,
                 remedy=f"{nearest(str(kind), COMPONENTS)}Use {', '.join(COMPONENTS)}",
             )  # fmt: skip
-        if not isinstance(path, str) or not path.startswith("/"):
-            raise ShotError("must be a prim path", path=map_file, attribute=f"{place}.prim", found=path, remedy=EXAMPLE)
+        ends = [("prim", path)] + ([("to", table.get("to"))] if kind == STRAIN else [])
+        for entry, end in ends:
+            if not isinstance(end, str) or not end.startswith("/"):
+                raise ShotError(
+                    "must be a prim path", path=map_file, attribute=f"{place}.{entry}", found=end,
+                    remedy='Write to = "/Arm/Link/gauge_end", the other end of the gauge' if entry == "to" else EXAMPLE,
+                )  # fmt: skip
         given = [given] if isinstance(given, str) else given
         if not isinstance(given, list) or len(given) != COMPONENTS[kind]:
             raise ShotError(
@@ -161,7 +170,9 @@ def _mapped(file: str, columns: Mapping[str, Array], map_file: str) -> tuple[lis
             )  # fmt: skip
         unit = unit_of(str(table.get("unit", DEFAULT_UNIT[kind])), FITTING[kind], map_file, f"{place}.unit")
         values = unit * np.stack([column_of(columns, str(column), file) for column in given], axis=1)
-        channels += _channel(kind, path, times, values, keep, _noise(table, unit, map_file, place))
+        made = _channel(kind, str(path), times, values, keep, _noise(table, unit, map_file, place))
+        low_pass = _low_pass(table.get("low_pass"), map_file, f"{place}.low_pass")
+        channels += [replace(own, to=str(ends[-1][1]) if kind == STRAIN else "", low_pass=low_pass) for own in made]
     return channels, _notes(file, keep)
 
 
@@ -195,6 +206,23 @@ def _noise(table: Mapping[str, Any], unit: float, map_file: str, place: str) -> 
             attribute=f"{place}.noise", found=noise, remedy="Write a positive number, or leave it out",
         )  # fmt: skip
     return unit * float(noise)
+
+
+def _low_pass(given: object, map_file: str, place: str) -> LowPass | None:
+    """The filter of a channel.
+
+    Raises:
+        ShotError: It is no table of a frequency and, of second order, a damping.
+    """
+    if given is None:
+        return None
+    numbers = given if isinstance(given, dict) and {"frequency"} <= set(given) <= {"frequency", "damping"} else {"": 0}
+    if any(isinstance(x, bool) or not isinstance(x, (int, float)) or not 0.0 < x < np.inf for x in numbers.values()):
+        raise ShotError(
+            "a filter has a frequency in Hz and, of second order, a damping", path=map_file, attribute=place,
+            found=given, remedy="Write low_pass = { frequency = 2.0, damping = 0.9 }, without damping of first order",
+        )  # fmt: skip
+    return LowPass(*(None if x is None else float(x) for x in (numbers["frequency"], numbers.get("damping"))))  # type: ignore[arg-type]
 
 
 def _channel(

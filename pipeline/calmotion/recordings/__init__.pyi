@@ -11,7 +11,9 @@ from calmotion.recordings.recording import ANGLE as ANGLE
 from calmotion.recordings.recording import COMPONENTS as COMPONENTS
 from calmotion.recordings.recording import EFFORT as EFFORT
 from calmotion.recordings.recording import MARKER as MARKER
+from calmotion.recordings.recording import STRAIN as STRAIN
 from calmotion.recordings.recording import UNITS as UNITS
 from calmotion.recordings.recording import Channel as Channel
+from calmotion.recordings.recording import LowPass as LowPass
 from calmotion.recordings.recording import RecordingRequest as RecordingRequest
 from calmotion.recordings.recording import SensorRecording as SensorRecording

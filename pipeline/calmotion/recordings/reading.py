@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from calmotion.host import Host, SettingError, Settings
 from calmotion.recordings.reader import RecordingReader
-from calmotion.recordings.recording import ACCELEROMETER, MARKER, RecordingRequest, SensorRecording, turned_on
+from calmotion.recordings.recording import RecordingRequest, SensorRecording, turned_on
 from calmotion.workflow.problems import value_of
 
 AT = "@/"  # FILE@/PRIM: where the sensor of a file sits
@@ -64,4 +64,4 @@ def read_recordings(host: Host, names: Sequence[str], settings: Settings) -> tup
 def measured_prims(recordings: Sequence[SensorRecording]) -> tuple[str, ...]:
     """Prims at which sensors sit, each once."""
     channels = [channel for recording in recordings for channel in recording.channels]
-    return tuple(dict.fromkeys(c.path for c in channels if c.kind in (MARKER, ACCELEROMETER)))
+    return tuple(dict.fromkeys(path for channel in channels for path in channel.prims))

@@ -8,9 +8,23 @@ import numpy as np
 
 from calmotion.arrays import Array
 
-MARKER, ACCELEROMETER, ANGLE, EFFORT = "marker", "accelerometer", "angle", "effort"  # kinds of channels
-COMPONENTS = {MARKER: 3, ACCELEROMETER: 3, ANGLE: 1, EFFORT: 1}
-UNITS = {MARKER: "m", ACCELEROMETER: "m/s^2", ANGLE: "rad or m", EFFORT: "N m or N"}
+# kinds of channels
+MARKER, ACCELEROMETER, ANGLE, EFFORT, STRAIN = "marker", "accelerometer", "angle", "effort", "strain"
+COMPONENTS = {MARKER: 3, ACCELEROMETER: 3, ANGLE: 1, EFFORT: 1, STRAIN: 1}
+UNITS = {MARKER: "m", ACCELEROMETER: "m/s^2", ANGLE: "rad or m", EFFORT: "N m or N", STRAIN: ""}
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """A filter between a sensor and its recording, with a gain of 1 for what is slow.
+
+    Attributes:
+        frequency: Of its corner [Hz].
+        damping: Of the second order, as a fraction of the critical; None: a filter of first order.
+    """
+
+    frequency: float
+    damping: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,11 +33,14 @@ class Channel:
 
     Attributes:
         kind: MARKER: position of a prim [m], world; ACCELEROMETER: specific force R^T (a - g) at a prim in its axes
-            [m/s^2]; ANGLE: value of a joint [rad or m]; EFFORT: of its motor [N m or N].
+            [m/s^2]; ANGLE: value of a joint [rad or m]; EFFORT: of its motor [N m or N]; STRAIN: of a gauge from a
+            prim to another one, in proportion to how far the link bends between them; gain and offset are not known.
         path: Prim path of the prim or of the joint.
         times: [s], strictly increasing, shape [n].
         values: Shape [n, c], c = 3 or 1; NaN where a sample is missing.
         sigma: Standard deviation of the noise; None: estimated from the samples.
+        to: The other prim of STRAIN.
+        low_pass: What the sensor does to its signal, or None.
     """
 
     kind: str
@@ -31,6 +48,14 @@ class Channel:
     times: Array
     values: Array
     sigma: float | None = None
+    to: str = ""
+    low_pass: LowPass | None = None
+
+    @property
+    def prims(self) -> tuple[str, ...]:
+        """Prims at which it sits; none for what a joint or its motor tells."""
+        ends = (self.path, self.to) if self.kind == STRAIN else (self.path,)
+        return ends if self.kind not in (ANGLE, EFFORT) else ()
 
     @property
     def name(self) -> str:

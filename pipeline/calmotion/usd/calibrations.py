@@ -40,3 +40,15 @@ def known_factors(stage: Usd.Stage) -> KnownFactors:
         total[first : first + len(block), first : first + len(block)] = block
         first += len(block)
     return KnownFactors(tuple(names), tuple(tuple(row) for row in total.tolist()))
+
+
+def predictions(stage: Usd.Stage) -> tuple[str, float, float] | None:
+    """How far recordings were from what the calibrated robot predicted of them: the strongest layer that tells it, root
+    mean square and largest [m]; None where none does."""
+    for layer in stage.GetLayerStack():
+        if stages.role_of(layer) == stages.CALIBRATION:
+            entry: Any = layer.customLayerData.get(stages.METADATA_KEY, {}).get("calibration", {})
+            rms, largest = (float(entry.get(f"prediction_{what}_m", 0.0)) for what in ("rms", "largest"))
+            if 0.0 < rms < np.inf and rms <= largest < np.inf:
+                return layer.GetDisplayName(), rms, largest
+    return None

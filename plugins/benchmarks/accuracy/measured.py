@@ -6,33 +6,44 @@ motions (names up to the last `_` tell motions apart), and the others are simula
 the mean absolute error of the others for each fit, in rad or m; below it are the median and the largest, those of the
 shots as they are, and, for each parameter, how often the 95% interval of a fit contains the estimate of another fit
 that shares no recording with it. `--most` takes that many fits, spread over all of them.
+
+The error of a strain gauge, whose gain and free swing at the start are fitted, is the share of its signal's shake that
+is left. A folder with `beam.toml` (the entries of `two_mode_beam.Strip`) gets the same from an independent model of its
+strip too. Without a folder, the command compares a published cantilever with its finite elements.
 """
 
 from __future__ import annotations
 
+import argparse
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from calmotion import ShotError
 from calmotion.model import RunSettings
-from calmotion.recordings import SensorRecording
+from calmotion.recordings import STRAIN, Channel, SensorRecording
 from calmotion.simulation import CompiledShot
 from calmotion_plugins.calibration import (
     Calibration,
     CalibrationSettings,
     Estimate,
+    Signals,
     calibrate_shots,
+    place_of,
     read_performed,
     robot_parameters,
     robot_with,
     signals_of,
 )
+from scipy.interpolate import CubicSpline
 
 from ..common.parsers import bench_parser, output_options
 from ..common.tables import finish, say, write_rows
+from . import cantilever, two_mode_beam
 
 HEADS = ("fitted", "error of the others", "as they are", "estimates")
 CLOCK = 0.02  # standard deviation of the clocks, which begin with the commands [s]
@@ -64,7 +75,7 @@ class Machine:
     takes: dict[str, tuple[CompiledShot, tuple[SensorRecording, ...]]]
 
     def error(self, name: str, estimates: Sequence[Estimate] = ()) -> float:
-        """Mean absolute error of the prediction of a recording [rad or m].
+        """Mean absolute error of the prediction of a recording [rad or m]; of a strain gauge the share of its shake.
 
         Args:
             name: Of the shot.
@@ -80,14 +91,52 @@ class Machine:
                 )
                 values[p.kind, p.path, p.axis] = moved
         signals = signals_of(robot_with(shot, values), RunSettings(step=STEP, integrator="bdf2"))
-        targets = {target.path: k for k, target in enumerate(shot.character.targets)}
-        motors = {motor.path: k for k, motor in enumerate(shot.character.motors)}
         off = []
         for recording in recordings:
             for channel in recording.channels:
-                index = motors[channel.path] if channel.kind in ("angle", "effort") else targets[channel.path]
-                off.append(np.abs(signals.at(channel.kind, index, channel.times) - channel.values).ravel())
+                place = place_of(channel, shot.character)
+                assert place is not None  # the recording was read for this shot
+                if channel.kind == STRAIN:
+                    gains = [item.value for item in estimates if item.kind == "gain" and item.path == channel.path]
+                    off.append(np.array([_left(signals, channel, place, gains[0] if gains else None)]))
+                else:
+                    off.append(np.abs(signals.at(channel.kind, place, channel.times) - channel.values).ravel())
         return float(np.nanmean(np.concatenate(off)))
+
+
+def _left(signals: Signals, channel: Channel, place: Any, gain: float | None) -> float:
+    """Share of the shake of a gauge's signal that is left, with its own free swing, offset and, if it is not known,
+    gain."""
+    inside = (channel.times >= 0.0) & (channel.times <= signals.times[-1])
+    times, values = channel.times[inside], channel.values[inside, 0]
+    answer = signals.at(STRAIN, place, times, low_pass=channel.low_pass)
+    free = np.concatenate(
+        [signals.decays(times), np.ones((len(times), 1)), *([answer] if gain is None else [])], axis=1
+    )
+    off = values - (0.0 if gain is None else gain) * answer[:, 0]
+    return float((off - free @ np.linalg.lstsq(free, off, rcond=None)[0]).std() / values.std())
+
+
+def beam_rows(folder: Path, machine: Machine, fits: Sequence[tuple[str, ...]]) -> list[list[str]]:
+    """What an independent two-mode beam predicts of the recordings of strips; none for another machine."""
+    file = folder / "beam.toml"
+    if not file.is_file():
+        return []
+    strip = two_mode_beam.Strip(**tomllib.loads(file.read_text(encoding="utf-8")))
+    readings = {}
+    for name, (shot, recordings) in machine.takes.items():
+        (track,), channel = shot.animation.current, recordings[0].channels[0]
+        hub = CubicSpline(shot.animation.frame_times, track.values)
+        inside = (channel.times >= 0.0) & (channel.times <= shot.animation.frame_times[-1])
+        times = channel.times[inside]
+        readings[name] = two_mode_beam.Reading(times, hub(times), channel.values[inside, 0])
+    rows = []
+    for own in fits:
+        found = two_mode_beam.fitted(strip, [readings[name] for name in own])
+        left = [two_mode_beam.predicted(found, reading) for name, reading in readings.items() if name not in own]
+        told = f"{found.frequencies[0]:.3g} Hz, damping {found.damping:.3g}, {found.modulus:.3g} of the modulus"
+        rows.append([f"beam: {', '.join(own)}", f"{np.mean(left):.4f}", "", told])
+    return rows
 
 
 def machine_in(folder: Path) -> Machine:
@@ -135,14 +184,29 @@ def covered(fits: dict[tuple[str, ...], Calibration]) -> dict[str, tuple[int, in
     return found
 
 
+def _cantilever(options: argparse.Namespace) -> None:
+    """The published cantilever."""
+    found, modulus = cantilever.cantilever()
+    cells = [
+        [f"{f:.4g}", f"{m:.4g}", f"{100.0 * (f / m - 1.0):+.2f}%"]
+        for f, m in zip(found, cantilever.MEASURED, strict=True)
+    ]
+    told = {"frequencies_hz": found.tolist(), "measured_hz": cantilever.MEASURED, "modulus_pa": modulus}
+    heads = ("computed [Hz]", "measured [Hz]", "difference")
+    finish(options, f"A steel cantilever, modulus {1e-9 * modulus:.4g} GPa", heads, cells, told)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("measured", __doc__)
-    parser.add_argument("folder", metavar="FOLDER", help="shots and recordings of one machine")
+    parser.add_argument("folder", metavar="FOLDER", nargs="?", help="shots and recordings of one machine")
     parser.add_argument("--fit", type=int, default=2, metavar="N", help="shots that are fitted together (default: 2)")
     parser.add_argument("--most", type=int, metavar="N", help="fits, spread over all of them (default: all)")
     output_options(parser, csv="a row for each fit", markdown=True)
     options = parser.parse_args(arguments)
+    if options.folder is None:
+        _cantilever(options)
+        return 0
     machine = machine_in(Path(options.folder))
     names = list(machine.takes)
     nominal = {name: machine.error(name) for name in names}
@@ -163,10 +227,12 @@ def main(arguments: list[str] | None = None) -> int:
         if options.csv:
             write_rows(options.csv, Predicted, rows)
     inside = covered(fits)
+    beams = beam_rows(Path(options.folder), machine, list(fits))
     errors = [row.error for row in rows]
     cells = [[row.fitted, f"{row.error:.4f}", f"{row.nominal:.4f}", row.estimates] for row in rows]
     cells.append(["median", f"{np.median(errors):.4f}", f"{np.mean(list(nominal.values())):.4f}", ""])
     cells.append(["largest", f"{max(errors):.4f}", f"{max(nominal.values()):.4f}", ""])
+    cells += beams
     cells += [[f"in the 95% interval: {name}", f"{a} of {n}", "", ""] for name, (a, n) in inside.items()]
     found = {
         "fits": [vars(row) for row in rows], "median_error": float(np.median(errors)), "largest_error": max(errors),

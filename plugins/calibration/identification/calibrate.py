@@ -25,14 +25,15 @@ from ..model.estimates import (
 )
 from .advice import IDENTIFIABLE, advised
 from .disagreement import misses
-from .measurement import Measurement, Motions, Sensor, measurement_parameters, sensors_of
+from .measurement import Measurement, Motions
 from .motor_groups import of_each_motor
 from .parameters import DEFAULT, Parameter
 from .problem import Calibrated
 from .recordings.clocks import clock_of
 from .recordings.plausible import refuse_far, refuse_long, refuse_still
+from .recordings.sensors import Sensor, gauge_parameters, measurement_parameters, sensors_of, start_parameters
 from .search import HALVINGS, Found, profiled, search, step_of
-from .signals import refuse_cyclic
+from .signals import begins_in_motion, refuse_cyclic
 from .takes import all_simulable, begun, hardly_shaking, takes_of
 
 AFTER = 1.0  # what a recording holds after the end of the shot is used up to here [s]
@@ -110,6 +111,11 @@ def calibrate_shots(
         before = sum(len(earlier) for _, earlier in performed[:k])
         sensors += [replace(sensor, take=k, recording=sensor.recording + before) for sensor in own]
         rows += measurement_parameters(recordings, clocks, settings.priors, k)
+        known_as = [replace(sensor, take=k) for sensor in own]
+        rows += gauge_parameters(known_as, clocks, nominal[k], settings.priors)
+        begins = start_parameters(known_as, clocks, nominal[k], begins_in_motion(shot.animation))
+        takes[k] = replace(takes[k], moves=bool(begins))
+        rows += begins
     measurement = Measurement(tuple(recording.file for recording in all_recordings), tuple(sensors), tuple(rows))
     told = _Told(progress)
     problem = Calibrated(takes, measurement, options, told.simulated)
@@ -215,6 +221,7 @@ def _fits(
                 _rms(off[fitted]),
                 _rms(off[sensor.validated]),
                 int((np.abs(off[fitted]) > 3.0 * sensor.sigma).sum()),
+                float(np.abs(off[sensor.validated if sensor.validated.any() else fitted]).max(initial=0.0)),
             )  # fmt: skip
         )
         used = sensor.used
@@ -247,6 +254,11 @@ def _notes(
             notes.append(
                 f"the recording of {take.shot.character.path} begins elsewhere than the shot: the simulation begins "
                 f"at rest where the encoders are {take.begin:.3g} s after the first frame, and is let go there"
+            )
+        if take.moves:
+            notes.append(
+                f"{take.shot.character.path} moves already when its recording begins: what it swings by itself then is "
+                "estimated from the recording (`start`)"
             )
     notes += _missed(found, fits)
     split = [item.name for item in estimates if item.of_robot and item.disagrees]

@@ -26,8 +26,8 @@ from .least_squares import HUBER, Solution, weights_of
 from .recordings.noise import noise_of
 
 if TYPE_CHECKING:
-    from .measurement import Sensor
     from .problem import Calibrated
+    from .recordings.sensors import Sensor
 
 PIECES = 4  # of each shot
 MISSED, TOGETHER = 1.5, 3.0  # residuals over the noise, and samples that count as one: the model misses something

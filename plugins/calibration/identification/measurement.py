@@ -2,164 +2,26 @@
 
 The clock of a recording reads s at the first frame of the shot, and a share d slower: t_robot = (t - s) (1 + d). An
 accelerometer has a constant bias in its axes; a marker sits a little off its prim, by a distance that is constant in
-the prim's axes. These are parameters like those of the robot, whose derivatives are exact.
+the prim's axes; a strain gauge has a gain and an offset. A robot that moves already when a shot begins swings freely in
+its lowest natural modes beside what the shot makes it do, by amounts of each sensor. These are parameters like those of
+the robot, whose derivatives are exact.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from calmotion.arrays import Array, BoolArray
-from calmotion.errors import ShotError, raise_all
-from calmotion.model import Character
-from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER, Channel, SensorRecording
-from calmotion.support import nearest
+from calmotion.arrays import Array
+from calmotion.recordings import ACCELEROMETER, MARKER, STRAIN
 
-from ..model.estimates import BIAS, CLOCK_DRIFT, CLOCK_OFFSET, PLACE
-from .parameters import PRIORS, Parameter
-from .recordings.noise import noise_of
+from ..model.estimates import BIAS, CLOCK_DRIFT, CLOCK_OFFSET, GAIN, OFFSET, PLACE, START
+from .parameters import Parameter
+from .recordings.sensors import Sensor, decay_paths, own_path
 from .signals import Signals
 
 Motions = Sequence[Signals]  # of each shot
-
-REST = 0.5  # time before the first frame that counts [s]: the robot rests
-BLOCKS, EVERY = 20, 5  # parts of a recording, of which every fifth is held out
-LEAST = 12  # values of a channel that are worth a fit
-
-
-@dataclass(frozen=True, eq=False)
-class Sensor:
-    """A channel, and what it has to do with the robot.
-
-    Attributes:
-        recording: Index of its recording.
-        channel: The channel.
-        index: Of the target, or of the motor.
-        used: Samples during the shot and shortly before and after it, shape [n].
-        held_out: Those of them that are not fitted, shape [n].
-        sigma: Standard deviation of its noise.
-        count: How many successive samples count as one: 1 for white noise.
-        take: Index of the shot that was performed.
-    """
-
-    recording: int
-    channel: Channel
-    index: int
-    used: BoolArray
-    held_out: BoolArray
-    sigma: float
-    count: float = 1.0
-    take: int = 0
-
-    @property
-    def fitted(self) -> BoolArray:
-        """Which values are fitted, shape [n, c]."""
-        return np.asarray((self.used & ~self.held_out)[:, None] & np.isfinite(self.channel.values))
-
-    @property
-    def validated(self) -> BoolArray:
-        """Which values are compared, but not fitted, shape [n, c]."""
-        return np.asarray((self.used & self.held_out)[:, None] & np.isfinite(self.channel.values))
-
-
-def sensors_of(
-    character: Character, recordings: Sequence[SensorRecording], clocks: Sequence[float], begin: float, end: float,
-    validate: bool = True,
-) -> tuple[Sensor, ...]:  # fmt: skip
-    """The sensors of recordings.
-
-    Args:
-        character: With a target at each prim that has a sensor.
-        recordings: The recordings.
-        clocks: What the clock of each reads at the first frame of the shot [s], about.
-        begin, end: What is simulated, on the robot's clock [s].
-        validate: Whether a fifth of the samples is held out.
-
-    Raises:
-        ShotError: A channel names nothing on the robot, or has too few samples during the shot.
-    """
-    refuse_unknown_channels(character, recordings)
-    targets = {target.path: k for k, target in enumerate(character.targets)}
-    motors = {motor.path: k for k, motor in enumerate(character.motors)}
-    found = []
-    for r, recording in enumerate(recordings):
-        for channel in recording.channels:
-            known = motors if channel.kind in (ANGLE, EFFORT) else targets
-            times = channel.times - clocks[r]
-            used = (times >= max(begin, -REST)) & (times <= end)
-            sensor = Sensor(r, channel, known[channel.path], used, np.zeros(len(times), bool), 1.0)
-            if sensor.fitted.sum() < LEAST:
-                raise ShotError(
-                    "the recording has too few samples of a channel during the shot",
-                    path=recording.file,
-                    attribute=channel.name,
-                    found=f"{int(sensor.fitted.sum())} values between {begin:.3g} and {end:.3g} s of the shot",
-                    remedy="Check the times of the recording; it must hold the performance of this shot",
-                )
-            block = np.floor((times - begin) * BLOCKS / (end - begin)).astype(int)
-            held = used & (block % EVERY == EVERY - 2) if validate else np.zeros(len(times), bool)
-            sigma = channel.sigma if channel.sigma is not None else noise_of(channel.values[used])
-            found.append(replace(sensor, held_out=held, sigma=sigma))
-    return tuple(found)
-
-
-def measurement_parameters(
-    recordings: Sequence[SensorRecording], clocks: Sequence[float], priors: Mapping[str, float] | None = None,
-    take: int = 0,
-) -> tuple[Parameter, ...]:  # fmt: skip
-    """Clocks of the recordings, biases of accelerometers and places of markers; the recordings of one shot share the
-    latter two.
-
-    Args:
-        take: Index of the shot.
-    """
-    given = {**PRIORS, **(priors or {})}
-    found = []
-    for recording, clock in zip(recordings, clocks, strict=True):
-        found.append(Parameter(CLOCK_OFFSET, recording.file, clock, given[CLOCK_OFFSET], "s", -1, False))
-        found.append(Parameter(CLOCK_DRIFT, recording.file, 0.0, given[CLOCK_DRIFT], "", -1, False))
-        for channel in recording.channels:
-            kind = {MARKER: PLACE, ACCELEROMETER: BIAS}.get(channel.kind)
-            if kind is not None:
-                unit = "m" if kind == PLACE else "m/s^2"
-                path = _of_take(channel.path, take)
-                found += [Parameter(kind, path, 0.0, given[kind], unit, axis, False) for axis in range(3)]
-    return tuple({p.name: p for p in found}.values())
-
-
-def own_path(sensor: Sensor) -> str:
-    """The path of the parameters of a sensor itself, which differ from shot to shot."""
-    return _of_take(sensor.channel.path, sensor.take)
-
-
-def _of_take(path: str, take: int) -> str:
-    return path if take == 0 else f"{path} (shot {take + 1})"
-
-
-def refuse_unknown_channels(character: Character, recordings: Sequence[SensorRecording]) -> None:
-    """Refuse channels of prims that the robot does not have.
-
-    Raises:
-        ShotError: There are some.
-    """
-    targets, motors = [t.path for t in character.targets], [m.path for m in character.motors]
-    problems = []
-    for recording in recordings:
-        for channel in recording.channels:
-            known = motors if channel.kind in (ANGLE, EFFORT) else targets
-            if channel.path not in known:
-                problems.append(
-                    ShotError(
-                        f"the recording has a channel ({channel.kind}) of a prim that the robot does not have",
-                        path=recording.file,
-                        attribute=channel.path,
-                        found="no such " + ("motor" if known is motors else "prim below a body"),
-                        remedy=f"{nearest(channel.path, known)}Correct the column, or its row in the TOML map",
-                    )
-                )
-    raise_all(problems)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,12 +65,24 @@ class Measurement:
         """
         times, kind, path = self.robot_times(sensor, x), sensor.channel.kind, own_path(sensor)
         signals = motions[sensor.take]
-        values = signals.at(kind, sensor.index, times)
-        if kind == MARKER and np.any(place := self._vector(x, PLACE, path)):
+        values = signals.at(kind, sensor.index, times, low_pass=sensor.channel.low_pass)
+        if kind == STRAIN:
+            values = self._value(x, GAIN, path) * values + self._value(x, OFFSET, path)
+        if kind == MARKER and isinstance(sensor.index, int) and np.any(place := self._vector(x, PLACE, path)):
             values = values + signals.axes_at(sensor.index, times) @ place
         if kind == ACCELEROMETER:
             values = values + self._vector(x, BIAS, path)
-        return values
+        free = self._free(signals, sensor, x)
+        return values if free is None else values + signals.decays(times) @ free
+
+    def _free(self, signals: Signals, sensor: Sensor, x: Array) -> Array | None:
+        """Free motions in which a sensor begins, shape [2 modes, c]; None for one that rests."""
+        paths = decay_paths(sensor, signals)
+        if not any(p.kind == START and p.path in paths for p in self.parameters):
+            return None
+        count = sensor.channel.values.shape[1]
+        axes = range(count) if count > 1 else (-1,)
+        return np.array([[self._value(x, START, path, axis) for axis in axes] for path in paths])
 
     def derivatives(self, motions: Motions, sensor: Sensor, x: Array) -> Array:
         """Derivative of `predicted` by the parameters, shape [n, c, m]."""
@@ -216,9 +90,14 @@ class Measurement:
         signals = motions[sensor.take]
         file = self.recordings[sensor.recording]
         out = np.zeros((len(times), channel.values.shape[1], len(self.parameters)))
-        rate = signals.at(channel.kind, sensor.index, times, 1)
+        rate = signals.at(channel.kind, sensor.index, times, 1, channel.low_pass)
+        if channel.kind == STRAIN:
+            rate = self._value(x, GAIN, path) * rate
+        if (free := self._free(signals, sensor, x)) is not None:
+            rate = rate + signals.decays(times, 1) @ free
+        index = sensor.index if isinstance(sensor.index, int) else 0
         if channel.kind == MARKER and np.any(place := self._vector(x, PLACE, path)):
-            rate = rate + signals.axes_at(sensor.index, times, 1) @ place
+            rate = rate + signals.axes_at(index, times, 1) @ place
         start, drift = (self._value(x, kind, file) for kind in (CLOCK_OFFSET, CLOCK_DRIFT))
         for m, p in enumerate(self.parameters):
             if p.kind == CLOCK_OFFSET and p.path == file:
@@ -227,8 +106,13 @@ class Measurement:
                 out[:, :, m] = p.spread * (channel.times - start)[:, None] * rate
             elif p.kind == BIAS and channel.kind == ACCELEROMETER and p.path == path:
                 out[:, p.axis, m] = p.spread
+            elif p.kind in (GAIN, OFFSET) and channel.kind == STRAIN and p.path == path:
+                own = signals.at(STRAIN, sensor.index, times, low_pass=channel.low_pass) if p.kind == GAIN else 1.0
+                out[:, :, m] = p.slope(float(x[m])) * own
+            elif p.kind == START and p.path in (paths := decay_paths(sensor, signals)):
+                out[:, max(p.axis, 0), m] = p.spread * signals.decays(times)[:, paths.index(p.path)]
             elif p.kind == PLACE and channel.kind == MARKER and p.path == path:
-                out[:, :, m] = p.spread * signals.axes_at(sensor.index, times)[:, :, p.axis]
+                out[:, :, m] = p.spread * signals.axes_at(index, times)[:, :, p.axis]
         return out
 
     def residuals(self, motions: Motions, x: Array) -> Array:

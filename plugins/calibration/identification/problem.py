@@ -24,6 +24,7 @@ from .signals import signals_of
 from .takes import Take
 
 DIFFERENCE = 1e-4  # of the prior's standard deviation
+FAR = 40.0  # standard deviations of the priors, beyond which a step of a search is not tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +106,8 @@ class Calibrated:
 
     def residuals(self, z: Array) -> Array | None:
         """(measured - predicted) / sigma, shape [N]; None where the robot cannot be simulated."""
+        if not np.all(np.abs(z[: len(self.parameters)]) < FAR):
+            return None
         try:
             signals = self.signals(z)
         except (ShotError, SimulationFailure):

@@ -16,11 +16,12 @@ from scipy.stats.qmc import Sobol
 from ..model.estimates import DAMPING, DELAY, FRICTION, LOAD_FRICTION, MAX_TORQUE
 from .disagreement import widened
 from .least_squares import Solution, chord, loss_of, minimize, posterior, weights_of
-from .measurement import Measurement, Sensor
+from .measurement import Measurement
 from .model_error import covariance_of_model
 from .problem import Calibrated, Measured
 from .recordings.free_decay import decay_factors
 from .recordings.noise import correlation_time, least_sigma, spread_of
+from .recordings.sensors import Sensor
 from .takes import STIFF
 
 TRIED = np.linspace(-2.4, 2.4, 17)  # of all of them at once, in standard deviations of their priors

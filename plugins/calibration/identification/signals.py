@@ -8,24 +8,30 @@ from functools import cached_property
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import PRESCRIBED, Animation, RunSettings, curve_of
+from calmotion.model import PRESCRIBED, Animation, Character, RunSettings, curve_of
 from calmotion.multibody import (
     NOWHERE,
+    Model,
     Reason,
     SimulationFailure,
     Workspace,
     equilibrium,
     joint_values,
+    natural_modes,
     reactions,
     rigid_state,
 )
-from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER
+from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER, STRAIN, Channel, LowPass
 from calmotion.simulation import AT_REST, CompiledShot, ForwardRun, Prepared, over_grid, prepare, run_forward
 from scipy.interpolate import CubicSpline, make_interp_spline
+from scipy.signal import bilinear, lfilter, lfilter_zi
 from scipy.spatial.transform import Rotation
 
 from .robots import Robot
 
+MOVES = 0.05  # share of its largest speed from which a command moves at the first frame, beyond what a spline rings
+FREE_MODES = 2  # lowest, in which a robot may move already when a shot begins
+Place = int | tuple[int, int]  # index of a target or of a motor; of the two targets of a strain gauge
 _TURNS, _NEAR = 20, 1e-5  # of the search for the command of a pose, and its end [rad or m]
 
 
@@ -41,6 +47,7 @@ class Signals:
         efforts: Of the motors [N m or N], shape [T, M].
         gravity: [m/s^2], world, shape [3].
         offsets: Of the motors' encoders [rad or m], shape [M].
+        modes: Frequencies [Hz] and damping ratios of the lowest natural modes where it begins, shape [2, n].
     """
 
     times: Array
@@ -50,7 +57,8 @@ class Signals:
     efforts: Array
     gravity: Array
     offsets: Array
-    _splines: dict[tuple[str, int], CubicSpline] = field(default_factory=dict, repr=False)
+    modes: Array = field(default_factory=lambda: np.zeros((2, 0)))
+    _splines: dict[object, CubicSpline] = field(default_factory=dict, repr=False)
 
     @cached_property
     def specific_forces(self) -> Array:
@@ -58,30 +66,67 @@ class Signals:
         accelerations = make_interp_spline(self.times, self.positions, k=5).derivative(2)(self.times)
         return np.asarray(np.einsum("tkij,tki->tkj", self.rotations, accelerations - self.gravity))
 
-    def at(self, kind: str, index: int, times: Array, order: int = 0) -> Array:
+    def at(
+        self, kind: str, index: Place, times: Array, order: int = 0, low_pass: LowPass | None = None
+    ) -> Array:  # fmt: skip
         """A quantity at times of the robot's clock, shape [n, c], or its derivative by time.
 
         Args:
             kind: Of a channel.
-            index: Of the target, or of the motor.
+            index: Of the target, or of the motor; of both targets of a strain gauge.
             times: [s], shape [n].
             order: 0, or 1 for the derivative, which is zero where the robot stands still.
+            low_pass: What the sensor does to it.
         """
-        return self._sampled((kind, index), times, order)
+        return self._sampled((kind, index, low_pass), times, order)
+
+    def decays(self, times: Array, order: int = 0) -> Array:
+        """Free motions in each of the lowest modes from the first frame on, of size one, which begin with a deflection
+        and with a speed, or their derivatives by time, shape [n, 2 modes]."""
+        frequencies, damping = self.modes
+        rate = 2.0 * np.pi * frequencies * (1j * np.sqrt(np.maximum(1.0 - damping**2, 0.0)) - damping)
+        moving = rate**order * np.exp(rate * np.maximum(times, 0.0)[:, None])
+        moving[times < 0.0] *= float(order == 0)
+        return np.asarray(np.stack([moving.real, moving.imag], axis=2).reshape(len(times), -1))
 
     def axes_at(self, index: int, times: Array, order: int = 0) -> Array:
         """Rotation matrices of a target, shape [n, 3, 3]."""
-        return self._sampled(("axes", index), times, order).reshape(-1, 3, 3)
+        return self._sampled(("axes", index, None), times, order).reshape(-1, 3, 3)
 
-    def _sampled(self, key: tuple[str, int], times: Array, order: int) -> Array:
+    def _sampled(self, key: tuple[str, Place, LowPass | None], times: Array, order: int) -> Array:
         if key not in self._splines:
-            self._splines[key] = CubicSpline(self.times, self._values(*key))
+            kind, index, low_pass = key
+            self._splines[key] = CubicSpline(self.times, self._filtered(self._values(kind, index), low_pass))
         inside = np.clip(times, self.times[0], self.times[-1])
         values = np.asarray(self._splines[key](inside, order), np.float64)
         moving = (inside == times)[:, None] | (order == 0)
         return np.asarray(np.where(moving, values, 0.0), np.float64)
 
-    def _values(self, kind: str, index: int) -> Array:
+    def _filtered(self, values: Array, low_pass: LowPass | None) -> Array:
+        """Values behind a filter, which has settled when the robot begins to move."""
+        if low_pass is None:
+            return values
+        w = 2.0 * np.pi * low_pass.frequency
+        second = low_pass.damping is not None
+        poles = [1.0, 2.0 * float(low_pass.damping or 0.0) * w, w * w] if second else [1.0, w]
+        b, a = bilinear([poles[-1]], poles, 1.0 / float(self.times[1] - self.times[0]))
+        return np.asarray(lfilter(b, a, values, axis=0, zi=lfilter_zi(b, a)[:, None] * values[:1])[0])
+
+    def _bending(self, first: int, last: int) -> Array:
+        """Curvature of a link between two targets [1/m], shape [T, 1], about the axis across their line about which it
+        bends most: the strain of a surface is in proportion, which on a thin link no displacement tells."""
+        between = Rotation.from_matrix(np.swapaxes(self.rotations[:, first], 1, 2) @ self.rotations[:, last])
+        turned = (between[0].inv() * between).as_rotvec()
+        along = self.rotations[0, last].T @ (self.positions[0, last] - self.positions[0, first])
+        length = float(np.linalg.norm(along))
+        turned = turned - np.outer(turned @ along, along) / length**2
+        axis = np.linalg.svd(turned, full_matrices=False)[2][0]
+        sign = np.sign(axis[np.argmax(np.abs(axis))])
+        return np.asarray((turned @ axis * sign / length)[:, None])
+
+    def _values(self, kind: str, index: Place) -> Array:
+        if isinstance(index, tuple):
+            return self._bending(*index)
         if kind == MARKER:
             return self.positions[:, index]
         if kind == ACCELEROMETER:
@@ -91,6 +136,15 @@ class Signals:
         if kind == EFFORT:
             return self.efforts[:, index, None]
         return self.rotations[:, index].reshape(-1, 9)
+
+
+def place_of(channel: Channel, character: Character) -> Place | None:
+    """Where a channel sits: the index of its target or motor, or those of both ends; None where the robot lacks it."""
+    if channel.kind in (ANGLE, EFFORT):
+        return {motor.path: k for k, motor in enumerate(character.motors)}.get(channel.path)
+    targets = {target.path: k for k, target in enumerate(character.targets)}
+    first, last = targets.get(channel.path), targets.get(channel.to)
+    return first if channel.kind != STRAIN or first is None else None if last is None else (first, last)
 
 
 def signals_of(
@@ -131,8 +185,17 @@ def _measured(robot: Robot, prepared: Prepared, run: ForwardRun) -> Signals:
     return Signals(
         prepared.grid.times, run.target_positions, matrices.reshape(*rotations.shape[:2], 3, 3),
         model.motor_values(values), model.motor_values(found.efforts), np.asarray(character.gravity, float),
-        robot.offsets,
+        robot.offsets, _modes(model, run.commands[0]),
     )  # fmt: skip
+
+
+def _modes(model: Model, commands: Array) -> Array:
+    """Of the lowest modes that oscillate; none where the robot has no equilibrium."""
+    try:
+        found = np.stack(natural_modes(model, commands))
+    except (np.linalg.LinAlgError, SimulationFailure):
+        return np.zeros((2, 0))
+    return found[:, (found[0] > 0.0) & (found[1] < 1.0)][:, :FREE_MODES]
 
 
 def _begun(robot: Robot, prepared: Prepared, workspace: Workspace, angles: Array, start: Array, begin: float) -> Array:
@@ -162,11 +225,20 @@ def _begun(robot: Robot, prepared: Prepared, workspace: Workspace, angles: Array
 
 def ends_at_rest(animation: Animation) -> bool:
     """Whether the current curves end at rest, so that what a robot does afterwards is known."""
+    return _rests(animation, -1)
+
+
+def begins_in_motion(animation: Animation) -> bool:
+    """Whether the current curves move already at the first frame, where a simulation begins at rest."""
+    return not _rests(animation, 0, MOVES)
+
+
+def _rests(animation: Animation, instant: int, share: float = AT_REST) -> bool:
     end = float(animation.frame_times[-1])
     fine = np.linspace(0.0, end, 4 * len(animation.frame_times))
     rates = [np.abs(curve_of(track, end, False)(fine, 1)) for track in animation.current]
     fastest = max((float(rate.max()) for rate in rates), default=0.0)
-    return all(float(rate[-1]) <= AT_REST * fastest for rate in rates)
+    return all(float(rate[instant]) <= share * fastest for rate in rates)
 
 
 def refuse_cyclic(cyclic: bool, path: str) -> None:

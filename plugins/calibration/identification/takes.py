@@ -15,9 +15,9 @@ from calmotion.recordings import ANGLE
 from calmotion.simulation import MAX_STEP, CompiledShot, failure_error, prepare
 
 from ..model.estimates import GEAR_STIFFNESS, MODULUS, POSITION_GAIN
-from .measurement import Sensor
 from .motor_groups import grouped
 from .parameters import Parameter, robot_parameters
+from .recordings.sensors import Sensor
 from .robots import robot_at, robot_with
 from .signals import Signals, ends_at_rest, signals_of
 
@@ -42,6 +42,7 @@ class Take:
         start: Where the motors stand until the recording begins [rad or m], shape [M], NaN where the shot says it;
             None: the robot begins as the shot does.
         begin: When that is, on the robot's clock [s].
+        moves: Whether the robot swings already when the shot begins.
     """
 
     shot: CompiledShot
@@ -49,6 +50,7 @@ class Take:
     after: float
     start: Array | None = None
     begin: float = 0.0
+    moves: bool = False
 
     @property
     def end(self) -> float:

@@ -19,6 +19,8 @@ ENCODER_OFFSET = "encoder_offset"
 HIGHER_MODES = "higher_modes"
 # kinds of parameters of a measurement
 CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE = "clock_offset", "clock_drift", "bias", "place"
+GAIN, OFFSET = "gain", "offset"  # of a strain gauge
+START = "start"  # free motion in which a shot begins, of a sensor's signal
 
 MATERIAL_KINDS = (MODULUS, DAMPING, DENSITY)
 BODY_KINDS = (MASS, CENTRE)
@@ -28,7 +30,7 @@ MOTOR_KINDS = (
 )  # fmt: skip
 ROBOT_KINDS = (*MATERIAL_KINDS, *BODY_KINDS, *MOTOR_KINDS)
 MODEL_KINDS = (HIGHER_MODES,)
-MEASUREMENT_KINDS = (CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE)
+MEASUREMENT_KINDS = (CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE, GAIN, OFFSET, START)
 AXES = "xyz"
 WITH_THIS_MODEL_ONLY = "with this model only"
 
@@ -90,6 +92,7 @@ class ChannelFit:
         rms_before: Root mean square of the residuals with the parameters of the shot, clocks fitted.
         rms, validation_rms: With the estimated ones, over fitted and over held-out values; NaN where there are none.
         outliers: Number of fitted values with less than full weight.
+        largest: Residual of the held-out values, of the fitted ones where none were held out.
     """
 
     recording: str
@@ -102,6 +105,7 @@ class ChannelFit:
     rms: float
     validation_rms: float
     outliers: int
+    largest: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)

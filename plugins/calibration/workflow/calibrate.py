@@ -28,9 +28,9 @@ from calmotion.workflow import (
 )
 
 from ..identification.calibrate import CalibrationSettings, calibrate_shots
-from ..identification.measurement import refuse_unknown_channels
 from ..identification.parameters import DEFAULT, refuse_unknown
 from ..identification.recordings.plausible import refuse_long
+from ..identification.recordings.sensors import refuse_unknown_channels
 from ..identification.signals import refuse_cyclic
 from ..model.estimates import Calibration, CalibrationFigures, Estimate
 

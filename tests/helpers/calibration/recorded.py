@@ -10,9 +10,10 @@ from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER, Channel, 
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.testing import beam_arm, quintic, shot_of
-from calmotion_plugins.calibration.identification.measurement import Measurement, measurement_parameters, sensors_of
+from calmotion_plugins.calibration.identification.measurement import Measurement
 from calmotion_plugins.calibration.identification.parameters import robot_parameters
 from calmotion_plugins.calibration.identification.problem import Calibrated
+from calmotion_plugins.calibration.identification.recordings.sensors import measurement_parameters, sensors_of
 from calmotion_plugins.calibration.identification.robots import robot_with
 from calmotion_plugins.calibration.identification.signals import signals_of
 from calmotion_plugins.calibration.identification.takes import Take

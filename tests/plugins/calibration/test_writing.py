@@ -7,7 +7,7 @@ import pytest
 from calmotion import ShotError
 from calmotion.usd import stages
 from calmotion.usd.reading import read_shot
-from calmotion_plugins.calibration.model.estimates import Calibration, Estimate
+from calmotion_plugins.calibration.model.estimates import Calibration, ChannelFit, Estimate
 from calmotion_plugins.calibration.writing import write_calibration
 from pxr import Sdf, Usd
 from small_shots import BASE, ELBOW, FORE, PLASTIC, SHOULDER, Scale, make_flexible, make_target, set_float, write_arm
@@ -159,6 +159,21 @@ def test_a_servo_fed_with_a_voltage_gets_a_factor_of_its_gain_that_any_shot_of_i
     assert found.max_torque == pytest.approx(largest or 1.2 * 0.7) and found.rotor.law.share == pytest.approx(0.3)
     assert found.rotor.back_emf == pytest.approx(1.2 * own.rotor.back_emf, rel=1e-6)
     assert found.rotor.viscous_friction == pytest.approx(0.01, rel=1e-6)
+
+
+def test_what_recordings_were_off_is_told_with_the_shot_of_the_layer(shot, tmp_path):
+    own = read_shot(shot)
+    fits = (
+        ChannelFit("a.csv", f"angle {SHOULDER}", "rad", 9, 3, 1e-3, 0.1, 0.01, 0.02, 0, 0.05),
+        ChannelFit("a.csv", "marker /Arm/Hand", "m", 9, 0, 1e-3, 0.1, 0.001, float("nan"), 0, 0.002),
+    )
+    made = dataclasses.replace(calibration_of(estimate("modulus", PLASTIC, 2e9, 2.1e9)), channels=fits)
+    _, root = write_calibration(own[0], own[2], made, str(tmp_path / "robot.usda"))
+    target = max(own[0].targets, key=lambda t: t.path)
+    arm = np.linalg.norm(own[0].bodies[target.body].rest.position - own[0].bodies[0].rest.position)
+    (note,) = [note for note in read_shot(root)[0].notes if "predicted of its recordings" in note]
+    found = [float(part.split()[-1]) for part in note.split(" mm")[:2]]
+    assert found[1] / found[0] == pytest.approx(2.5, rel=0.02) and found[0] > 0.5 * 20.0 * arm
 
 
 def test_the_largest_torque_is_that_of_the_duty_cycle_and_of_the_drive_where_these_limit_it(tmp_path):

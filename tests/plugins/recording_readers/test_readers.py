@@ -28,6 +28,35 @@ def read(repository, tmp_path):
     return run
 
 
+GAUGE = '[[channel]]\nkind = "strain"\nprim = "/Arm/a"\ncolumns = ["volts"]\n'
+
+
+def test_a_strain_gauge_has_two_ends_and_a_filter(read):
+    table = "time_s,volts\n0.0,0.1\n0.01,0.2\n"
+    found = read(table, beside=GAUGE + 'to = "/Arm/b"\nlow_pass = { frequency = 2.0, damping = 0.9 }\n')
+    (channel,) = found.channels
+    assert (channel.kind, channel.path, channel.to) == ("strain", "/Arm/a", "/Arm/b")
+    assert (channel.low_pass.frequency, channel.low_pass.damping) == (2.0, 0.9)
+    assert channel.values[:, 0].tolist() == [0.1, 0.2] and measured_prims([found]) == ("/Arm/a", "/Arm/b")
+    first = read(table, "first.csv", beside=GAUGE + 'to = "/Arm/b"\nlow_pass = { frequency = 2 }\n')
+    assert first.channels[0].low_pass.damping is None
+
+
+@pytest.mark.parametrize(
+    ("more", "attribute"),
+    [
+        ("", "channel[0].to"), ('to = "b"\n', "channel[0].to"),
+        ('to = "/Arm/b"\nlow_pass = 2.0\n', "channel[0].low_pass"),
+        ('to = "/Arm/b"\nlow_pass = { frequency = -2.0 }\n', "channel[0].low_pass"),
+        ('to = "/Arm/b"\nlow_pass = { frequency = 2.0, order = 2 }\n', "channel[0].low_pass"),
+    ],
+)  # fmt: skip
+def test_a_gauge_without_its_other_end_or_with_another_filter_is_refused(read, more, attribute):
+    with pytest.raises(ShotError) as caught:
+        read("time_s,volts\n0.0,0.1\n0.01,0.2\n", beside=GAUGE + more)
+    assert caught.value.attribute == attribute
+
+
 def test_columns_are_named_after_prims_and_empty_cells_are_missing(read):
     found = read(f"# a comment\n{HEAD}\n0.0,1,2,3,,,,0.5\n0.01,,,,4,5,6,\n0.02,1.5,2,,4,5,7,0.6\n")
     marker, sensor, angle = found.channels

@@ -13,7 +13,7 @@ from calmotion.errors import ShotError
 from calmotion.model import RetargetSettings, TempoSettings
 from calmotion.model.uncertainty import Uncertainty
 from calmotion.usd import gf, schemas
-from calmotion.usd.calibrations import known_factors
+from calmotion.usd.calibrations import known_factors, predictions
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.units import EARTH_GRAVITY
 
@@ -83,6 +83,12 @@ def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
     Raises:
         ShotError: A value out of range.
     """
+    if (told := predictions(reading.stage)) is not None:
+        layer, rms, largest = told
+        reading.notes.append(
+            f"{layer}: what the calibrated robot predicted of its recordings was off by {1e3 * rms:.3g} mm (root mean "
+            f"square), {1e3 * largest:.3g} mm at most; expect at least that beside the errors of the model"
+        )
     prim = reading.stage.GetPrimAtPath(root)
     while prim and not schemas.is_applied(prim, _SCHEMA):
         prim = prim.GetParent()

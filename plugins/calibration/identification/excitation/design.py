@@ -24,11 +24,12 @@ from calmotion.simulation import CompiledShot, pose_modes
 from ...model.estimates import ROBOT_KINDS
 from ...model.excitation import Clear, Excitation, MotorUse, PlannedSensor, Predicted
 from ..advice import IDENTIFIABLE
-from ..measurement import Measurement, measurement_parameters, sensors_of
+from ..measurement import Measurement
 from ..model_error import covariance_of_model
 from ..motor_groups import grouped
 from ..parameters import DEFAULT, Parameter, robot_parameters
 from ..problem import Calibrated
+from ..recordings.sensors import measurement_parameters, sensors_of
 from ..signals import Signals, refuse_cyclic
 from ..takes import Take, simulable
 from .clearance import Clearance

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import Character
-from calmotion.recordings import ANGLE, EFFORT, SensorRecording
+from calmotion.recordings import STRAIN, Channel, SensorRecording
 
-from ..signals import Signals
+from ..signals import Place, Signals, place_of
 from .noise import noise_of
 
 STEP = 0.01  # between clocks that are tried first [s]
@@ -47,31 +47,39 @@ def _clock_by(recording: SensorRecording, character: Character, signals: Signals
     return best
 
 
-_Compared = tuple[str, int, Array, Array, float]
+_Compared = tuple[Channel, Place, Array, Array, float]
 
 
 def _compared(recording: SensorRecording, character: Character) -> list[_Compared]:
     """Kind, index, times, values and scale of each channel, with few samples."""
-    targets = {target.path: k for k, target in enumerate(character.targets)}
-    motors = {motor.path: k for k, motor in enumerate(character.motors)}
     found = []
     for channel in recording.channels:
-        known = motors if channel.kind in (ANGLE, EFFORT) else targets
-        if channel.path not in known:
+        place = place_of(channel, character)
+        if place is None:
             continue
         every = max(1, len(channel.times) // SAMPLES)
         values = channel.values[::every]
         spread = np.nanstd(values) + noise_of(channel.values)
-        found.append((channel.kind, known[channel.path], channel.times[::every], values, float(spread)))
+        found.append((channel, place, channel.times[::every], values, float(spread)))
     return found
+
+
+def fitted_gain(signal: Array, values: Array) -> float:
+    """The factor by which a signal, shape [n, 1], is most like values that may be offset; 1 where it does not move."""
+    known = np.isfinite(values[:, 0])
+    own, other = signal[known, 0] - signal[known, 0].mean(), values[known, 0] - values[known, 0].mean()
+    return float(own @ other / (own @ own)) if own @ own > 0.0 and own @ other != 0.0 else 1.0
 
 
 def _best(candidates: Array, compared: list[_Compared], signals: Signals) -> tuple[float, float]:
     costs = []
     for clock in candidates:
         cost = 0.0
-        for kind, index, times, values, scale in compared:
-            off = (values - signals.at(kind, index, times - clock)) / scale
+        for channel, place, times, values, scale in compared:
+            simulated = signals.at(channel.kind, place, times - clock, low_pass=channel.low_pass)
+            if channel.kind == STRAIN:  # its gain is not known
+                simulated = fitted_gain(simulated, values) * simulated
+            off = (values - simulated) / scale
             # a few outliers must not decide
             off = np.clip(off - np.nanmedian(off, axis=0), -2.0, 2.0)
             cost += float(np.nanmean(off**2))

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.recordings import ACCELEROMETER, MARKER
+from calmotion.recordings import ACCELEROMETER, MARKER, STRAIN
 from scipy.signal import decimate
 
-from ..measurement import Measurement, Motions, Sensor
+from ..measurement import Measurement, Motions
+from .sensors import Sensor
 
 ORDER = 8  # exponentials: four modes, or fewer and noise
 FASTEST, MOST, FEWEST = 400.0, 400, 40  # samples in a second, and most and fewest samples that are used
@@ -84,7 +85,7 @@ def decay_factors(measurement: Measurement, motions: Motions, ends: Sequence[flo
     found = []
     zero = np.zeros(len(measurement.parameters))
     for sensor in measurement.sensors:
-        if sensor.channel.kind not in (MARKER, ACCELEROMETER):
+        if sensor.channel.kind not in (MARKER, ACCELEROMETER, STRAIN):
             continue
         times, end = measurement.robot_times(sensor, zero), ends[sensor.take]
         measured = _decay(sensor, times, sensor.channel.values, end)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from calmotion import ShotError
 from calmotion.model.run import RunSettings
-from calmotion_plugins.calibration.identification.measurement import Measurement, measurement_parameters, sensors_of
+from calmotion_plugins.calibration.identification.measurement import Measurement
 from calmotion_plugins.calibration.identification.recordings.clocks import clock_of
+from calmotion_plugins.calibration.identification.recordings.sensors import measurement_parameters, sensors_of
 from calmotion_plugins.calibration.identification.robots import robot_with
 from calmotion_plugins.calibration.identification.signals import signals_of
 from recorded import CLOCKS

@@ -9,9 +9,10 @@ from calmotion.model.run import RunSettings
 from calmotion.recordings import ACCELEROMETER, ANGLE, MARKER, Channel, SensorRecording
 from calmotion_plugins.calibration.identification.excitation.superposition import AROUND, SHAPE, Superposition, _heights
 from calmotion_plugins.calibration.identification.excitation.waveforms import bounds_of, family_of
-from calmotion_plugins.calibration.identification.measurement import Measurement, measurement_parameters, sensors_of
+from calmotion_plugins.calibration.identification.measurement import Measurement
 from calmotion_plugins.calibration.identification.parameters import robot_parameters
 from calmotion_plugins.calibration.identification.problem import Calibrated
+from calmotion_plugins.calibration.identification.recordings.sensors import measurement_parameters, sensors_of
 from calmotion_plugins.calibration.identification.robots import robot_with
 from calmotion_plugins.calibration.identification.takes import Take
 from recorded import LOAD, MOTOR, PLASTIC

@@ -1,0 +1,74 @@
+"""What the layer of a calibration tells beside its attributes: all parameters, their covariance, its predictions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from calmotion.model import Character
+from calmotion.recordings import ANGLE, MARKER
+from calmotion.usd import to_doubles, to_strings
+from scipy.spatial.transform import Rotation
+
+from .model.estimates import ENCODER_OFFSET, Calibration, Estimate
+
+
+def metadata_of(character: Character, calibration: Calibration) -> dict[str, Any]:
+    """What the layer's metadata tell of a calibration of a character."""
+    items = calibration.estimates
+    known = [k for k, item in enumerate(items) if item.of_robot and item.identifiable and _has_factor(item)]
+    relative = np.array([1.0 if items[k].logarithmic else 1.0 / items[k].value for k in known])
+    covariance = calibration.covariance[np.ix_(known, known)] * np.outer(relative, relative)
+    return {
+        "parameters": to_strings(item.name for item in items),
+        "values": to_doubles([item.value for item in items]),
+        "standard_deviations": to_doubles([item.standard_deviation for item in items]),
+        "prior_values": to_doubles([item.nominal for item in items]),
+        "prior_standard_deviations": to_doubles([item.prior for item in items]),
+        "units": to_strings(item.unit for item in items),
+        "identifiable": to_strings(item.name for item in items if item.identifiable),
+        "with_this_model_only": to_strings(item.name for item in items if item.disagrees),
+        "factors": to_strings(items[k].name for k in known),
+        "covariance_of_log_factors": to_doubles(covariance.ravel()),
+        "recordings": to_strings(calibration.recordings),
+        "recordings_sha256": to_strings(calibration.recordings.values()),
+        "channels": to_strings(fit.name for fit in calibration.channels),
+        "residual_rms": to_doubles([fit.rms for fit in calibration.channels]),
+        "validation_rms": to_doubles([fit.validation_rms for fit in calibration.channels]),
+        **_predictions(character, calibration),
+    }
+
+
+def _predictions(character: Character, calibration: Calibration) -> dict[str, float]:
+    """How far recordings were from their prediction, at the places that markers and encoders tell of [m]: root mean
+    square and largest, of the worst channel; nothing where there is none."""
+    found = [(0.0, 0.0)]
+    for fit in calibration.channels:
+        kind, _, path = fit.name.partition(" ")
+        held_out = np.isfinite(fit.validation_rms)
+        arm = 1.0 if kind == MARKER else _arm(character, path) if kind == ANGLE else 0.0
+        found.append((arm * (fit.validation_rms if held_out else fit.rms), arm * fit.largest))
+    rms, largest = np.max(found, axis=0)
+    return {"prediction_rms_m": float(rms), "prediction_largest_m": float(largest)} if rms > 0.0 else {}
+
+
+def _arm(character: Character, path: str) -> float:
+    """Distance from a joint to the farthest target [m]; 1 of a slider, whose encoder tells metres."""
+    motor = next((own for own in character.motors if own.path == path), None)
+    if motor is None or motor.linear:
+        return 1.0
+
+    def place(body: int, at: np.ndarray) -> np.ndarray:
+        rest = character.bodies[body].rest
+        w, x, y, z = rest.rotation
+        return np.asarray(rest.position + Rotation.from_quat([x, y, z, w]).apply(at))
+
+    joint = character.joints[motor.joint]
+    middle = place(joint.body1, joint.frame1.position)
+    ends = [place(target.body, target.frame.position) for target in character.targets]
+    return max(float(np.linalg.norm(end - middle)) for end in ends)
+
+
+def _has_factor(item: Estimate) -> bool:
+    """Whether a parameter can be drawn as a factor of its value: one about zero cannot."""
+    return item.axis < 0 and item.kind != ENCODER_OFFSET and item.value > 3.0 * item.standard_deviation
