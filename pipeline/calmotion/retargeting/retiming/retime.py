@@ -36,6 +36,7 @@ from calmotion.tolerance.simulation import found_tracks
 ROUNDS = 4  # searches at most, of which the last keeps all limits by itself
 KEPT = 1e-6  # share of a limit by which it counts as kept
 ROOM = 5e-3  # share of a limit by which the tempo stays further within it once offsets are known
+MOST_ROOM = 0.05  # share of a limit, beyond which a search that keeps it is better than more room
 FINE = 8  # instants of a frame at which curves are compared with their limits
 
 
@@ -67,8 +68,12 @@ def optimize_with_tempo(
         latest = optimize_to_tolerance(performance.shot, of_round, progress, checkpoint)
         done = latest if done is None else continued(done, latest)
         used = performance.used(latest)
-        if last or done.interrupted or max(float(np.max(share, initial=0.0)) for share in used.values()) <= 1.0 + KEPT:
+        over = max(float(np.max(share, initial=0.0)) for share in used.values()) - 1.0
+        if last or done.interrupted or over <= KEPT:
             break
+        if over > MOST_ROOM:  # commands far ahead of their motors: bending them a little costs less than time
+            last = True
+            continue
         progress(0.0, "choosing the tempo for the curves that were found")
         limits = _narrowed(limits, used)
         narrow = replace(given, limits=limits, efforts=performance.efforts(latest))
