@@ -104,7 +104,7 @@ def _print(report: dict[str, Any], console: Console) -> None:
     for file in report["files"]:
         say(console, f"wrote {file}")
     if kept:
-        say(console, "next: the page 'Exporting for a controller' of the documentation tells how the file is played")
+        say(console, "next: the page 'Exporting for a controller' of the documentation says how the file is played")
     elif lowest:
         say(console, f"next: the same command with --rate {lowest}")
     elif report["searched"]:

@@ -129,7 +129,7 @@ class Comparison:
     def _concluded(self) -> Diagnosis:
         best = self._best()
         if not best.causes and self._is_quiet(self.SMALL):
-            quiet = Cause(NONE, 1.0, 0.7, "nothing: what is left is a little more than noise, and no cause explains it")
+            quiet = Cause(NONE, 1.0, 0.7, "nothing: the rest is a little more than noise, and no cause explains it")
             return Diagnosis((quiet,), "", self._channels(best), None, self._situation)
         shares = self._shares(best)
         unexplained = max(0.0, 1.0 - sum(shares.values()))
@@ -214,7 +214,7 @@ class Comparison:
         if s.mechanics is None:
             return "name the shot of the robot: its inertias and modes tell joints, links and base apart"
         if not s.encoders:
-            return "record the joints' encoders too: they tell what joints do from what the structure does"
+            return "record the joints' encoders too: they separate joints from structure"
         return "no explanation fits: record the hand with an accelerometer, and the same motion at half of its speed"
 
     def _channels(self, best: Fit) -> tuple[dict[str, Any], ...]:

@@ -217,7 +217,7 @@ class CompareWithLimits(Operator):
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         source, character, animation = data.get(Source), data.get(Character), data.get(Animation)
         if source is not None and source.command not in ("inspect", "check"):
-            return NotAsked("other commands tell it of what they simulate")
+            return NotAsked("other commands report it for their simulation")
         if character is not None and not has_limits(character):
             return NotAsked("no motor has limits")
         if animation is not None and len(animation.frame_times) < 2:

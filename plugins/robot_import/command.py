@@ -103,7 +103,7 @@ def _next(report: dict[str, Any]) -> str:
         return f"import again with --motion FILE, or animate the motors; calmotion inspect {layer} shows them"
     if not report["flexible"]:
         return (
-            'import again with --flexible "PATTERN=MATERIAL" for links that bend, or give motors a model that gives; '
+            'import again with --flexible "PATTERN=MATERIAL" for links that bend, or give motors a compliant model; '
             f"calmotion inspect {layer} shows the gains that the robot's file has"
         )
     return f"calmotion inspect {layer} shows how stiff it is, calmotion optimize {layer} -o LAYER makes calm curves"

@@ -189,8 +189,7 @@ class OptimizeShot(Operator):
             float,
             0.0,
             minimum=0.0,
-            description="Weight of what the play of gears would move the targets, over that of their errors; 0: play "
-            "does not count",
+            description="Weight of the motion of targets across the backlash, over that of their errors; 0: none",
         ),
         Property("retime", bool, False, description="Slow the animation down where limits of motors ask for it"),
         Property(

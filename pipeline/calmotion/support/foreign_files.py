@@ -34,7 +34,7 @@ _KINDS = {
     ),
     "bvh": (
         "a BVH motion",
-        "Name it with --motion, beside the shot of a robot; `--set bvh.read.map=...` tells which channels are motors",
+        "Name it with --motion, beside the shot of a robot; `--set bvh.read.map=...` names the channels of motors",
     ),
 }
 

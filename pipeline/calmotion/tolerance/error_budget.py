@@ -35,7 +35,7 @@ def _unknown(result: Result, character: Character, requested: float | None) -> t
         return ()
     share, least = 100.0 * max(unknown), 100.0 * mesh_budget.OF_UNCERTAINTY * max(unknown)
     what = f"meshes and reductions that change the stiffness by less than {least:.2g}%"
-    why = f"the modulus is known to {share:.3g}%; calm:retarget:uncertainty:modulus tells it, --tolerance asks for more"
+    why = f"the modulus is known to {share:.3g}%; calm:retarget:uncertainty:modulus sets it, --tolerance asks for more"
     return (Simplification(what, why, result.accuracy.mesh_m if result.accuracy else None, MESH),)
 
 

@@ -255,7 +255,7 @@ def _tempo(retime: bool | Mapping[str, Any]) -> Settings:
     unknown = set(given) - {"slowest", "fastest"}
     if unknown:
         raise SettingError(
-            "this is nothing of a tempo", path="retime", found=", ".join(sorted(unknown)),
+            "this is no setting of the tempo", path="retime", found=", ".join(sorted(unknown)),
             remedy="Use slowest, fastest and pin.",
         )  # fmt: skip
     pinned = {"pinned": ",".join(str(pin) for pin in pins)} if len(pins) else {}

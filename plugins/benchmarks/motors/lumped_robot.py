@@ -176,7 +176,7 @@ def _refuse(character: Character) -> None:
             raise _unfit("a flexible link or a body without mass", body.path)
     for motor in character.motors:
         if motor.model == PRESCRIBED or motor.follows is not None or np.isfinite(motor.rotor.gear_stiffness):
-            raise _unfit("a motor that is ideal, geared to another, or has a gear that gives", motor.path)
+            raise _unfit("a motor that is ideal, geared to another, or has a compliant gear", motor.path)
 
 
 def _unfit(what: str, path: str) -> ShotError:

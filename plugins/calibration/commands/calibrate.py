@@ -177,7 +177,7 @@ def _print(report: dict[str, Any], console: Console) -> None:
 
     of_robot = [row for row in report["parameters"] if row["of_robot"]]
     told = sum(bool(row["identifiable"]) for row in of_robot)
-    say(console, f"The recordings tell {told} of {counted(len(of_robot), 'parameter')} of the robot.")
+    say(console, f"The recordings identify {told} of {counted(len(of_robot), 'parameter')} of the robot.")
     for row in report["channels"]:
         held_out = row["validation_rms"]
         before, after, noise = (quantity_in(row[name], row["unit"], 3) for name in ("rms_before", "rms", "noise"))

@@ -86,7 +86,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
 def _print(report: dict[str, Any], console: Console) -> None:
 
     told = sum(row["identifiable"] for row in report["parameters"])
-    say(console, f"A recording of this motion would tell {told} of {counted(len(report['parameters']), 'parameter')}.")
+    say(console, f"A recording of this motion identifies {told} of {counted(len(report['parameters']), 'parameter')}.")
     rows = [
         [
             row["kind"], row["path"], quantity_in(row["value"], row["unit"]),

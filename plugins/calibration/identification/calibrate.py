@@ -175,7 +175,7 @@ def _estimates(found: Found) -> tuple[Estimate, ...]:
         if not identifiable and p.kind in ROBOT_KINDS:
             text = (
                 f"{advice[k].sentence} narrow it to {100.0 * advice[k].sigma:.2g}% of its prior" if k in advice
-                else "no single marker, accelerometer, encoder or torque would tell it from this motion"
+                else "no single marker, accelerometer, encoder or torque would show it in this motion"
             )  # fmt: skip
         rows.append(
             Estimate(
@@ -264,8 +264,8 @@ def _notes(
     split = [item.name for item in estimates if item.of_robot and item.disagrees]
     if split:
         notes.append(
-            f"pieces of the recordings tell other values of {', '.join(split)} by more than noise: they hold with this "
-            "model only, and their standard deviations are those of what other recordings would tell"
+            f"pieces of the recordings differ by more than noise in {', '.join(split)}: these values hold with this "
+            "model only, and their standard deviations are those that other recordings would give"
         )
     deviations = np.sqrt(np.diag(found.covariance))
     correlations = found.covariance / np.outer(deviations, deviations)
@@ -295,7 +295,7 @@ def _missed(found: Found, fits: Sequence[ChannelFit]) -> list[str]:
         if left:
             notes.append(
                 f"{sensor.channel.name} still differs by {left:.2g} times its noise, and not at random: the model "
-                "misses something, and standard deviations are those of what other recordings would tell. Try a finer "
+                "misses something, and standard deviations are those that other recordings would give. Try a finer "
                 "model (a smaller --tolerance), another friction of motors (calm:motor:frictionModel), or more "
                 "--parameters"
             )

@@ -92,9 +92,9 @@ class Backlash(AddedExplanation):
             return "look for play in the gears"
         worst = max(parameters, key=lambda row: row["value"])
         return (
-            f"{worst['path']} has {np.degrees(worst['value']):.2g} degrees of play: tighten its horn, screws and gear, "
-            "preload it with a spring or its weight, and keep its torque from changing sign (its play in "
-            "calm:motor:backlash tells what it costs)"
+            f"{worst['path']} has {np.degrees(worst['value']):.2g} degrees of backlash: tighten its horn, screws and "
+            "gear, preload it with a spring or its weight, and keep its torque from changing sign (its value in "
+            "calm:motor:backlash shows the effect)"
         )
 
 

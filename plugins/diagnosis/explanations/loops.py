@@ -101,7 +101,7 @@ class Friction(LoopExplanation):
         worst = max((row for row in parameters if row["name"] == "lost_motion"), key=lambda row: row["value"])
         return (
             f"{worst['path']} sticks within {worst['value']:.2g} rad of its command: lubricate or loosen it, raise its "
-            "position gain or compensate friction; calmotion calibrate --parameters friction tells it to the model"
+            "position gain or compensate friction; calmotion calibrate --parameters friction adds it to the model"
         )
 
 

@@ -154,7 +154,7 @@ class Stream(AddedExplanation):
         if "rate" in rows:
             return (
                 f"commands arrive in steps of {rows['rate']:.3g} Hz: send them at 100 Hz or more, or interpolated "
-                "(calmotion export --rate tells the lowest rate; calmotion live --sender-rate smooths a slow sender)"
+                "(calmotion export --rate finds the lowest rate; calmotion live --sender-rate smooths a slow sender)"
             )
         what = (
             f"{rows['gaps']:.0f} gaps of up to {1e3 * rows['longest_gap']:.0f} ms"

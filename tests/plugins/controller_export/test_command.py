@@ -23,7 +23,7 @@ REPORT = {
 @pytest.mark.parametrize(
     ("kept", "lowest", "then"),
     [
-        (True, 8, "tells how the file is played"),
+        (True, 8, "says how the file is played"),
         (False, 40, "--rate 40"),
         (False, None, "no rate keeps it"),
     ],

@@ -59,13 +59,13 @@ def print_lost_motion(console: Console, lost: dict[str, Any] | None, suffix: str
     say(
         console,
         f"backlash is not simulated: the torques of {len(turned)} of {len(lost['motors'])} motors change their sign "
-        f"{count} times; the play would move {worst['path']} by up to {length(worst[f'max_error{suffix}_m'])}{before}"
+        f"{count} times; it would move {worst['path']} by up to {length(worst[f'max_error{suffix}_m'])}{before}"
         if turned
         else "backlash costs nothing: the torques of the motors keep their signs",
     )
     unfollowed = ", ".join(motor["path"] for motor in lost["motors"] if not motor["followed"])
     if unfollowed:
-        say(console, f"without the play of {unfollowed}, which the closed chains of a rigid robot cannot follow")
+        say(console, f"without the backlash of {unfollowed}, which the closed chains of a rigid robot cannot follow")
 
 
 def print_joint_gap(console: Console, gap: float) -> None:

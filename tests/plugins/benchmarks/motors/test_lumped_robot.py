@@ -87,7 +87,7 @@ def test_both_programs_move_the_targets_alike(character):
             "/C/L1",
         ),
         (lambda c: servos(c, model="prescribed"), "ideal", "/C/J0"),
-        (lambda c: servos(c, rotor=replace(ROTOR, gear_stiffness=9.0)), "a gear that gives", "/C/J0"),
+        (lambda c: servos(c, rotor=replace(ROTOR, gear_stiffness=9.0)), "a compliant gear", "/C/J0"),
         (lambda c: servos(c, follows=Follows(0, 1.0, 0.0)), "geared", "/C/J0"),
     ],
     ids=["chain", "mass", "flexible", "ideal", "gear", "geared"],

@@ -26,7 +26,7 @@ def test_a_test_motion_says_what_its_recording_would_tell():
     near = {"bodies": ["/Arm/Base", "/Arm/Hand"], "first_pose_m": 0.05, "least_m": 0.021}
     report |= {"clearances": [near | {"least_m": 0.03}, near], "unchecked_pairs": 4 * [["/Arm/A", "/Arm/B"]]}
     lines = printed(excite, report)
-    assert lines[0] == "A recording of this motion would tell 1 of 2 parameters."
+    assert lines[0] == "A recording of this motion identifies 1 of 2 parameters."
     (next_,) = [line for line in lines if line.startswith("next: ")]
     assert next_.startswith("next: play it") and "calmotion calibrate test.usda --recording FILE" in next_
     assert lines.index(next_) < lines.index("What the motors do (rad or m, s, N m or N)")
@@ -47,7 +47,7 @@ def test_a_calibration_says_what_the_recordings_tell_before_what_they_cost():
         "step_shift": 0.1,
     }  # fmt: skip
     lines = printed(calibrate, report)
-    assert lines[0] == "The recordings tell 1 of 2 parameters of the robot."
+    assert lines[0] == "The recordings identify 1 of 2 parameters of the robot."
     assert lines[1].startswith("marker /Arm/Hand: the difference of recording and robot falls from 0.8 mm to 0.2 mm")
     order = ["Parameters of the robot", "wrote mine.usda", "wrote mine_root.usda"]
     order += ["next: calmotion optimize mine_root.usda -o LAYER makes curves for this robot", "note: a note"]

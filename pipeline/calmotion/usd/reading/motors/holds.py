@@ -170,5 +170,5 @@ def _note(steps: list[Samples], joint: JointPrim) -> str:
     return (
         f"{joint.path}: its samples are held and step {most} between {times[0]:.4g} and {times[-1]:.4g} s; it goes "
         f"from hold to hold without overshoot, and excites all frequencies up to about {1.0 / brief:.3g} Hz: smooth "
-        "the keys unless a step is meant"
+        "the keys unless a step is intended"
     )
