@@ -193,7 +193,7 @@ class ErrorShares:
     """Largest error of each target in the input, shape [K] [m], where only one cause of it is left.
 
     Attributes:
-        motors_m: With rigid links: that of motors that give.
+        motors_m: With rigid links: that of compliant motors.
         links_m: With ideal motors: that of flexible links.
     """
 

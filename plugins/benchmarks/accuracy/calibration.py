@@ -1,7 +1,7 @@
 """How honest calibrations are: random arms with known parameters, recorded with noise and calibrated.
 
 `calmotion bench calibration [--trials N] [--first K] [--finer-mesh] [--csv FILE [--resume]]` draws arms of one or two
-flexible links with a load, half of them with a motor that gives. The parameters of the real arm differ from the model
+flexible links with a load, half of them with a compliant motor. The parameters of the real arm differ from the model
 by a standard deviation of their priors. It is simulated by another integrator (Newmark's method, steps of 1/7680 s,
 extrapolated; the generalized-alpha method where that diverges) and, with `--finer-mesh`, with another mesh and twice
 the modes. A marker, an accelerometer and the encoders record it, each with its own clock, noise, bias, gaps and

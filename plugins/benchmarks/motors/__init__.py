@@ -1,1 +1,1 @@
-"""Motors that give, and what commands for them bring."""
+"""Compliant motors, and what commands for them bring."""

@@ -46,7 +46,7 @@ class Row:
 
     Attributes:
         shot: Name.
-        motors: Number of motors that give.
+        motors: Number of compliant motors.
         ideal_mm, optimised_mm: Largest error of the animation as the command, and of the optimised commands [mm].
         share: The second over the first.
         mujoco_ideal_mm, mujoco_optimised_mm, mujoco_share: The same in MuJoCo.

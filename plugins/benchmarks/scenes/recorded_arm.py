@@ -103,7 +103,7 @@ def _with_more_modes(body: Body) -> Body:
 def _reference(robot: Robot) -> Signals:
     """Signals of the real arm, extrapolated to steps of zero: the error is of fourth order.
 
-    Newmark's method does not damp the fast modes of a motor that gives, and can diverge: then the scheme is the
+    Newmark's method does not damp the fast modes of a compliant motor, and can diverge: then the scheme is the
     generalized-alpha method.
     """
     try:

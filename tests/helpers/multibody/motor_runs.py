@@ -1,4 +1,4 @@
-"""Simulations of motors that give, for the tests of drives and of servos."""
+"""Simulations of compliant motors, for the tests of drives and of servos."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Commands of the rigid robot's inverse: motors that give then do what ideal ones do."""
+"""Commands of the rigid robot's inverse: compliant motors then do what ideal ones do."""
 
 from dataclasses import replace
 

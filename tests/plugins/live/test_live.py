@@ -28,7 +28,7 @@ GIVES = {"model": "drive", "position_gain": 180.0, "velocity_gain": 0.4}
 
 
 def robot(motor=GIVES, **limits):
-    """The arm of two beams without gravity, on motors that give: it swings at about 5 and 17 Hz."""
+    """The arm of two beams without gravity, on compliant motors: it swings at about 5 and 17 Hz."""
     character, animation = small_shot()
     motors = tuple(replace(item, **motor, **limits) for item in character.motors)
     return compile_shot(replace(character, motors=motors, gravity=np.zeros(3)), animation)

@@ -1,4 +1,4 @@
-"""What the regulariser holds back: commands of motors that give less than curves of ideal ones."""
+"""What the regulariser holds back: commands of compliant motors less than curves of ideal ones."""
 
 from dataclasses import replace
 

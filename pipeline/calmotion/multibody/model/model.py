@@ -146,7 +146,7 @@ def _held(character: Character, tree: Tree, mass: Array, Z: Array, joints: Joint
 
 
 def with_drives(model: Model, motors: Sequence[Motor]) -> Model:
-    """The model with the coordinates of its motors that give, see `drives`; itself where motors are ideal."""
+    """The model with the coordinates of its compliant motors, see `drives`; itself where motors are ideal."""
     found = giving_motors(model.system, model.motor, motors)
     if not found:
         return model

@@ -31,7 +31,7 @@ class System(NamedTuple):
 
     Attributes:
         parent: Parent of each component, shape [B], -1 for the world.
-        elastic: Number of elastic coordinates, shape [B]: modes, then those of motors that give
+        elastic: Number of elastic coordinates, shape [B]: modes, then those of compliant motors
             (`motors.drives`).
         modes: Number of those that deform the component, shape [B].
         side: Components on the two sides of each joint, shape [J, 2].

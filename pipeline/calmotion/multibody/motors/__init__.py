@@ -1,1 +1,1 @@
-"""Motors that give: drives, and servos with their rotors."""
+"""Compliant motors: drives, and servos with their rotors."""

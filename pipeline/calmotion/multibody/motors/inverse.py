@@ -1,4 +1,4 @@
-"""Commands under which motors that give would do exactly what ideal ones do, from the efforts that this takes.
+"""Commands under which compliant motors would do exactly what ideal ones do, from the efforts that this takes.
 
 They are exact on rigid links, but for damping in gears, and limits that a torque would exceed.
 """

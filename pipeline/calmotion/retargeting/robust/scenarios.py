@@ -64,7 +64,7 @@ def uncertain_parameters(shot: CompiledShot) -> tuple[Parameter, ...]:
 
 
 def _gains(character: Character, known: Collection[str]) -> Iterator[Parameter]:
-    """The gains of each motor that gives, which have a common factor, but for those that a calibration tells."""
+    """The gains of each compliant motor, which have a common factor, but for those that a calibration tells."""
     spread = float(np.log1p(character.retarget.uncertainty.gains))
     for motor in character.motors:
         if spread > 0.0 and motor.model != PRESCRIBED and motor.follows is None:

@@ -1,4 +1,4 @@
-"""The delay of commands: what a motor that gives follows is its curve of some time ago.
+"""The delay of commands: what a compliant motor follows is its curve of some time ago.
 
 Between instants a curve is the cubic with the values and rates of both, which is exact for splines with knots at
 instants. Before a shot begins the robot rests at its first command; a shot that loops has its end before its beginning.

@@ -1,1 +1,1 @@
-"""Motors that give: what they do to the targets, and what the play of their gears would."""
+"""Compliant motors: what they do to the targets, and what the play of their gears would."""

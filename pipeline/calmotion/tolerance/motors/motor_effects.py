@@ -1,4 +1,4 @@
-"""How far motors that give move the targets: by the gains that a shot carries, and their part of its error."""
+"""How far compliant motors move the targets: by the gains that a shot carries, and their part of its error."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def effects_of_gains(shot: CompiledShot, options: RunSettings) -> MotorEffects |
 
 
 def _giving_model(shot: CompiledShot, character: Character) -> Model:
-    """The robot on motors that give; on rigid links where one of its motors could not stand on a flexible one."""
+    """The robot on compliant motors; on rigid links where one of its motors could not stand on a flexible one."""
     try:
         return compile_shot(character, shot.animation, shot.bodies).model
     except ShotError:

@@ -1,4 +1,4 @@
-"""Commands for motors that give, confirmed by MuJoCo, and the cut of shots."""
+"""Commands for compliant motors, confirmed by MuJoCo, and the cut of shots."""
 
 import json
 from dataclasses import replace

@@ -87,7 +87,7 @@ def read_gains(
         current: The motor, where it is fed with a voltage: its gain is that of its duty cycle.
 
     Raises:
-        ShotError: A gain that is negative or not finite, a motor that gives without a gain, or a wrong DAMPING_ON.
+        ShotError: A gain that is negative or not finite, a compliant motor without a gain, or a wrong DAMPING_ON.
     """
     if current is not None:
         return Gains(current.position_gain, 0.0, "calm:motor:dutyGain and calm:motor:voltage (Calmotion)")
