@@ -65,15 +65,22 @@ def reduce_body(
     settings = replace(body.flexible, material=material)
     body = replace(body, flexible=settings)
     elasticity = None
-    law, simplifications = _law(model, linear.support, basis, body, load_envelope, tolerance)
-    left_out += simplifications
+    law, simplifications, linear_error = _law(model, linear.support, basis, body, load_envelope, tolerance)
     if law != "linear" and len(basis.omega_squared):
         from calmotion.reduction.material_laws.large_deflection import large_deflection
+        from calmotion.reduction.material_laws.locking import locked
 
         basis, elasticity = large_deflection(
             model, linear.support, basis, material, law, load_envelope, tolerance, settings.pairs_share
         )
-        left_out += _omitted_strain(elasticity, body)
+        locking = locked(model, linear.basis, basis, elasticity, load_envelope, linear_error)
+        left_out += (
+            simplifications + _omitted_strain(elasticity, body) if locking is None else (locking.told(body.path),)
+        )
+        if locking is not None and locking.by_linear:
+            basis, elasticity = linear.basis, None
+    else:
+        left_out += simplifications
     r, mesh_error = len(basis.omega_squared), _mesh_error(mesh)
     reduced = ReducedBody(
         invariants=inertia_integrals(model.mesh.nodes, model.mass, basis.modes),
@@ -217,25 +224,25 @@ def linear_modes(
 
 def _law(
     model: FEModel, support: Support, basis: Basis, body: Body, load_envelope: LoadEnvelope | None, tolerance: float
-) -> tuple[str, tuple[Simplification, ...]]:
-    """The elastic law of a body, and its simplifications."""
+) -> tuple[str, tuple[Simplification, ...], float]:
+    """The law of a body, its simplifications, and the error of the linear law [m], infinite where the shot chose."""
     settings = body.flexible
     assert settings is not None
     law, what = settings.elasticity, f"{body.path}: linear elasticity"
     if law != "auto":
-        return law, (
-            Simplification(what, "calm:flexible:elasticity is linear", None, REDUCTION),
-        ) if law == "linear" else ()
+        told = Simplification(what, "calm:flexible:elasticity is linear", None, REDUCTION)
+        return law, (told,) if law == "linear" else (), np.inf
     if load_envelope is None:
-        return "linear", (Simplification(what, "its deflection is not known without a motion", None, REDUCTION),)
+        told = Simplification(what, "its deflection is not known without a motion", None, REDUCTION)
+        return "linear", (told,), np.inf
     from calmotion.reduction.material_laws.choice import choose_law
 
     choice = choose_law(model, support, basis, settings.material, load_envelope, tolerance, body.path)
     if choice.law == "neohookean":
-        return choice.law, ()
+        return choice.law, (), choice.linear_error_m
     if choice.law == "stvk":
         what = f"{body.path}: linear material, with nonlinear strain"
-    return choice.law, (Simplification(what, choice.reason, choice.error_m, REDUCTION),)
+    return choice.law, (Simplification(what, choice.reason, choice.error_m, REDUCTION),), choice.linear_error_m
 
 
 def _mesh_error(mesh: FEMesh) -> float | None:

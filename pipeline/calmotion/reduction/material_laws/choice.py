@@ -39,11 +39,13 @@ class LawChoice:
         law: `linear`, `stvk` or `neohookean`.
         reason: For the user.
         error_m: Estimated error of the law at the interfaces of the body [m].
+        linear_error_m: That of the linear law [m].
     """
 
     law: str
     reason: str
     error_m: float
+    linear_error_m: float = 0.0
 
 
 def choose_law(
@@ -97,10 +99,10 @@ def choose_law(
     stvk_error = moved * strain**2
     reason = f"its deflection is about {_mm(deflection)}; a linear law would have an error of about {_mm(linear_error)}"
     if linear_error <= tolerance:
-        return LawChoice("linear", reason, linear_error)
+        return LawChoice("linear", reason, linear_error, linear_error)
     if stvk_error <= tolerance or strain <= _LARGE_STRAIN:
-        return LawChoice("stvk", f"{reason}; its strain is {strain:.1%}", stvk_error)
-    return LawChoice("neohookean", f"{reason}; its strain is {strain:.0%}", 0.0)
+        return LawChoice("stvk", f"{reason}; its strain is {strain:.1%}", stvk_error, linear_error)
+    return LawChoice("neohookean", f"{reason}; its strain is {strain:.0%}", 0.0, linear_error)
 
 
 def amplitudes(model: FEModel, basis: Basis, load_envelope: LoadEnvelope, count: int) -> Array:
