@@ -14,7 +14,7 @@ SETTINGS = "[figures.plot]\ndpi = 100\n"
 CORE = (
     "tests/support/caching", "tests/support/test_files.py", "tests/support/test_memory.py",
     "tests/support/test_worker_processes.py", "tests/host/test_choices.py", "tests/workflow/test_outputs.py",
-    "tests/workflow/running", "tests/plugins/rerun_logger/test_recording.py",
+    "tests/workflow/test_watch.py", "tests/plugins/rerun_logger/test_recording.py",
 )  # fmt: skip
 
 

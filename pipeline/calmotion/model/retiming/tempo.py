@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from calmotion.arrays import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 NEWTON_STEPS = 50  # at most; four are enough but where the tempo changes by much between two pairs
 EXACT = 1e-14  # of the length of the performance: what is nearer is the same time
@@ -30,6 +33,8 @@ class TimeMap:
 
     @cached_property
     def _spline(self) -> CubicSpline:
+        from scipy.interpolate import CubicSpline
+
         return CubicSpline(self.animation, self.performance)
 
     @property
