@@ -32,6 +32,7 @@ def bring_back(context: bpy.types.Context, character: bpy.types.Object, root: Pa
         RuntimeError: The layer does not contain this character.
     """
     scene, frame = context.scene, context.scene.frame_current
+    active, selected = context.view_layer.objects.active, list(context.selected_objects)
     before, names = set(bpy.data.objects), {kind: set(getattr(bpy.data, kind)) for kind in _KINDS}
     # From 4.3 on the importer takes a unit of the scene for a metre; the layer has those of the scene.
     converts = "apply_unit_conversion_scale" in bpy.ops.wm.usd_import.get_rna_type().properties
@@ -48,6 +49,9 @@ def bring_back(context: bpy.types.Context, character: bpy.types.Object, root: Pa
     finally:
         _remove(imported, names)
         scene.frame_set(frame)
+        for obj in selected:  # the importer selects what it adds
+            obj.select_set(True)
+        context.view_layer.objects.active = active
 
 
 def _put_on_bones(
