@@ -74,11 +74,12 @@ def reduce_body(
             model, linear.support, basis, material, law, load_envelope, tolerance, settings.pairs_share
         )
         locking = locked(model, linear.basis, basis, elasticity, load_envelope, linear_error)
-        left_out += (
-            simplifications + _omitted_strain(elasticity, body) if locking is None else (locking.told(body.path),)
-        )
+        if locking is not None:
+            left_out += (locking.told(body.path),)
         if locking is not None and locking.by_linear:
             basis, elasticity = linear.basis, None
+        else:
+            left_out += simplifications + _omitted_strain(elasticity, body)
     else:
         left_out += simplifications
     r, mesh_error = len(basis.omega_squared), _mesh_error(mesh)

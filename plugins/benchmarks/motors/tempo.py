@@ -201,7 +201,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--tempo-only", action="store_true", help="find the tempo of the rigid robot, and no curves")
     output_options(parser)
     options = parser.parse_args(arguments)
-    rows = []
+    rows, failed = [], False
     for path in options.shots:
         shot = load(path)
         full = None if options.tempo_only else _at_full_tempo(shot)
@@ -210,12 +210,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 try:
                     rows.append(measure(Path(path).stem, shot, quantity, share, full))
                 except ShotError as error:
+                    failed = True
                     print(f"{Path(path).stem}, {quantity} {share:g}: {error}", file=sys.stderr)
     if options.json:
         print(json.dumps([asdict(row) for row in rows]))
     else:
         _print(rows)
-    return int(not all(row.kept for row in rows))
+    return int(failed or not all(row.kept for row in rows))
 
 
 def _print(rows: Sequence[Row]) -> None:
