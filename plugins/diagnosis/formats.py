@@ -78,7 +78,7 @@ def read_dataset(file: str) -> tuple[SensorRecording, SensorRecording]:
         rows = episodes == episodes[0]
         if not rows.all():
             notes.append(f"{file}: of {len(np.unique(episodes))} episodes, the first is read")
-    rows &= np.concatenate([[True], np.diff(times) > 0.0]) | (np.arange(len(times)) == 0)
+    rows[1:] &= np.diff(times) > 0.0
     names, digest = _names(file, moved.shape[1]), hash_of(file)
     found = []
     for values in (moved, asked):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from calmotion.arrays import Array
@@ -80,11 +79,6 @@ def cells(rows: list[Worth]) -> list[tuple[str, ...]]:
         )
         for row in rows
     ]
-
-
-def as_json(rows: list[Worth]) -> list[dict[str, Any]]:
-    """The table for a program."""
-    return [dict(vars(row)) for row in rows]
 
 
 def _limits(limited: dict[str, int]) -> str:

@@ -7,7 +7,7 @@ import pytest
 from calmotion.model import Animation, FreeTrack, MovingFrame, Track, WeightTrack
 from calmotion.model.curves import held_curve, root_at
 from calmotion.model.retiming.performance import retimed
-from calmotion.model.retiming.tempo import TimeMap, uniform_map
+from calmotion.model.retiming.tempo import TimeMap
 from scipy.spatial.transform import Rotation
 
 FRAMES = np.arange(25) / 24.0
@@ -41,7 +41,7 @@ def test_times_of_the_animation_and_of_the_performance_are_inverse():
 
 def test_one_tempo_for_the_whole_is_the_shot_with_other_time_codes():
     given, slower = animation(), animation(1.5)
-    found = retimed(given, uniform_map(1.0, 1.5), np.arange(37) / 24.0)
+    found = retimed(given, TimeMap(np.linspace(0.0, 1.0, 4), np.linspace(0.0, 1.5, 4)), np.arange(37) / 24.0)
     times = np.linspace(0.0, 1.5, 100)
     for one, other in zip(found.tracks, slower.tracks, strict=True):
         assert held_curve(one, 1.5)(times, 0) == pytest.approx(held_curve(other, 1.5)(times, 0), abs=2e-4)

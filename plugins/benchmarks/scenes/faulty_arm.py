@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -223,8 +223,3 @@ def _moving(command: Array, length: int, rng: np.random.Generator) -> int:
     speed = np.abs(np.diff(command, axis=0)).max(axis=1)
     fast = np.flatnonzero(speed[:-length] > 0.3 * speed.max())
     return int(rng.choice(fast))
-
-
-def with_faults(arm: FaultyArm, **sizes: float) -> FaultyArm:
-    """The arm with other faults."""
-    return replace(arm, faults=sizes)

@@ -146,10 +146,12 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 def worth_of_lookahead(args: argparse.Namespace, output: Output) -> int:
     """Print what look-aheads are worth to the robot of a shot, here and for `calmotion inspect --live`."""
+    from dataclasses import asdict
+
     from calmotion.cli import console_on, print_table
     from calmotion.workflow import Hooks
 
-    from ..lookahead import as_json, cells, worth_of_lookahead
+    from ..lookahead import cells, worth_of_lookahead
     from ..opening import compiled
     from ..session import LiveSettings
 
@@ -159,7 +161,7 @@ def worth_of_lookahead(args: argparse.Namespace, output: Output) -> int:
         robot = compiled(shot, assignments(args), Hooks(progress=display, on_operator=display.done))
     rows, notes = worth_of_lookahead(robot, asked)
     if output.json:
-        output.object({"lookahead": as_json(rows), "notes": list(notes)})
+        output.object({"lookahead": [asdict(row) for row in rows], "notes": list(notes)})
         return 0
     title = f"The motion of the shot as a stream, {asked.rate:g} commands a second; errors of the simulated robot"
     heads = ("look-ahead", "behind by", "rms error", "largest error", "what limits it")

@@ -64,16 +64,6 @@ class TimeMap:
         return np.asarray(found)
 
 
-def uniform_map(length: float, stretch: float) -> TimeMap:
-    """The whole animation slower by one factor.
-
-    Args:
-        length: Of the animation [s].
-    """
-    times = np.linspace(0.0, length, 4)
-    return TimeMap(times, stretch * times)
-
-
 @dataclass(frozen=True)
 class TempoSettings:
     """How the tempo may change.
