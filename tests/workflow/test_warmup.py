@@ -2,10 +2,14 @@
 
 import json
 import os
+import threading
 
 import calmotion as cm
+import psutil
 import pytest
 from calmotion.errors import ShotError
+from calmotion.support import compilation
+from calmotion.support.compilation import compiling
 from calmotion.workflow import warmup as module
 
 
@@ -39,3 +43,48 @@ def test_a_search_compiles_nothing_after_it(calmotion_process, repository, tmp_p
     calmotion_process("optimize", shot, "-o", tmp_path / "calm.usda", env=os.environ | environment)
     after = sum(1 for _ in (tmp_path / "cache").rglob("*.nbc"))
     assert after == made["kernels"]
+
+
+@pytest.fixture
+def shared():
+    """Two processes compile, as the counts of this one see it."""
+    compiling.processes = 2
+    yield compiling
+    compiling.processes = 1
+
+
+def test_a_first_run_is_helped_by_another_process_which_ends_with_it(tmp_path, monkeypatch, shared):
+    monkeypatch.setattr(module, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(module, "processors", lambda: [0, 1])
+    told, before = [], set(psutil.Process().children())
+    with module.first_run(told.append):
+        (helper,) = set(psutil.Process().children()) - before
+        assert helper.is_running()
+    assert not helper.is_running()
+    assert len(told) == 1 and "about 30 s" in told[0]
+    (tmp_path / "kernel.1.nbc").touch()
+    with module.first_run(told.append):
+        assert set(psutil.Process().children()) == before
+    assert len(told) == 1
+
+
+def test_a_kernel_that_another_process_compiles_is_waited_for(tmp_path, monkeypatch, shared):
+    monkeypatch.setattr(compilation, "cache_place", lambda: tmp_path)
+    held, released, order = threading.Event(), threading.Event(), []
+
+    def other():
+        with shared.claimed("calmotion.kernel", ("float64",)):
+            held.set()
+            released.wait(10.0)
+            order.append("other")
+
+    thread = threading.Thread(target=other)
+    thread.start()
+    assert held.wait(10.0)
+    with shared.claimed("calmotion.kernel", ("int64",)):  # of other types: another kernel
+        pass
+    threading.Timer(0.2, released.set).start()
+    with shared.claimed("calmotion.kernel", ("float64",)):
+        order.append("this")
+    thread.join()
+    assert order == ["other", "this"]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from calmotion.cli.options import opened_shot, progress_display, run_arguments, simulation_arguments
-from calmotion.cli.output import FAILED, INTERRUPTED, Output, conclude
+from calmotion.cli.output import FAILED, INTERRUPTED, Output, conclude, notice
 from calmotion.host import SettingError
 from calmotion.model.run import OutputPaths
 from calmotion.workflow.results import SimulationResult
@@ -34,9 +35,11 @@ def run_shot(
         SettingError: When an option or setting does not fit.
     """
     from calmotion.cli.reports.run import print_run
+    from calmotion.workflow.warmup import first_run
 
     shot = shot_to_run(args)
-    result, report = run_once(function, shot, args, args.quiet, **options)
+    with first_run(lambda line: None if args.quiet or sys.stderr.isatty() else notice(line)):  # a terminal has bars
+        result, report = run_once(function, shot, args, args.quiet, **options)
     conclude(report, result.problems, output, None if args.quiet else partial(print_run, verbose=args.verbose))
     return status_of(result, report, args)
 

@@ -30,5 +30,6 @@ from calmotion.multibody.runs import linearize as linearize
 from calmotion.multibody.runs import natural_modes as natural_modes
 from calmotion.multibody.runs import simulate as simulate
 from calmotion.multibody.sensitivity.linearization import processors as processors
+from calmotion.multibody.statics.equilibrium import compile_joint_rows as compile_joint_rows
 from calmotion.multibody.statics.equilibrium import equilibrium as equilibrium
 from calmotion.reduction.reduced_body import ReducedBody as ReducedBody

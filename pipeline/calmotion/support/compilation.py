@@ -10,13 +10,14 @@ and with a version of numba that is not known, kernels are compiled by `numba.nj
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import re
 import stat
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -32,6 +33,7 @@ from calmotion.support.caching.cache_folder import KERNELS, cache_folder
 from calmotion.support.caching.caches import mark_used, prune
 from calmotion.support.caching.sources import digest_of, with_imports
 from calmotion.support.files import is_own
+from calmotion.support.operating_system import locked
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -53,12 +55,14 @@ class Compilation(event.Listener):  # type: ignore[misc]
         compiled: Number of kernels.
         kernel: The one that is being compiled; empty where none is.
         seconds: Processor time of those that are compiled, kernels within kernels counted once [s].
+        processes: That compile for one cache now, this one included, and wait for each other's kernels.
     """
 
     TYPICAL = 220  # kernels of a shot with flexible links: the bartender with empty caches
 
     def __init__(self) -> None:
         self.compiled, self.kernel, self.seconds = 0, "", 0.0
+        self.processes = 1
         self._depth, self._begin = 0, 0.0
         event.register("numba:compile", self)
 
@@ -83,10 +87,35 @@ class Compilation(event.Listener):  # type: ignore[misc]
         if self.compiled < self.TYPICAL // 10:
             return None
         spent = self.seconds + (time.process_time() - self._begin if self._depth else 0.0)
-        return max(0.0, spent / self.compiled * (self.TYPICAL - self.compiled))
+        there = self.compiled if self.processes == 1 else kernels_in(cache_place())
+        return max(0.0, spent / self.compiled * (self.TYPICAL - there) / self.processes)
+
+    @contextlib.contextmanager
+    def claimed(self, name: str, arguments: object) -> Iterator[None]:
+        """While a kernel is compiled: wait for another process that compiles it, and has put it in the cache then.
+
+        Args:
+            name: Of the kernel, with its module.
+            arguments: Their types.
+        """
+        if self.processes == 1:
+            yield
+            return
+        self.kernel = name.rpartition(".")[2]
+        digest = hashlib.sha256(str(arguments).encode()).hexdigest()[:8]
+        try:
+            with locked(cache_place(), f"{name}.{digest}.claim"):
+                yield
+        finally:
+            self.kernel = self.kernel if self._depth else ""
 
 
 compiling = Compilation()
+
+
+def kernels_in(folder: Path) -> int:
+    """Number of the compiled kernels in a folder of the cache."""
+    return sum(1 for _ in folder.rglob("*.nbc"))
 
 
 def is_plain() -> bool:
@@ -176,7 +205,9 @@ def _compile(function: Function, *, inline: str = "never", one_copy: bool = Fals
             return cast(Function, njit(cache=_is_private(cache_place()), fastmath=FUSED, nogil=not arrays)(function))
         from calmotion.support.numba_internals import compiled
 
-        return cast(Function, compiled(function, {"fastmath": FUSED, "inline": inline}, one_copy, arrays))
+        return cast(
+            Function, compiled(function, {"fastmath": FUSED, "inline": inline}, one_copy, arrays, compiling.claimed)
+        )
     finally:
         config.CACHE_DIR = before
 

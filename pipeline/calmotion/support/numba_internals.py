@@ -17,7 +17,7 @@ import importlib
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -227,7 +227,10 @@ def called_by_kernel() -> Iterator[None]:
         _thread.callers -= 1
 
 
-def compiled(function: Callable[..., Any], options: dict[str, Any], one_copy: bool, arrays: bool) -> Any:
+Claim = Callable[..., contextlib.AbstractContextManager[object]]
+
+
+def compiled(function: Callable[..., Any], options: dict[str, Any], one_copy: bool, arrays: bool, claim: Claim) -> Any:
     """A function that numba compiles when it is first called.
 
     Args:
@@ -235,6 +238,7 @@ def compiled(function: Callable[..., Any], options: dict[str, Any], one_copy: bo
         options: Of `numba.njit`.
         one_copy: Whether its callers share its machine code, see `_share`.
         arrays: Whether it makes arrays.
+        claim: Gives, for its name and types, the context in which it is compiled, so that no other process does.
     """
     without = {} if arrays else _WITHOUT_ARRAYS
     dispatcher = njit(cache=True, pipeline_class=KernelCompiler, **options, **without)(function)
@@ -243,15 +247,18 @@ def compiled(function: Callable[..., Any], options: dict[str, Any], one_copy: bo
         Path(stored.cache_path), dispatcher.py_func.__module__, stored._impl.filename_base,
         stored._impl.locator.get_source_stamp(), dumps, is_called_by_kernel,
     )  # fmt: skip
-    return with_entrance_for_python(dispatcher, one_copy)
+    return with_entrance_for_python(
+        dispatcher, one_copy, partial(claim, f"{function.__module__}.{function.__qualname__}")
+    )
 
 
-def with_entrance_for_python(dispatcher: Any, one_copy: bool = False) -> Any:
+def with_entrance_for_python(dispatcher: Any, one_copy: bool = False, claim: Claim = contextlib.nullcontext) -> Any:
     """A function, compiled by numba, that is compiled with an entrance for Python when Python calls it.
 
     Args:
         dispatcher: From `numba.njit`.
         one_copy: As of `compiled`.
+        claim: The same of its types alone.
     """
     compile_, add_overload = dispatcher.compile, dispatcher.add_overload
     without: set[Any] = set()
@@ -263,7 +270,8 @@ def with_entrance_for_python(dispatcher: Any, one_copy: bool = False) -> Any:
             if arguments in without and not is_called_by_kernel():
                 without.remove(arguments)
                 del dispatcher.overloads[arguments]
-            return compile_(signature)
+            with claim(arguments):
+                return compile_(signature)
 
     def add(result: Any) -> None:
         if one_copy:

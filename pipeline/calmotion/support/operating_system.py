@@ -36,14 +36,14 @@ def module(name: str) -> Any:
 
 
 @contextlib.contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Wait until no other thread or process is in such a block with the same folder, which is there.
+def locked(folder: Path, name: str = LOCK) -> Iterator[None]:
+    """Wait until no other thread or process is in such a block with the same folder, which is there, and name.
 
     File systems that cannot lock, and folders that cannot be written, run the block at once.
     """
     from filelock import FileLock
 
-    lock = FileLock(folder / LOCK)
+    lock = FileLock(folder / name)
     with contextlib.suppress(OSError, NotImplementedError):
         lock.acquire()
     try:

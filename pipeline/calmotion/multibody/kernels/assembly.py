@@ -172,7 +172,7 @@ def _parent_stiffness(system: System, joint: int, angle: float, w: Work, blocks:
 
 
 @shared_kernel
-def _joint_rows(
+def joint_rows(
     system: System, integrator: Integrator, joint: int, angle: float, rate: float, state: State, Hv: Array,
     tangent: bool, w: Work, blocks: Blocks,
 ) -> None:  # fmt: skip
@@ -228,4 +228,4 @@ def assemble(
         for b in range(count):
             _follow_positions(6 + system.elastic[b], acceleration, Hv[b], blocks.D[b], blocks.P[b], blocks.K[b])
     for joint in range(len(system.rows)):
-        _joint_rows(system, integrator, joint, angle[joint], rate[joint], state, Hv, tangent, w, blocks)
+        joint_rows(system, integrator, joint, angle[joint], rate[joint], state, Hv, tangent, w, blocks)

@@ -8,7 +8,7 @@ from calmotion.arrays import Array
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.newton import correct, largest_entry, rounding_floor, worst_component
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.kernels.assembly import assemble
+from calmotion.multibody.kernels.assembly import assemble, joint_rows
 from calmotion.multibody.linear_solver.closed_chains import factor_closed_chains, solve_system
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.least_multipliers import least_multipliers
@@ -40,6 +40,12 @@ def linearize(system: System, state: State, angle: Array, ws: Workspace) -> None
     Hv[:] = 0.0
     Vd[:] = 0.0
     assemble(system, STATIC, state, Vd, angle, np.zeros_like(angle), Hv, True, ws.work, ws.blocks)
+
+
+def compile_joint_rows(system: System) -> None:
+    """Compile the largest part of what `linearize` compiles, and its last."""
+    ws = Workspace.for_system(system)
+    joint_rows(system, STATIC, 0, 0.0, 0.0, allocate_state(system), ws.scratch.Hv, True, ws.work, ws.blocks)
 
 
 def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tuple[State, int]:

@@ -25,7 +25,7 @@ from calmotion.reduction.basis.craig_bampton import Basis, mode_signs
 from calmotion.reduction.basis.fixed_interface import FixedInterface
 from calmotion.reduction.basis.natural_modes import vector_mass
 from calmotion.reduction.elements.assembly import FEModel
-from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, second_order_force
+from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants
 from calmotion.reduction.elements.patch_rotation import (
     shape_changes,
     spring_rows,
@@ -111,7 +111,7 @@ def modal_derivatives(
     n, p = len(nodes), len(support.patches)
     lame, mu = lame_constants(material.youngs_modulus, material.poissons_ratio)
     rule = GradientRule(model.mesh, LAW_ORDER)
-    gradients = rule.gradients(np.ascontiguousarray(basis.modes[:, :, :count]))
+    gradients = np.ascontiguousarray(rule.gradients(np.ascontiguousarray(basis.modes[:, :, :count])))
     first, second = np.triu_indices(count)
     pairs = len(first)
     arms = [nodes[patch] - center for patch, center in zip(support.patches, support.centers, strict=True)]
@@ -125,7 +125,7 @@ def modal_derivatives(
     imposed = np.zeros((n, 3, pairs + at))
     for k, (i, j) in enumerate(zip(first, second, strict=True)):
         interrupts.check()
-        force[:, :, k] = second_order_force(rule, gradients[i], gradients[j], lame, mu, law)
+        force[:, :, k] = rule.second_order_force(gradients[i], gradients[j], lame, mu, law)
     change_sizes = np.einsum("pms,pmq->sq", changes, squares(basis.patch_motion[:, 3:, :count]))
     for k, (patch, arm) in enumerate(zip(support.patches, arms, strict=True)):
         imposed[patch] = square_fields(arm) @ changes[k] @ np.hstack([change_sizes, np.eye(at)])

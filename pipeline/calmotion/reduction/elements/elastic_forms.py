@@ -12,6 +12,7 @@ from calmotion.arrays import Array
 from calmotion.mesh.quadratic import QuadraticMesh
 from calmotion.reduction.elements.assembly import corner_gradients
 from calmotion.reduction.elements.green_strain_fields import green_fields
+from calmotion.reduction.elements.second_order_forces import add_second_order_forces
 from calmotion.support import interrupts
 
 # Order of the rule of elastic laws. It is exact for small strains of quadratic elements, as their order of convergence
@@ -55,47 +56,24 @@ class GradientRule:
         local = modes[self._tets[elements]]  # [m, 10, 3, r]
         return np.asarray(np.einsum("eair,ajeq->reqij", local, self._shape[:, :, elements], optimize=True))
 
-    def nodal_forces(self, stress: Array) -> Array:
-        """int P : grad N, shape [n, 3], of a stress field P of shape [m, q, 3, 3] [Pa]."""
-        local = np.einsum("eqij,ajeq,eq->eai", stress, self._shape, self.weights, optimize=True)
-        out = np.zeros((self._nodes, 3))
-        np.add.at(out, self._tets, local)
-        return out
+    def second_order_force(self, A: Array, B: Array, lame: float, mu: float, material: str) -> Array:
+        """Second derivative of the internal force in the directions of two fields [N], shape [n, 3].
+
+        Args:
+            A, B: Gradients of the fields at the points, shape [m, q, 3, 3].
+            lame, mu: Lame's constants [Pa].
+            material: `stvk` (St. Venant-Kirchhoff) or `neohookean`.
+        """
+        force = np.zeros((self._nodes, 3))
+        stvk, scratch = material == "stvk", np.empty((4, 3, 3))
+        add_second_order_forces(self._tets, self._shape, self.weights, A, B, lame, mu, stvk, scratch, force)
+        return force
 
 
 def linear_stress(G: Array, lame: float, mu: float) -> Array:
     """C : sym(G) [Pa], shape of G [..., 3, 3]."""
     trace = np.trace(G, axis1=-2, axis2=-1)[..., None, None]
     return np.asarray(mu * (G + np.swapaxes(G, -1, -2)) + lame * trace * np.eye(3))
-
-
-def second_order_stress(A: Array, B: Array, lame: float, mu: float, material: str) -> Array:
-    """P''[A, B] [Pa] of two displacement gradients, shapes [..., 3, 3].
-
-    Args:
-        material: `stvk` (St. Venant-Kirchhoff) or `neohookean`.
-
-    Source: the second derivative of S = C:E, P = F S with E = sym(G) + G^T G/2, or of
-    P = mu (F - F^-T) + lame ln(J) F^-T, at F = E.
-    """
-    At, Bt = np.swapaxes(A, -1, -2), np.swapaxes(B, -1, -2)
-    if material == "stvk":
-        return linear_stress(At @ B, lame, mu) + A @ linear_stress(B, lame, mu) + B @ linear_stress(A, lame, mu)
-    trace_a = np.trace(A, axis1=-2, axis2=-1)[..., None, None]
-    trace_b = np.trace(B, axis1=-2, axis2=-1)[..., None, None]
-    product = np.einsum("...ij,...ji->...", A, B)[..., None, None]
-    return np.asarray(-mu * (At @ Bt + Bt @ At) - lame * (trace_a * Bt + trace_b * At + product * np.eye(3)))
-
-
-def second_order_force(
-    rule: GradientRule, A: Array, B: Array, lame: float, mu: float, material: str
-) -> Array:  # fmt: skip
-    """Second derivative of the internal force in the directions of two fields [N], shape [n, 3].
-
-    Args:
-        A, B: Gradients of the fields at the rule's points, shape [m, q, 3, 3].
-    """
-    return rule.nodal_forces(second_order_stress(A, B, lame, mu, material))
 
 
 def lame_constants(youngs_modulus: float, poissons_ratio: float) -> tuple[float, float]:
