@@ -32,6 +32,8 @@ class RunSettings:
             play does not count.
         retime: How the tempo may change; None: not at all.
         limited_by_tempo: Whether a tempo keeps the limits that it can, so that a search need not.
+        narrowed: Shares of the limits within which a search keeps each motor, by the name of the quantity; those of
+            others are kept as they are.
         robust: Settings of an optimisation for a set of robots; None: for the nominal robot alone.
     """
 
@@ -52,6 +54,7 @@ class RunSettings:
     avoid_reversals: float = 0.0
     retime: TempoSettings | None = None
     limited_by_tempo: bool = False
+    narrowed: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     @property
     def scheme(self) -> str:

@@ -122,7 +122,8 @@ def _optimized(
     fixed = searched.hold()
     curves, x = found_curves(problem, len(character.motors), search.x)
     after = problem.at(x)
-    costs = {} if searched.interrupted else limit_costs(after, fixed)
+    # at a tempo of its own, limits cost time
+    costs = {} if searched.interrupted or options.retime is not None else limit_costs(after, fixed)
     wall = time.perf_counter() - begin
     rows = left_out_rows(prepared)
     rows += search_rows(problem, character, curves, searched.inactive, options, searched.idle_gain)

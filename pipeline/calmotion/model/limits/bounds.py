@@ -25,6 +25,10 @@ class Bounds:
     upper: Array
     scale: Array
 
+    def narrowed(self, shares: Array) -> Bounds:
+        """So large shares of these bounds, shape [M]."""
+        return Bounds(self.lower * shares, self.upper * shares, self.scale)
+
 
 def motor_bounds(character: Character, movable: BoolArray | None = None) -> dict[str, Bounds]:
     """Bounds by the name of their quantity; only quantities of which some motor has one.

@@ -176,6 +176,7 @@ def unknowns(
     bounds = motor_bounds(character, np.any(coupling, axis=1))
     if options.limited_by_tempo:
         bounds = {name: bound for name, bound in bounds.items() if name not in TEMPO_LIMITS}
+    bounds |= {name: bounds[name].narrowed(np.array(shares)) for name, shares in options.narrowed if name in bounds}
     continuous = options.adjoint == "continuous"
     if continuous and ("effort" in bounds or grid.cyclic):
         raise ShotError(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -20,6 +21,7 @@ from calmotion.model.retiming.performance import retimed, with_contacts_at
 from calmotion.model.retiming.retimed import Retimed
 from calmotion.model.retiming.tempo import TimeMap
 from calmotion.model.run import RunSettings
+from calmotion.retargeting.input_run import with_input_resolved
 from calmotion.retargeting.retiming.program import NOTICED
 from calmotion.retargeting.retiming.rigid_robot import tempo_input
 from calmotion.retargeting.retiming.settings import refuse_tempo
@@ -32,12 +34,14 @@ from calmotion.tolerance.motors.animation_limits import tempo_limits
 from calmotion.tolerance.pod_subspace import ReferenceRun
 from calmotion.tolerance.reduced_bodies import RunMemory
 from calmotion.tolerance.simulation import found_tracks
+from calmotion.tolerance.step_choice import chooses_step
 
-ROUNDS = 4  # searches at most, of which the last keeps all limits by itself
-KEPT = 1e-6  # share of a limit by which it counts as kept
+ROUNDS = 3  # searches at most that leave limits to the tempo
+LIMITED_SEARCHES = 4  # at most that keep all limits by themselves
+KEPT, BETWEEN = 1e-6, 5e-4  # shares of a limit by which it counts as kept: by a tempo, and between a search's instants
 ROOM = 5e-3  # share of a limit by which the tempo stays further within it once offsets are known
 MOST_ROOM = 0.05  # share of a limit, beyond which a search that keeps it is better than more room
-FINE = 8  # instants of a frame at which curves are compared with their limits
+FINE = 32  # instants of a frame at which curves are compared with their limits
 
 
 def optimize_with_tempo(
@@ -49,46 +53,98 @@ def optimize_with_tempo(
     Raises:
         ShotError: Pinned times and limits contradict each other, or the shot cannot be processed.
     """
-    settings, plain = options.retime, replace(options, retime=None)
+    settings = options.retime
     if settings is None:
-        return optimize_to_tolerance(shot, plain, progress, checkpoint, known, memory)
+        return optimize_to_tolerance(shot, options, progress, checkpoint, known, memory)
     refuse_tempo(shot.character, shot.animation, settings)
     progress(0.0, "choosing the tempo")
-    given = tempo_input(shot, plain, shot.animation.tracks)
+    given = tempo_input(shot, options, shot.animation.tracks)
     found = find_tempo(given, settings, shot.character.path)
     if found.map is None:
-        result = optimize_to_tolerance(shot, plain, progress, checkpoint, known, memory)
+        result = optimize_to_tolerance(shot, replace(options, retime=None), progress, checkpoint, known, memory)
         return replace(result, retimed=Retimed(shot.animation, shot.character, found.report))
-    uniform, bound = found.report.uniform_added, found.report.lower_bound
-    performance, limits, done = _Performance.of(shot, given, found), given.limits, None
-    last = found.excess > NOTICED  # where nothing may be slower, a search has to keep the limits
-    for number in range(1, ROUNDS + 1):
-        last = last or number == ROUNDS
-        of_round = replace(plain, limited_by_tempo=not last, robust=None)
-        latest = optimize_to_tolerance(performance.shot, of_round, progress, checkpoint)
-        done = latest if done is None else continued(done, latest)
-        used = performance.used(latest)
-        over = max(float(np.max(share, initial=0.0)) for share in used.values()) - 1.0
-        if last or done.interrupted or over <= KEPT:
+    searches = _Searches(options, progress, checkpoint)
+    performance, limits = _Performance.of(shot, given, found), given.limits
+    kept = False
+    for _ in range(ROUNDS):
+        if found.excess > NOTICED:  # where nothing may be slower, a search has to keep the limits
             break
-        if over > MOST_ROOM:  # commands far ahead of their motors: bending them a little costs less than time
-            last = True
-            continue
+        done = searches.searched(performance.shot, limited_by_tempo=True)
+        used = performance.used(done)
+        over = _excess(used)
+        kept = over <= KEPT
+        # commands far ahead of their motors: bending them a little costs less than time
+        if done.interrupted or kept or over > MOST_ROOM:
+            break
         progress(0.0, "choosing the tempo for the curves that were found")
         limits = _narrowed(limits, used)
-        narrow = replace(given, limits=limits, efforts=performance.efforts(latest))
         try:
-            other = find_tempo(narrow, settings, shot.character.path)
+            other = find_tempo(
+                replace(given, limits=limits, efforts=performance.efforts(done)), settings, shot.character.path
+            )
         except ShotError:  # pinned times leave no room
-            other, last = found, True
+            break
+        uniform, bound = found.report.uniform_added, found.report.lower_bound
         found = replace(other, report=replace(other.report, uniform_added=uniform, lower_bound=bound))
-        last = last or found.excess > NOTICED
-        performance = performance.moved(latest, found)
-    assert done is not None
-    if plain.robust is not None and not done.interrupted:
-        tracks = found_tracks(done, performance.shot.animation)
-        done = continued(done, optimize_to_tolerance(performance.shot.with_tracks(tracks), plain, progress, checkpoint))
+        performance = performance.moved(done, found)
+    if not (kept or searches.interrupted):
+        _search_within_limits(performance, searches)
+    tracks = found_tracks(searches.done, performance.shot.animation)
+    if options.robust is not None and not searches.interrupted:
+        searches.searched(performance.shot.with_tracks(tracks), robust=options.robust)
+    done = searches.with_input_resolved(performance.shot)
     return replace(done, retimed=performance.retimed)
+
+
+class _Searches:
+    """Searches one after the other, each of almost the motion of the last.
+
+    Attributes:
+        done: The result of the last, with the work of all.
+    """
+
+    done: Result
+
+    def __init__(self, options: RunSettings, progress: Progress, checkpoint: Path | None):
+        self._options = replace(options, robust=None)
+        self._progress, self._checkpoint, self._memory, self._count = progress, checkpoint, RunMemory(), 0
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the user ended one of them."""
+        return self._count > 0 and self.done.interrupted
+
+    def searched(self, shot: CompiledShot, **options: Any) -> Result:
+        """The result of one more, with other settings."""
+        latest = optimize_to_tolerance(
+            shot, replace(self._options, **options), self._progress, self._checkpoint, memory=self._memory
+        )  # fmt: skip
+        self.done = continued(self.done, latest) if self._count else latest
+        self._count += 1
+        return self.done
+
+    def with_input_resolved(self, shot: CompiledShot) -> Result:
+        """The result, whose input is simulated as well as that of a single search."""
+        if self._count == 1 or self.interrupted or not chooses_step(shot.character, self._options):
+            return self.done
+        return with_input_resolved(self.done, shot.with_tracks(shot.animation.tracks), self._options)
+
+
+def _search_within_limits(performance: _Performance, searches: _Searches) -> None:
+    """Search with all limits. Those that curves exceed between the instants of a search are narrowed by the excess."""
+    character = performance.shot.character
+    shot, shares = performance.shot, {name: np.ones(len(character.motors)) for name in TEMPO_LIMITS}
+    for _ in range(LIMITED_SEARCHES):
+        done = searches.searched(shot, narrowed=tuple((name, tuple(share.tolist())) for name, share in shares.items()))
+        used = performance.used(done)
+        if done.interrupted or _excess(used) <= BETWEEN:
+            break
+        shares = {name: share / np.maximum(1.0, used[name]) for name, share in shares.items()}
+        shot = shot.with_tracks(found_tracks(done, shot.animation))
+
+
+def _excess(used: dict[str, Array]) -> float:
+    return max(float(np.max(share, initial=0.0)) for share in used.values()) - 1.0
 
 
 def _narrowed(limits: TempoLimits, used: dict[str, Array]) -> TempoLimits:
