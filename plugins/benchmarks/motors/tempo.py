@@ -3,7 +3,7 @@
 `calmotion bench tempo SHOT ...` gives each motor of a shot limits of speed or effort that are a share of what the
 animation needs, and finds tempo and curves. Added times are compared with the lower bound of the rigid robot, with
 what TOPP-RA adds (where the package `toppra` is there; it knows no efforts here), and with one tempo for the whole.
-Limits are checked on fine samples of the curves, efforts in a simulation by half of the step. The command fails where
+Limits are checked on fine samples of the curves, efforts in a simulation by Newmark's scheme and a quarter of the step. The command fails where
 a limit is exceeded by more than a thousandth, or the error is above the tolerance and above that at full tempo.
 """
 
@@ -149,7 +149,7 @@ def excess_of(limited: CompiledShot, result: Result, quantity: str) -> float:
         values = commanded_curves(performance.character, animation, result)(times, 0)
         reached = np.abs(np.diff(values, axis=0)).max(axis=0) / (times[1] - times[0])
         return float(np.max(reached / [motor.max_velocity for motor in motors])) - 1.0
-    finer = RunSettings(step=0.5 * result.step_s, pre_roll=result.pre_roll_s)
+    finer = RunSettings(step=0.25 * result.step_s, pre_roll=result.pre_roll_s, integrator="newmark")
     run = simulate_shot(
         performance.with_tracks(found_tracks(result, animation)), finer, lambda fraction, message: None
     ).before.motion  # fmt: skip

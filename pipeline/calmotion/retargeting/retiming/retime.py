@@ -29,7 +29,7 @@ from calmotion.retargeting.retiming.tempo import FoundTempo, TempoInput, find_te
 from calmotion.retargeting.to_tolerance import continued, optimize_to_tolerance
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.tempo import TEMPO_LIMITS, MotorEfforts, TempoLimits
-from calmotion.simulation.simulate import Progress
+from calmotion.simulation.simulate import Progress, simulate_shot
 from calmotion.tolerance.motors.animation_limits import tempo_limits
 from calmotion.tolerance.pod_subspace import ReferenceRun
 from calmotion.tolerance.reduced_bodies import RunMemory
@@ -201,12 +201,22 @@ class _Performance:
         assert result.after is not None
         limits, frames = tempo_limits(self.made.character), self.retimed.animation.frame_times
         times = np.linspace(0.0, frames[-1], FINE * (len(frames) - 1) + 1)
-        curves, motion = self._curves(result), result.after.motion
-        values = [curves(times, 1), curves(times, 2), curves(times, 3), motion.motor_efforts[motion.judged]]
+        curves = self._curves(result)
+        values = [curves(times, 1), curves(times, 2), curves(times, 3), self._efforts(result)]
         return {
             name: np.max(np.abs(v), axis=0, initial=0.0) / getattr(limits, name)
             for name, v in zip(TEMPO_LIMITS, values, strict=True)
         }
+
+    def _efforts(self, result: Result) -> Array:
+        """Efforts in a result, and as half of its steps show them, shape [n, M]."""
+        assert result.after is not None
+        motions = [result.after.motion]
+        if np.any(np.isfinite(self.given.limits.effort)) and not result.interrupted:
+            shot = self.shot.with_tracks(found_tracks(result, self.shot.animation))
+            finer = RunSettings(step=0.5 * result.step_s, pre_roll=result.pre_roll_s)
+            motions.append(simulate_shot(shot, finer, lambda fraction, message: None).before.motion)
+        return np.concatenate([motion.motor_efforts[motion.judged] for motion in motions])
 
     def efforts(self, result: Result) -> MotorEfforts | None:
         """Those of the rigid robot, and what the motion of a result takes beside them, by the square of the tempo."""
