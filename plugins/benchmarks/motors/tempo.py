@@ -3,8 +3,9 @@
 `calmotion bench tempo SHOT ...` gives each motor of a shot limits of speed or effort that are a share of what the
 animation needs, and finds tempo and curves. Added times are compared with the lower bound of the rigid robot, with
 what TOPP-RA adds (where the package `toppra` is there; it knows no efforts here), and with one tempo for the whole.
-Limits are checked on fine samples of the curves, efforts in a simulation by Newmark's scheme and a quarter of the step. The command fails where
-a limit is exceeded by more than a thousandth, or the error is above the tolerance and above that at full tempo.
+Limits are checked on fine samples of the curves, efforts in a simulation by Newmark's scheme and a quarter of the
+step. The command fails where a limit is exceeded by more than a thousandth, or the error is above the tolerance and
+above that at full tempo.
 """
 
 from __future__ import annotations

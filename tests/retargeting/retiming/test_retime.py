@@ -11,9 +11,9 @@ from calmotion.model.curves import commanded_curves, held_curve
 from calmotion.model.retiming.tempo import TempoSettings
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.retiming.retime import optimize_with_tempo
+from calmotion.retargeting.retiming.rigid_robot import tempo_input
 from calmotion.retargeting.retiming.settings import pinned_times, refuse_tempo
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
-from calmotion.retargeting.retiming.rigid_robot import tempo_input
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.tolerance.simulation import found_tracks
@@ -47,7 +47,8 @@ def exceeded(shot, found, quantity):
     motors, animation = performance.character.motors, performance.animation
     if quantity == "effort":
         finer = performance.with_tracks(found_tracks(found, animation))
-        run = simulate_shot(finer, replace(OPTIONS, step=0.25 * found.step_s, integrator="newmark"), ignore_progress).before.motion
+        options = replace(OPTIONS, step=0.25 * found.step_s, integrator="newmark")
+        run = simulate_shot(finer, options, ignore_progress).before.motion
         reached, largest = run.motor_efforts[run.judged], [motor.max_torque for motor in motors]
     else:
         order = ("velocity", "acceleration", "jerk").index(quantity) + 1
