@@ -34,7 +34,7 @@ def Xform "Robot" (prepend apiSchemas = ["PhysicsArticulationRootAPI"])
     def Material "Steel" (prepend apiSchemas = ["PhysicsVolumeDeformableMaterialAPI", "CalmDampingAPI"])
     {{
         float physics:youngsModulus = {modulus}
-        float physics:poissonsRatio = 0.29
+        float physics:poissonsRatio = 0.0
         float physics:density = 7850
         float calm:damping:ratio = 0.1
     }}
@@ -99,7 +99,7 @@ def test_the_share_is_that_of_a_spring_that_stiffens():
 
 
 def test_a_steel_strip_swings_as_a_beam_does(tmp_path):
-    """More than six thicknesses far, where its modes alone resist."""
+    """More than six thicknesses far, by nonlinear strain."""
     times = np.arange(151) / 100.0
     s = np.clip(times / 0.5, 0.0, 1.0)
     angles = 0.2 * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
@@ -109,8 +109,7 @@ def test_a_steel_strip_swings_as_a_beam_does(tmp_path):
     (tmp_path / "strip.usda").write_text(text)
     result = cm.simulate(tmp_path / "strip.usda", tolerance="0.5mm")
     report = result.report()
-    row = next(row for row in report["left_out"] if row["what"] == "/Robot/Link: linear elasticity")
-    assert "strips lock" in row["why"] and row["estimated_error_m"] < 2e-3
+    assert not any("linear elasticity" in row["what"] for row in report["left_out"])
 
     # tip of a Euler-Bernoulli beam without mass that carries the load
     EI = MODULUS * WIDTH * THICKNESS**3 / 12.0
@@ -126,4 +125,4 @@ def test_a_steel_strip_swings_as_a_beam_does(tmp_path):
     beam = solve_ivp(rates, (0.0, 1.5), np.zeros(4), t_eval=times, rtol=1e-8, atol=1e-10).y[0]
     assert np.abs(beam).max() > 6.0 * THICKNESS
     largest = report["targets"][0]["max_error_m"]
-    assert largest == pytest.approx(np.abs(beam).max(), rel=0.06)
+    assert largest == pytest.approx(np.abs(beam).max(), rel=0.05)

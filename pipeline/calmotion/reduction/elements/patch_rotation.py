@@ -30,6 +30,7 @@ _PLANE = 3  # changes of shape of a plane patch, at most
 # Smallest eigenvalue of a change of shape, of the largest. Without the smaller ones a patch rotates to first order in
 # them, and resists: with 0.1 a link with a rounded end was 0.4 to 0.9% too stiff at four degrees.
 _FLAT = 1e-3
+_ROUNDING = 1e-12  # likewise, of points on a line
 _ROWS, _COLUMNS = (0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)  # of the six entries of a symmetric matrix
 
 
@@ -77,7 +78,10 @@ def shape_changes(arms: Array) -> Array:
     fields = square_fields(arms).reshape(-1, 6)
     changes = fields - rigid @ np.linalg.lstsq(rigid, fields, rcond=None)[0]
     values, vectors = np.linalg.eigh(changes.T @ changes)
-    return vectors[:, values > _FLAT * max(float(np.linalg.eigvalsh(fields.T @ fields)[-1]), np.finfo(float).tiny)]
+    # a thin face shrinks across by little; without a coordinate for that its turn strains the link as a wide face does
+    _, middle, widest = np.linalg.eigvalsh(arms.T @ arms)
+    thin = max(_FLAT * middle / max(widest, np.finfo(float).tiny), _ROUNDING)
+    return vectors[:, values > thin * max(float(np.linalg.eigvalsh(fields.T @ fields)[-1]), np.finfo(float).tiny)]
 
 
 def stiffer(tolerance: float) -> float:

@@ -1,7 +1,7 @@
 """Whether a reduced body with quadratic strain is too stiff: the static deflection by its largest load.
 
-Bending curves a wide thin strip across its width. At deflections of a few thicknesses a real strip becomes flat across
-(Searle 1908; Ashwell, The anticlastic curvature of rectangular beams and plates, 1950). The modes and their derivatives
+Bending curves a wide thin strip across its width. At deflections of many thicknesses a real strip becomes flat across
+(Searle 1908; Ashwell, The anticlastic curvature of rectangular beams and plates, 1950). Few modes and their derivatives
 lack this change of shape, and the reduced strip stretches instead.
 """
 
