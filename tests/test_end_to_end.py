@@ -26,7 +26,7 @@ def test_the_demo_writes_a_layer_a_recording_a_table_and_pictures(run):
     written = {path.name for path in folder.iterdir()}
     assert written == {
         "bartender.usda", "bartender_calm.usda", "bartender_calm_root.usda", "bartender.rrd", "bartender.csv",
-        "figures",
+        "bartender.html", "figures",
     }  # fmt: skip
     assert (folder / "figures" / "filmstrip.png").read_bytes().startswith(b"\x89PNG")
 

@@ -110,8 +110,8 @@ class FindSystemModes(Operator):
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         source, paths = data.get(Source), data.get(OutputPaths)
         if source is not None and source.command != "inspect" and paths is not None:
-            if not paths.figures and not paths.rrd:
-                return NotAsked("only figures and recordings show frequencies, and none are requested")
+            if not (paths.figures or paths.rrd or paths.html):
+                return NotAsked("only figures, recordings and pages show frequencies, and none are requested")
         character = data.get(Character)
         return None if character is not None and motors_give(character) else no_flexible_bodies(data)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -33,18 +33,22 @@ def draw_calibration(folder: str, calibration: Calibration, dpi: int = 150) -> l
     target = Path(folder)
     try:
         target.mkdir(parents=True, exist_ok=True)
-        written = []
-        for page, first in enumerate(range(0, len(calibration.curves), CHANNELS_ON_A_PAGE)):
-            some = calibration.curves[first : first + CHANNELS_ON_A_PAGE]
-            name = "measured" if len(calibration.curves) <= CHANNELS_ON_A_PAGE else f"measured_{page + 1}"
-            written.append(save(plot_signals(some), target / f"{name}.png", dpi))
-        written.append(save(plot_residual_spectra(calibration.curves), target / "residual_spectra.png", dpi))
-        written.append(save(plot_intervals(calibration), target / "intervals.png", dpi))
+        written = [save(figure, target / f"{name}.png", dpi) for name, _, figure in plots_of(calibration)]
     except OSError as error:
         raise ShotError(
             "the figures cannot be written", path=folder, found=error.strerror, remedy="Choose another folder"
         ) from error
     return written
+
+
+def plots_of(calibration: Calibration) -> Iterator[tuple[str, str, Figure]]:
+    """For each figure the name of its file, a heading, and the figure."""
+    for page, first in enumerate(range(0, len(calibration.curves), CHANNELS_ON_A_PAGE), start=1):
+        some = calibration.curves[first : first + CHANNELS_ON_A_PAGE]
+        name = "measured" if len(calibration.curves) <= CHANNELS_ON_A_PAGE else f"measured_{page}"
+        yield name, "Measured and simulated", plot_signals(some)
+    yield "residual_spectra", "Spectra of what is not explained", plot_residual_spectra(calibration.curves)
+    yield "intervals", "Parameters", plot_intervals(calibration)
 
 
 def plot_signals(curves: Sequence[ChannelCurves]) -> Figure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -26,12 +27,19 @@ def draw_diagnosis(folder: str, diagnosis: Diagnosis, dpi: int = 150) -> list[st
     target = Path(folder)
     try:
         target.mkdir(parents=True, exist_ok=True)
-        figures = {"motion": plot_motion, "spectra": plot_spectra, "speed_and_torque": plot_speed_and_torque}
-        return [save(plot(diagnosis), target / f"{name}.png", dpi) for name, plot in figures.items()]
+        return [save(figure, target / f"{name}.png", dpi) for name, _, figure in plots_of(diagnosis)]
     except OSError as error:
         raise ShotError(
             "the figures cannot be written", path=folder, found=error.strerror, remedy="Choose another folder"
         ) from error
+
+
+def plots_of(diagnosis: Diagnosis) -> Iterator[tuple[str, str, Figure]]:
+    """For each figure the name of its file, a heading, and the figure; none where a spectrum was measured."""
+    if diagnosis.situation is not None:
+        yield "motion", "Motion and error", plot_motion(diagnosis)
+        yield "spectra", "Spectra of the error", plot_spectra(diagnosis)
+        yield "speed_and_torque", "Error over speed and torque", plot_speed_and_torque(diagnosis)
 
 
 def plot_motion(diagnosis: Diagnosis) -> Figure:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import Operator, Property, RunContext, registration
-from calmotion.model import Animation, Character, Figures, OutputPaths, Result, SystemModes
+from calmotion.model import Animation, Character, Figures, OutputPaths, Plots, Result, SystemModes
 
 
 class PlotFigures(Operator):
@@ -44,4 +44,21 @@ class PlotFigures(Operator):
         return (Figures(tuple(written)),)
 
 
-register, unregister = registration(PlotFigures)
+class PlotCurves(Operator):
+    """The figures of curves, for what shows them in another way than as files."""
+
+    idname = "figures.curves"
+    label = "Draw the curves"
+    requires = (Character, Result)
+    uses = (SystemModes,)
+    provides = (Plots,)
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        """The figures under their headings."""
+        from .drawing import plots_of
+
+        drawn = plots_of(context.get(Character), context.get(Result), context.get(SystemModes))
+        return (Plots(tuple((heading, figure) for _, heading, figure in drawn)),)
+
+
+register, unregister = registration(PlotFigures, PlotCurves)

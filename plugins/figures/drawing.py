@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from calmotion.errors import ShotError
 from calmotion.model import Animation, Character, Result, SystemModes
 from calmotion.views import save
+from matplotlib.figure import Figure
 
 from .curves import plot_convergence, plot_errors, plot_motors
 from .filmstrip import draw_filmstrip
@@ -17,6 +18,28 @@ from .tempo import plot_tempo
 
 MOTORS_ON_A_PAGE = 8
 Progress = Callable[[float, str], None]
+
+
+def plots_of(
+    character: Character, result: Result, modes: SystemModes | None = None
+) -> Iterator[tuple[str, str, Figure]]:
+    """The figures of curves: for each the name of its file, a heading, and the figure.
+
+    Args:
+        modes: Frequencies to mark in the spectra.
+    """
+    if character.targets:
+        yield "errors", "Errors over time", plot_errors(character, result)
+        yield "spectra", "Spectra of the errors", plot_spectra(character, result, modes)
+    for page, first in enumerate(range(0, len(character.motors), MOTORS_ON_A_PAGE), start=1):
+        motors = range(first, min(first + MOTORS_ON_A_PAGE, len(character.motors)))
+        yield "motors" if page == 1 else f"motors_{page}", "Motors", plot_motors(character, result, motors)
+    if len(result.steps) > 1:
+        yield "convergence", "The search", plot_convergence(result)
+    if result.retimed is not None and result.retimed.animation.tempo is not None:
+        yield "tempo", "Tempo", plot_tempo(character, result.retimed)
+    if result.robustness is not None and character.targets:
+        yield "robustness", "Robots that differ from the model", plot_robustness(character, result.robustness)
 
 
 def draw_figures(
@@ -52,24 +75,9 @@ def draw_figures(
     written: list[str] = []
     try:
         target.mkdir(parents=True, exist_ok=True)
-        if character.targets:
-            progress(0.0, "errors")
-            written.append(save(plot_errors(character, result), target / "errors.png", dpi))
-            progress(0.1, "spectra")
-            written.append(save(plot_spectra(character, result, modes), target / "spectra.png", dpi))
-        for page, first in enumerate(range(0, len(character.motors), MOTORS_ON_A_PAGE)):
-            progress(0.2, "motors")
-            motors = range(first, min(first + MOTORS_ON_A_PAGE, len(character.motors)))
-            name = "motors.png" if page == 0 else f"motors_{page + 1}.png"
-            written.append(save(plot_motors(character, result, motors), target / name, dpi))
-        if len(result.steps) > 1:
-            progress(0.4, "convergence")
-            written.append(save(plot_convergence(result), target / "convergence.png", dpi))
-        if result.retimed is not None and result.retimed.animation.tempo is not None:
-            written.append(save(plot_tempo(character, result.retimed), target / "tempo.png", dpi))
-        if result.robustness is not None and character.targets:
-            progress(0.45, "robustness")
-            written.append(save(plot_robustness(character, result.robustness), target / "robustness.png", dpi))
+        for number, (name, heading, figure) in enumerate(plots_of(character, result, modes)):
+            progress(min(0.1 * number, 0.45), heading)
+            written.append(save(figure, target / f"{name}.png", dpi))
         progress(0.5, "filmstrip")
         written.append(save(draw_filmstrip(character, animation, result, instants), target / "filmstrip.png", dpi))
     except OSError as error:

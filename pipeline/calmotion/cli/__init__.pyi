@@ -2,6 +2,7 @@
 
 from calmotion.cli.options import assignments as assignments
 from calmotion.cli.options import count_of as count_of
+from calmotion.cli.options import html_option as html_option
 from calmotion.cli.options import json_option as json_option
 from calmotion.cli.options import opened_shot as opened_shot
 from calmotion.cli.options import plugin_option as plugin_option
@@ -19,6 +20,7 @@ from calmotion.cli.output import Output as Output
 from calmotion.cli.output import conclude as conclude
 from calmotion.cli.output import notice as notice
 from calmotion.cli.output import print_error as print_error
+from calmotion.cli.pages import page_of_report as page_of_report
 from calmotion.cli.parser import entry as entry
 from calmotion.cli.progress import ProgressDisplay as ProgressDisplay
 from calmotion.cli.quantities import angle as angle

@@ -69,6 +69,15 @@ def shot_arguments(command: argparse.ArgumentParser, optional: bool = False) -> 
     )
 
 
+def html_option(command: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
+    """Add `--html`."""
+    command.add_argument(
+        "--html", metavar="FILE",
+        help="write one page for browsers, with the report, its curves and, for a motion, a 3D player; it needs no "
+        "network",
+    )  # fmt: skip
+
+
 def plugin_option(command: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     """Add `--plugins`."""
     command.add_argument(
@@ -100,6 +109,7 @@ def run_options(command: argparse.ArgumentParser) -> None:
     outputs.add_argument("--rrd", metavar="FILE", help="write a recording for the rerun viewer")
     outputs.add_argument("--figures", metavar="DIR", help="draw figures into this folder")
     outputs.add_argument("--video", metavar="FILE", help="write a video (.webp, or .mp4 where ffmpeg is installed)")
+    html_option(outputs)
     outputs.add_argument(
         "--manifest", metavar="FILE",
         help="write a manifest (JSON): inputs and outputs with hashes, versions, settings, verdict",

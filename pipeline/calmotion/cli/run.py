@@ -83,11 +83,24 @@ def run_once(
         options |= simulation_arguments(args) | run_arguments(args, display)
         result = function(shot, verify=args.verify, outputs=_paths(args), **options)
     report = result.report()
+    if args.html:
+        report["html"] = _page(result, report, args.html)
     if args.manifest and not result.problems and not result.interrupted:
         from calmotion.workflow.publishing.manifest import write_manifest
 
         report["manifest"] = write_manifest(result, args.manifest)
     return result, report
+
+
+def _page(result: SimulationResult, report: dict[str, Any], path: str) -> str:
+    """Write the page of `--html`; its path."""
+    from calmotion.cli.pages import sections_of
+    from calmotion.cli.reports.run import SECTIONS
+    from calmotion.model.outputs import PageContent
+    from calmotion.workflow.publishing.manifest import origin_of_run
+
+    title = f"{report['command']} {os.path.basename(result.shot.path)}"
+    return result.write_page(path, PageContent(title, sections_of(report, SECTIONS), origin_of_run(result)))
 
 
 def status_of(result: SimulationResult, report: dict[str, Any], args: argparse.Namespace) -> int:
@@ -100,7 +113,9 @@ def status_of(result: SimulationResult, report: dict[str, Any], args: argparse.N
 
 
 def _paths(args: argparse.Namespace) -> OutputPaths:
-    return OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures, video=args.video)
+    return OutputPaths(
+        layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures, video=args.video, html=args.html
+    )
 
 
 def _may_be_manifest(path: str) -> bool:

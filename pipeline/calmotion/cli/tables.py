@@ -8,6 +8,7 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from typing import IO, TYPE_CHECKING, Any, Literal, TextIO
 
+from calmotion.model.outputs import TextTable
 from calmotion.support.naming import distinct_names
 
 if TYPE_CHECKING:
@@ -62,6 +63,9 @@ def with_texts(value: Any, change: Callable[[str], str]) -> Any:
 
 def say(console: Console, text: str) -> None:
     """Print a sentence, wrapped between words on a terminal."""
+    if (parts := getattr(console, "parts", None)) is not None:  # of a page
+        parts.append(text)
+        return
     print(filled(text, console.file), file=console.file)
 
 
@@ -81,6 +85,9 @@ def print_table(
         texts: The first so many columns are text, and the others numbers.
     """
     if not rows:
+        return
+    if (parts := getattr(console, "parts", None)) is not None:  # of a page
+        parts.append(TextTable(title, tuple(columns), tuple(map(tuple, rows)), texts))
         return
     from rich.measure import Measurement
 

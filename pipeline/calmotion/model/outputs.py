@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from calmotion.arrays import Array
@@ -80,6 +81,55 @@ class Figures:
 @dataclass(frozen=True)
 class Video:
     """Path of a video."""
+
+    path: str
+
+
+@dataclass(frozen=True, eq=False)
+class Plots:
+    """Curves of a result, each figure under its heading: `matplotlib.figure.Figure`, drawn but not saved."""
+
+    figures: tuple[tuple[str, Any], ...]
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A table of a report; its first `texts` columns are text, the others numbers."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    texts: int = 1
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a report under a heading: sentences and tables in their order."""
+
+    title: str
+    parts: tuple[str | TextTable, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class PageContent:
+    """What a page says of a result.
+
+    Attributes:
+        title: Of the page.
+        sections: The words of the report on the screen, the verdict first.
+        provenance: Where it comes from: values by their names, or lists of them.
+        plots: Figures that are not among the `Plots` of the run.
+    """
+
+    title: str
+    sections: tuple[Section, ...]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    plots: tuple[tuple[str, Any], ...] = ()
+
+
+@dataclass(frozen=True)
+class HtmlPage:
+    """Path of a page."""
 
     path: str
 

@@ -105,6 +105,7 @@ class OutputPaths:
     figures: str | None = None
     video: str | None = None
     modes: str | None = None
+    html: str | None = None
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,13 @@ from pathlib import Path
 from calmotion.errors import ShotError
 from calmotion.host import Host, SettingError
 from calmotion.model import Character, Provenance
-from calmotion.model.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
+from calmotion.model.outputs import CsvFile, Figures, HtmlPage, PageContent, Recording, Video, WrittenLayer
 from calmotion.model.run import OutputPaths
 from calmotion.support.files import try_writing
+from calmotion.workflow.problems import value_of
 
 _NAMES = (("-o", "layer"), ("--csv", "csv"), ("--rrd", "rrd"), ("--figures", "figures"), ("--video", "video"),
-          ("--modes", "modes"))  # fmt: skip
+          ("--modes", "modes"), ("--html", "html"))  # fmt: skip
 _FOLDERS = ("--figures", "--modes")
 _ROOT = "-o, its root layer"
 _KINDS = (
@@ -125,7 +126,7 @@ def refuse_other_types(outputs: object) -> None:
 
 
 def requested_files(host: Host, outputs: OutputPaths) -> list[type]:
-    """The types that the requested files are made as.
+    """The types that the requested files are made as in the run; the page of `--html` is made of the finished run.
 
     Raises:
         SettingError: No plugin writes one of them.
@@ -133,18 +134,45 @@ def requested_files(host: Host, outputs: OutputPaths) -> list[type]:
     kinds: list[type] = []
     for kind, option, name in _KINDS:
         path = getattr(outputs, name)
-        if path is None:
-            continue
-        if not host.providers(kind):
-            failed = "; ".join(f"{plugin.id}: {plugin.error}" for plugin in host.failures())
-            raise SettingError(
-                "no plugin writes this output",
-                path=option,
-                found=path,
-                remedy=f"Plugins that failed: {failed}" if failed else f"Install one that provides {kind.__name__}.",
-            )
-        kinds.append(kind)
+        if path is not None:
+            _refuse_unprovided(host, kind, option, path)
+            kinds.append(kind)
+    if outputs.html is not None:
+        _refuse_unprovided(host, HtmlPage, "--html", outputs.html)
     return kinds
+
+
+def _refuse_unprovided(host: Host, kind: type, option: str, path: str) -> None:
+    if not host.providers(kind):
+        failed = "; ".join(f"{plugin.id}: {plugin.error}" for plugin in host.failures())
+        raise SettingError(
+            "no plugin writes this output",
+            path=option,
+            found=path,
+            remedy=f"Plugins that failed: {failed}" if failed else f"Install one that provides {kind.__name__}.",
+        )
+
+
+def prepare_page(host: Host, page: str, inputs: Mapping[str, str]) -> None:
+    """Refuse a page of `--html` that cannot be written, before the long work.
+
+    Args:
+        inputs: Files that are read, by what they are.
+
+    Raises:
+        SettingError: It cannot, no plugin writes pages, or it is one of the files that are read.
+    """
+    _refuse_unprovided(host, HtmlPage, "--html", page)
+    prepare_outputs(inputs, OutputPaths(html=page))
+
+
+def write_page(host: Host, page: str, content: PageContent) -> str:
+    """Write a page of a result that is no motion; returns its path.
+
+    Raises:
+        RunError: It cannot be written.
+    """
+    return value_of(host.run([content, OutputPaths(html=page)], [HtmlPage]).finish(), HtmlPage).path
 
 
 def refuse_unwritable(file: str) -> None:

@@ -132,6 +132,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "csv": table.path if table else None,
         "figures": figures.paths if figures else [],
         "video": video.path if (video := run.get(Video)) else None,
+        "html": None,  # a page has words of this report, and is written after it
         "left_out": [left_out_row(row) for row in (*run.left_out(), *result.left_out)],
         "notes": list(character.notes),
         "written_names": dict(provenance.names) if provenance else {},

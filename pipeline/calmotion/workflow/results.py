@@ -12,7 +12,16 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model import Character, Result, Simulation
-from calmotion.model.outputs import CsvFile, Figures, Recording, Verification, Video, WrittenLayer
+from calmotion.model.outputs import (
+    CsvFile,
+    Figures,
+    HtmlPage,
+    PageContent,
+    Recording,
+    Verification,
+    Video,
+    WrittenLayer,
+)
 from calmotion.model.run import OutputPaths
 from calmotion.model.table import columns, read_only
 from calmotion.workflow.run import Outcome, again, no_input
@@ -226,6 +235,17 @@ class SimulationResult:
             ShotError: It cannot be written, or the shot is read from this file.
         """
         return again(self._outcome, Video, OutputPaths(video=no_input(self._outcome, path))).path
+
+    def write_page(self, path: Path, content: PageContent) -> str:
+        """Write a page for browsers; returns the path.
+
+        Args:
+            content: Its words; motions, curves and frequencies are those of the result.
+
+        Raises:
+            ShotError: It cannot be written, or the shot is read from this file.
+        """
+        return again(self._outcome, HtmlPage, OutputPaths(html=no_input(self._outcome, path)), content).path
 
     def write(
         self,

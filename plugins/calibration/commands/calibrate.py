@@ -10,8 +10,10 @@ from calmotion.cli import (
     assignments,
     conclude,
     counted,
+    html_option,
     measured,
     opened_shot,
+    page_of_report,
     print_table,
     progress_display,
     quantity,
@@ -85,6 +87,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--integrator", metavar="NAME", help="bdf2, newmark or generalized-alpha (default: the last one)"
     )
     command.add_argument("--figures", metavar="DIR", help="draw measured and simulated signals into this folder")
+    html_option(command)
     command.add_argument(
         "--motion", metavar="FILE",
         help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
@@ -122,8 +125,9 @@ def parameter_arguments(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.workflow import with_shot
+    from calmotion.workflow import prepare_page, with_shot
 
+    from ..drawing import plots_of
     from ..workflow.calibrate import calibrate_together
 
     performed = _performed(args)
@@ -131,6 +135,12 @@ def run(args: argparse.Namespace, output: Output) -> int:
     for name, _ in performed:
         args.shot = with_shot(name)
         shots.append(opened_shot(args))
+    inputs = {}
+    for k, (shot, (_, files)) in enumerate(zip(shots, performed, strict=True), start=1):
+        inputs[f"shot {k}"] = shot.path
+        inputs |= {f"recording {k}.{n}": name.partition("@")[0] for n, name in enumerate(files, start=1)}
+    if args.html:
+        prepare_page(shots[0].host, args.html, inputs)
     with progress_display(args) as display:
         made = calibrate_together(
             list(zip(shots, (files for _, files in performed), strict=True)), layer=args.output,
@@ -138,7 +148,10 @@ def run(args: argparse.Namespace, output: Output) -> int:
             integrator=args.integrator, figures=args.figures, operators=args.run, settings=assignments(args),
             progress=display, on_operator=display.done,
         )  # fmt: skip
-    conclude(made.report(), (), output, None if args.quiet else _print)
+    report = made.report()
+    plots = [(heading, figure) for _, heading, figure in plots_of(made.calibration)] if args.html else []
+    report["html"] = page_of_report(shots[0].host, args.html, report, SECTIONS, inputs, plots)
+    conclude(report, (), output, None if args.quiet else _print)
     return 130 if made.calibration.interrupted else 0
 
 
@@ -173,8 +186,7 @@ def _went(row: dict[str, Any]) -> str:
     return "falls" if row["rms"] < row["rms_before"] else "goes"
 
 
-def _print(report: dict[str, Any], console: Console) -> None:
-
+def _print_answer(report: dict[str, Any], console: Console) -> None:
     of_robot = [row for row in report["parameters"] if row["of_robot"]]
     told = sum(bool(row["identifiable"]) for row in of_robot)
     say(console, f"The recordings identify {told} of {counted(len(of_robot), 'parameter')} of the robot.")
@@ -191,11 +203,17 @@ def _print(report: dict[str, Any], console: Console) -> None:
     for row in report["parameters"]:
         if row["advice"]:
             say(console, f"{row['name']} is not identifiable from these recordings: {row['advice']}")
-    for file in (report["layer"], report["root"], *report["figures"]):
+
+
+def _print_files(report: dict[str, Any], console: Console) -> None:
+    for file in (report["layer"], report["root"], *report["figures"], report["html"]):
         if file:
             say(console, f"wrote {file}")
     if report["root"]:
         say(console, f"next: calmotion optimize {report['root']} -o LAYER makes curves for this robot")
+
+
+def _print_measurement(report: dict[str, Any], console: Console) -> None:
     for note in report["notes"]:
         say(console, f"note: {note}")
     measurement = [row for row in report["parameters"] if not row["of_robot"]]
@@ -205,6 +223,15 @@ def _print(report: dict[str, Any], console: Console) -> None:
         f"{report['simulations']} simulations in {report['wall_s']:.3g} s; steps of {1e3 * report['step_s']:.3g} ms, "
         f"whose error is {report['step_shift']:.2g} standard deviations of the estimates",
     )
+
+
+SECTIONS = {"Result": _print_answer, "Measurement": _print_measurement}
+
+
+def _print(report: dict[str, Any], console: Console) -> None:
+    _print_answer(report, console)
+    _print_files(report, console)
+    _print_measurement(report, console)
 
 
 def _print_parameters(console: Console, title: str, parameters: Sequence[dict[str, Any]]) -> None:

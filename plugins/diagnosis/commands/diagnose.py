@@ -9,7 +9,9 @@ from calmotion.cli import (
     Output,
     assignments,
     conclude,
+    html_option,
     opened_shot,
+    page_of_report,
     print_table,
     progress_display,
     quantity_in,
@@ -48,23 +50,35 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--figures", metavar="DIR", help="draw motion and error, their spectra, and error over speed and torque here"
     )
+    html_option(command)
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.workflow import with_shot
+    from calmotion.host import open_host
+    from calmotion.workflow import prepare_page, with_shot
 
     from ..diagnosing import diagnose
+    from ..drawing import plots_of
 
     shot = None
     if args.shot is not None:
         args.shot = with_shot(args.shot)
         shot = opened_shot(args)
+    inputs = {} if shot is None else {"shot": args.shot}
+    inputs |= {f"recording {k}": name.partition("@")[0] for k, name in enumerate(args.recording, start=1)}
+    inputs |= {"commands": args.commands} if args.commands else {}
+    host = shot.host if shot else open_host(args.plugins)
+    if args.html:
+        prepare_page(host, args.html, inputs)
     with progress_display(args) as display:
         made = diagnose(
             shot, args.recording, commands=args.commands, figures=args.figures, settings=assignments(args),
             progress=display, on_operator=display.done,
         )  # fmt: skip
-    conclude(made.report(), (), output, None if args.quiet else _print)
+    report = made.report()
+    plots = [(heading, figure) for _, heading, figure in plots_of(made.diagnosis)] if args.html else []
+    report["html"] = page_of_report(host, args.html, report, SECTIONS, inputs, plots)
+    conclude(report, (), output, None if args.quiet else _print)
     return 0
 
 
@@ -80,7 +94,7 @@ def _sure(confidence: float) -> str:
     )
 
 
-def _print(report: dict[str, Any], console: Console) -> None:
+def _print_answer(report: dict[str, Any], console: Console) -> None:
     first = report["causes"][0]
     if first["cause"] == "none":
         say(console, "The robot does what was asked, within the noise of the recording: nothing shakes.")
@@ -106,10 +120,21 @@ def _print(report: dict[str, Any], console: Console) -> None:
         for row in report["channels"]
     ]
     print_table(console, "Error (root mean square)", ["channel", "error", "noise", "not explained"], rows, texts=1)
-    for file in report["figures"]:
-        say(console, f"wrote {file}")
+
+
+def _print_notes(report: dict[str, Any], console: Console) -> None:
     for note in report["notes"]:
         say(console, f"note: {note}")
+
+
+SECTIONS = {"Result": _print_answer, "Notes": _print_notes}
+
+
+def _print(report: dict[str, Any], console: Console) -> None:
+    _print_answer(report, console)
+    for file in (*report["figures"], *filter(None, [report["html"]])):
+        say(console, f"wrote {file}")
+    _print_notes(report, console)
 
 
 def _values(parameters: list[dict[str, Any]]) -> str:

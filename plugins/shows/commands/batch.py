@@ -5,7 +5,18 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli import FAILED, INTERRUPTED, Output, conclude, counted, length, report_options, say
+from calmotion.cli import (
+    FAILED,
+    INTERRUPTED,
+    Output,
+    conclude,
+    counted,
+    html_option,
+    length,
+    page_of_report,
+    report_options,
+    say,
+)
 
 from .forwarding import command_of, extras_of, forwarded, forwarded_options
 
@@ -31,6 +42,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     report_options(command)
     command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
+    html_option(command)
     group = command.add_argument_group("workers")
     group.add_argument("--on", metavar="WHERE", default="local", help="local (default) or dask://HOST:PORT")
     group.add_argument(
@@ -50,21 +62,32 @@ def worker_count(text: str) -> int:
 
 def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli import ProgressDisplay
+    from calmotion.host import open_host
+    from calmotion.workflow import prepare_page
 
     from ..batch.run import batch
 
+    inputs = {f"shot {k}": shot for k, shot in enumerate(args.shots, start=1)}
+    host = open_host(args.plugins) if args.html else None
+    if host is not None:
+        prepare_page(host, args.html, inputs)
     with ProgressDisplay(args.quiet, args.progress) as display:
         result = batch(
             args.shots, args.output, command=command_of(args), arguments=forwarded(args), extras=extras_of(args),
             on=args.on, workers=args.workers, progress=display,
         )  # fmt: skip
-    conclude(result.report(), [], output, None if args.quiet else _print)
+    report = result.report() | {"html": None}
+    if host is not None:
+        from ..batch.drawing import plots_of
+
+        report["html"] = page_of_report(host, args.html, report, SECTIONS, inputs, plots_of(report["jobs"]))
+    conclude(report, [], output, None if args.quiet else _print)
     if result.interrupted:
         return INTERRUPTED
     return 0 if result.successful else FAILED
 
 
-def _print(report: dict[str, Any], console: Console) -> None:
+def _print_answer(report: dict[str, Any], console: Console) -> None:
     counts = ", ".join(f"{count} {SAID.get(name, name)}" for name, count in report["outcomes"].items())
     say(console, f"{counted(len(report['jobs']), 'shot')} in {report['wall_s']:.1f} s: {counts}")
     for job in report["jobs"]:
@@ -82,6 +105,15 @@ def _print(report: dict[str, Any], console: Console) -> None:
             place = ".".join(filter(None, (problem.get("path"), problem.get("attribute"))))
             say(console, f"    {place + ': ' if place else ''}{problem['problem']}")
             say(console, f"    log: {job['log']}")
+
+
+SECTIONS = {"Result": _print_answer}
+
+
+def _print(report: dict[str, Any], console: Console) -> None:
+    _print_answer(report, console)
+    if report["html"]:
+        say(console, f"wrote {report['html']}")
     say(console, f"report: {report['folder']}/batch.md")
     roots = [job["root_layer"] for job in report["jobs"] if job["root_layer"]]
     if roots:

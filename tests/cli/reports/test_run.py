@@ -87,7 +87,7 @@ def test_rotations_without_weight_are_printed_only_on_request(verbose):
 
 def test_figures_of_a_folder_are_named_on_one_line():
     stream = io.StringIO()
-    files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv"))
+    files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv", "html"))
     print_files(console_on(stream), report(**files, figures=["out/errors.png", "out/motors.png"], can_shake=True))
     assert "wrote errors.png, motors.png in out" in stream.getvalue()
 
@@ -98,7 +98,7 @@ def test_figures_of_a_folder_are_named_on_one_line():
 )
 def test_a_shot_that_keeps_within_the_tolerance_is_not_said_to_shake(error, turn, weight, shakes):
     stream = io.StringIO()
-    files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv"))
+    files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv", "html"))
     target = {"path": "/Cup", "max_error_m": error, "max_rotation_error_rad": turn, "rotation_weight": weight}
     print_files(console_on(stream), report(**files, figures=[], targets=[target], can_shake=True))
     assert ("next: calmotion optimize shot.usda -o LAYER removes the shake" in stream.getvalue()) == shakes
@@ -108,7 +108,7 @@ def test_a_shot_that_keeps_within_the_tolerance_is_not_said_to_shake(error, turn
 @pytest.mark.parametrize("optimised", [False, True])
 def test_of_a_rigid_robot_with_ideal_motors_is_told_that_nothing_shakes(optimised):
     stream = io.StringIO()
-    files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv"))
+    files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv", "html"))
     suffix = "_before" if optimised else ""
     target = {"path": "/Cup", f"max_error{suffix}_m": 1e-9, f"max_rotation_error{suffix}_rad": 0.0}
     target |= {"rotation_weight": 1.0}

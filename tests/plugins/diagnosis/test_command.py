@@ -101,7 +101,8 @@ def test_gaps_in_a_log_of_commands_are_the_stream(calmotion, tmp_path, motion):
 def test_the_answer_comes_first_and_figures_are_written(calmotion, tmp_path, motion):
     commands = written(tmp_path / "sent.csv", TICKS, motion(TICKS))
     recording = written(tmp_path / "take.csv", TICKS, loop(motion, 5.0, 0.12)(TICKS))
-    options = ("--recording", recording, "--commands", commands, "--figures", tmp_path / "figures")
+    options = ("--recording", recording, "--commands", commands, "--figures", tmp_path / "figures",
+               "--html", tmp_path / "page.html")  # fmt: skip
     done = calmotion("diagnose", *options)
     assert done.returncode == 0, done.stderr
     lines = " ".join(done.stdout.split("\n")[:6])
@@ -109,6 +110,8 @@ def test_the_answer_comes_first_and_figures_are_written(calmotion, tmp_path, mot
     assert {file.name for file in (tmp_path / "figures").iterdir()} == {
         "motion.png", "spectra.png", "speed_and_torque.png"
     }  # fmt: skip
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert f"<p>{done.stdout.splitlines()[0]}</p>" in page and "Motion and error" in page and "take.csv" in page
 
 
 def test_a_shot_knows_its_command_and_refuses_what_it_does_not_have(calmotion, tmp_path):

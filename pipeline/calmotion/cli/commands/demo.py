@@ -12,7 +12,11 @@ from calmotion.errors import ShotError
 EXAMPLES = (("calmotion demo", "after an installation"),)
 SHOT = "bartender.usda"
 # Each option with the plugin that writes it, which may have been deleted.
-OPTIONAL = (("--rrd", "bartender.rrd", "rerun_logger"), ("--figures", "figures", "figures"))
+OPTIONAL = (
+    ("--html", "bartender.html", "html_report"),
+    ("--rrd", "bartender.rrd", "rerun_logger"),
+    ("--figures", "figures", "figures"),
+)
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:

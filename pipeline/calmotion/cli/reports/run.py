@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -186,7 +186,7 @@ def print_errors(console: Console, report: dict[str, Any], verbose: bool = False
 
 def print_files(console: Console, report: dict[str, Any]) -> None:
     """What was written, and what to do with it."""
-    for name in ("layer", "root_layer", "rrd", "video", "csv"):
+    for name in ("layer", "root_layer", "rrd", "video", "csv", "html"):
         if report[name]:
             say(console, f"wrote {report[name]}")
     figures = [Path(figure) for figure in report["figures"]]
@@ -207,8 +207,8 @@ def print_files(console: Console, report: dict[str, Any]) -> None:
         else:
             done = f"every error is below the accuracy of the simulation ({length(report['tolerance_m'])})"
             say(console, f"next: {done}; {command} --tolerance LENGTH, with a smaller length, removes more")
-    if not any(report[name] for name in ("layer", "rrd", "video")):
-        say(console, "next: --rrd FILE records the motion for the rerun viewer, --video FILE makes a video of it")
+    if not any(report[name] for name in ("layer", "rrd", "video", "html")):
+        say(console, "next: --html FILE shows the motion in a browser, --rrd FILE in the rerun viewer")
 
 
 def print_warnings(console: Console, report: dict[str, Any]) -> None:
@@ -288,3 +288,21 @@ def print_work(console: Console, report: dict[str, Any]) -> None:
     for row in report["reactions"]:
         force, moment = f"{row['max_force_n']:.4g} N", f"{row['max_moment_n_m']:.4g} N m"
         say(console, f"the world holds {row['body']} with up to {force} and {moment}")
+
+
+def _print_answer(report: dict[str, Any], console: Console) -> None:
+    print_verdict(console, report)
+    print_remaining(console, report)
+    print_errors(console, report)
+    print_robustness(console, report)
+
+
+# The parts of the page of `--html` by their headings.
+SECTIONS: Mapping[str, Callable[[dict[str, Any], Console], None]] = {
+    "Result": _print_answer,
+    "Limits and other causes": lambda report, console: print_warnings(console, report),
+    "Accuracy of the simulation": lambda report, console: print_budget(console, report),
+    "Simplifications": lambda report, console: print_left_out(console, report["left_out"]),
+    "Notes on the shot": lambda report, console: print_notes(console, report["notes"]),
+    "Work": lambda report, console: print_work(console, report),
+}

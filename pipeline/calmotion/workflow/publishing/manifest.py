@@ -9,6 +9,8 @@ import hashlib
 import json
 import os
 import platform
+import shlex
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -59,6 +61,26 @@ def manifest_of(result: SimulationResult, folder: str | os.PathLike[str]) -> dic
         "versions": {"python": platform.python_version(), "platform": platform.platform(), **_versions()},
         "verdict": _verdict(result),
     }
+
+
+def origin_of(files: Mapping[str, str]) -> dict[str, Any]:
+    """The provenance of a result for a page: the command line, versions, and hashes of the files that were read.
+
+    Args:
+        files: What was read, by what it is.
+    """
+    return {
+        "command": shlex.join(["calmotion", *sys.argv[1:]]),
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "inputs": [{"path": path, "role": role, "sha256": sha256_of(path) or ""} for role, path in files.items()],
+        "versions": {"python": platform.python_version(), "platform": platform.platform(), **_versions()},
+    }
+
+
+def origin_of_run(result: SimulationResult) -> dict[str, Any]:
+    """The same of a run, whose layers were hashed when they were read."""
+    rows = [_row(path, os.getcwd(), role, digest) for path, role, digest in _inputs(result)]
+    return origin_of({}) | {"inputs": rows, "settings": manifest_of(result, os.getcwd())["request"]}
 
 
 def write_manifest(result: SimulationResult, path: str | os.PathLike[str]) -> str:

@@ -39,7 +39,7 @@ def test_the_command_writes_a_layer_with_the_parameters_of_the_robot(calmotion, 
     shot, recording = take
     done = calmotion(
         "calibrate", shot, "--recording", recording, "-o", tmp_path / "robot.usda", "--json", "--parameters", "modulus",
-        "damping", "--figures", tmp_path / "figures",
+        "damping", "--figures", tmp_path / "figures", "--html", tmp_path / "page.html",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)
@@ -58,6 +58,8 @@ def test_the_command_writes_a_layer_with_the_parameters_of_the_robot(calmotion, 
     assert sorted(p.name for p in (tmp_path / "figures").iterdir()) == [
         "intervals.png", "measured.png", "residual_spectra.png",
     ]  # fmt: skip
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "The recordings identify 2 of 2 parameters" in page and "Measured and simulated" in page
 
 
 def test_what_does_not_fit_is_refused_before_any_mesh(calmotion, take, tmp_path):
