@@ -148,6 +148,14 @@ class OptimizeShot(Operator):
             "auto: a tenth",
         ),
         Property(
+            "goal",
+            float,
+            None,
+            unit="m",
+            minimum=0.0,
+            description="Error at the targets that is accepted: the search ends there; auto: that of the shot, or none",
+        ),
+        Property(
             "knot_spacing",
             float,
             None,
@@ -281,6 +289,7 @@ class OptimizeShot(Operator):
             context,
             **given,
             max_iterations=values.max_iterations,
+            goal=values.goal or None,
             knot_spacing=values.knot_spacing or None,
             smoothness=values.smoothness,
             adjoint=values.adjoint,

@@ -36,6 +36,7 @@ expected = {
     "calm:motor:maxJerk": float("inf"), "calm:motor:skelJoint": None,
     "calm:target:positionWeight": 1.0, "calm:target:rotationWeight": 0.0, "calm:retarget:reference": "rigid",
     "calm:retarget:endpoints": "free", "calm:retarget:cyclic": False, "calm:retarget:tolerance": -1.0,
+    "calm:retarget:goal": -1.0,
 }
 for name, value in expected.items():
     assert name in values and values[name] == value, (name, values.get(name))

@@ -130,7 +130,7 @@ def run_options(command: argparse.ArgumentParser) -> None:
         "--strict",
         action="store_true",
         help="exit with status 1 if the simulation does not keep the tolerance, curves leave a larger error than the "
-        "animation, or a foot would be pulled, tip or slip; the outputs are written all the same",
+        "animation or the goal, or a foot would be pulled, tip or slip; the outputs are written all the same",
     )
 
 
@@ -229,7 +229,7 @@ def assignments(args: argparse.Namespace) -> dict[str, dict[str, object]]:
     writer: dict[str, object] = {
         name: value for name, empty in names.items() if (value := getattr(args, name, empty)) != empty
     }
-    searched = ("robust", "scenarios", "avoid_reversals")
+    searched = ("robust", "scenarios", "avoid_reversals", "goal")
     search = {name: value for name in searched if (value := getattr(args, name, None)) is not None}
     search |= retime_settings(args)
     if getattr(args, "retime_scene", None) is not None:

@@ -108,7 +108,8 @@ def status_of(result: SimulationResult, report: dict[str, Any], args: argparse.N
     if result.interrupted:
         return INTERRUPTED
     unlike = any(row["unlike_ground"] for row in report["contacts"])
-    missed = unlike or not report["tolerance_kept"] or report.get("improved") is False
+    worse = report.get("improved") is False or report.get("goal_kept") is False
+    missed = unlike or not report["tolerance_kept"] or worse
     return FAILED if result.problems or (args.strict and missed) else 0
 
 

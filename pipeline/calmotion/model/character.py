@@ -271,6 +271,7 @@ class RetargetSettings:
 
     Attributes:
         tolerance: Accuracy of the simulation at the targets [m].
+        goal: Error that is accepted at the targets after optimising [m].
         time_step: Step of the simulation [s].
         knot_spacing: Distance of the spline's knots [s].
         smoothness: Weight of the regulariser.
@@ -290,6 +291,7 @@ class RetargetSettings:
     cyclic: bool = False
     uncertainty: Uncertainty = Uncertainty()
     tempo: TempoSettings = TempoSettings()
+    goal: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

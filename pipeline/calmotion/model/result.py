@@ -135,6 +135,7 @@ class Simplification:
     skipped: bool = False
 
 
+GOAL_REACHED = "goal reached"  # why a search ended
 _NOTICED_RISE = 0.01  # of the tolerance
 
 
@@ -255,6 +256,7 @@ class Result:
         lost_motion: What the play of gears would do to the input, and to the curves found; empty without play.
         robustness: The curves on robots that differ from the model; None where they were optimised for one robot.
         friction_band_m: How far Coulomb friction may hold each target off at rest [m], shape [K]; None without any.
+        goal_m: Error that is accepted at the targets [m]; None where none is named.
         retimed: The animation at the tempo that was found, to whose times all motions belong; None: at its own.
     """
 
@@ -293,6 +295,7 @@ class Result:
     processor_s: float | None = None
     friction_band_m: Array | None = None
     retimed: Retimed | None = None
+    goal_m: float | None = None
 
     def performed_animation(self, animation: Animation) -> Animation:
         """An animation at the tempo of this result."""

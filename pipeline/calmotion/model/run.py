@@ -16,6 +16,7 @@ class RunSettings:
 
     Attributes:
         tolerance: Accuracy of the simulation at the targets [m].
+        goal: Error at the targets that is accepted after optimising [m]; a search ends where it is reached.
         step: Time step [s].
         pre_roll: Length of the pre-roll [s].
         integrator: Name of the integrator.
@@ -55,6 +56,7 @@ class RunSettings:
     retime: TempoSettings | None = None
     limited_by_tempo: bool = False
     narrowed: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    goal: float | None = None
 
     @property
     def scheme(self) -> str:

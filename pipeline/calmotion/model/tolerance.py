@@ -1,4 +1,7 @@
-"""The tolerance of a shot: the user's, the shot's, or a share of how far the character reaches."""
+"""The tolerance of a shot, the accuracy of its simulation, and its goal, the error that is accepted after optimising.
+
+The tolerance is the user's, the shot's, or a share of how far the character reaches.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,11 @@ SMALLEST = 1e-6  # of a character without extent [m]
 def tolerance_of(character: Character, requested: float | None = None) -> float:
     """Accuracy of the simulation at the targets [m]: as requested, or of the shot, or a thousandth of the reach."""
     return requested or character.retarget.tolerance or max(SHARE_OF_REACH * reach(character), SMALLEST)
+
+
+def goal_of(character: Character, requested: float | None = None) -> float | None:
+    """Error that is accepted at the targets after optimising [m]: as requested, or of the shot; None: none is named."""
+    return requested or character.retarget.goal
 
 
 def reach(character: Character) -> float:

@@ -13,7 +13,7 @@ from calmotion.errors import ShotError
 from calmotion.model import Character, OptimizerStep, Result
 from calmotion.model.limits.bounds import Excess, excesses, motor_bounds
 from calmotion.model.run import RunSettings
-from calmotion.model.tolerance import tolerance_of
+from calmotion.model.tolerance import goal_of, tolerance_of
 from calmotion.model.uncertainty import Scenario
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
@@ -153,6 +153,7 @@ def _optimized(
         interrupted=searched.interrupted,
         performed=performed_motion(prepared, after.curves),
         idle_gain_m=searched.idle_gain,
+        goal_m=goal_of(character, options.goal),
         resumed_iterations=searched.resumed_iterations,
     )
 

@@ -9,7 +9,9 @@ import numpy as np
 from calmotion.arrays import Array, BoolArray
 from calmotion.model import Animation, Character
 from calmotion.model.model_choice import OFF
+from calmotion.model.result import GOAL_REACHED
 from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import goal_of
 from calmotion.retargeting.checkpoint import Checkpoint
 from calmotion.retargeting.feasible_start import on_sufficient_knots, onto_limits, with_moving_end, with_possible_limits
 from calmotion.retargeting.problem.adaptive_knots import converted, refined_breaks
@@ -36,8 +38,8 @@ from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
 
 AS_THEY_ARE = "converged"  # reason of the end where nothing is searched: another search has found the curves
-NEAR_TOLERANCE = 2.0  # where a largest error is beyond the tolerance, but not by this factor, smaller gains count
-GAIN_NEAR_TOLERANCE = 0.2  # share of the least gain, which is one of a mean over time, that counts there
+NEAR = 2.0  # where a largest error is beyond the goal, else the tolerance, but not by this factor, smaller gains count
+GAIN_NEAR = 0.2  # share of the least gain, which is one of a mean over time, that counts there
 MISSED = 0.5  # share of the least gain that changes in the inactive intervals may gain together
 
 
@@ -50,7 +52,7 @@ class RetargetSearch:
         search: State of the minimisation.
         inactive: Intervals in which no motor changes.
         character, animation, options: Of the shot.
-        tolerance: Acceptable error [m].
+        tolerance: Accuracy of the simulation [m].
         frequency: Lowest frequency of the character [Hz].
         adaptive: Whether knots are refined.
         checkpoint: Stores the search after each iteration.
@@ -81,7 +83,10 @@ class RetargetSearch:
 
     def __post_init__(self) -> None:
         self.problem: RetargetProblem = self.input.problem  # on the current knots, with the limits as they are now
-        self._least = self.options.least_gain * self.tolerance  # a smaller predicted gain ends the search [m]
+        # a robust search has an end of its own
+        self._goal = None if self.options.robust else goal_of(self.character, self.options.goal)
+        # a smaller predicted gain ends the search [m]
+        self._least = self.options.least_gain * min(self.tolerance, self._goal or np.inf)
         self._done = SearchProgress(self._least)
 
     def run(self, start: Array, last: SearchMemory | None = None) -> None:
@@ -180,7 +185,7 @@ class RetargetSearch:
                 self._keep()
             if self._unconfirmed:
                 self._confirm(fixed)
-            if self.search.reason == "iteration limit":
+            if self.search.reason in ("iteration limit", GOAL_REACHED):
                 return
             if not (self.adaptive and self._refine()):
                 if self.inactive:
@@ -194,10 +199,16 @@ class RetargetSearch:
             fixed = self.hold()
 
     def _minimized(self, search: Search, fixed: BoolArray) -> Search:
-        found = self._to_gain(search, fixed, self._least)
-        if found.reason == "converged" and 1.0 < self._largest_error(found.at) / self.tolerance < NEAR_TOLERANCE:
-            found = self._to_gain(replace(found, reason=""), fixed, GAIN_NEAR_TOLERANCE * self._least)
+        found, enough = self._to_gain(search, fixed, self._least), self._goal or self.tolerance
+        if found.reason == "converged" and 1.0 < self._largest_error(found.at) / enough < NEAR:
+            found = self._to_gain(replace(found, reason=""), fixed, GAIN_NEAR * self._least)
         return found
+
+    def _reached(self, at: Evaluation) -> bool:
+        """Whether no target that counts is farther off than the goal, and all limits are kept."""
+        if self._goal is None or self._largest_error(at) > self._goal:
+            return False
+        return at.problem.limits is None or at.problem.limits.kept(at.limited)
 
     def _to_gain(self, search: Search, fixed: BoolArray, gain: float) -> Search:
         """Minimise until less is to be gained [m]."""
@@ -209,6 +220,7 @@ class RetargetSearch:
             self.options.max_iterations,
             on_iterate=self._on_iterate,
             onto_limits=lambda at: onto_limits(at, fixed),
+            reached=self._reached,
         )
         self.problem = found.at.problem
         return found
@@ -286,7 +298,8 @@ class RetargetSearch:
             problem, begin, fixed, self._least, max_iterations=self.options.max_iterations + 3
         )  # fmt: skip
         limits = pruned.at.problem.limits
-        if pruned.at.merit <= at.merit + 2.0 * budget and (limits is None or limits.kept(pruned.at.limited)):
+        kept = (limits is None or limits.kept(pruned.at.limited)) and self._reached(at) <= self._reached(pruned.at)
+        if kept and pruned.at.merit <= at.merit + 2.0 * budget:
             self.search, self.problem = replace(pruned, reason=search.reason), pruned.at.problem
         else:
             self.search = replace(

@@ -12,6 +12,7 @@ import numpy as np
 
 from calmotion.model import OptimizerStep, Result, Track
 from calmotion.model.model_choice import OFF
+from calmotion.model.result import GOAL_REACHED
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.parallel import at_once
@@ -200,6 +201,8 @@ def _searched(
     first = _search(shot, options, progress, checkpoint, memory)
     enough = JOINING_GAIN * tolerance_of(character, options.tolerance)
     if first.interrupted or first.idle_gain_m is None or first.idle_gain_m <= enough or options.motors == OFF:
+        return first
+    if first.stopped == GOAL_REACHED:
         return first
     progress.ended()
     motors = tuple(replace(motor, idle=False) for motor in character.motors)

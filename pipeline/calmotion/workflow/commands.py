@@ -86,6 +86,7 @@ def optimize(
     motors: str = AUTHORED,
     integrator: str | None = None,
     adjoint: str | None = None,
+    goal: float | str | None = None,
     retime: bool | Mapping[str, Any] = False,
     keep: Sequence[str] = (),
     leave_out: Sequence[str] = (),
@@ -108,6 +109,8 @@ def optimize(
             on_operator, cancel: As of `simulate`.
         integrator: `bdf2`, the only one for the optimiser.
         adjoint: `discrete` (None; exact gradients) or `continuous` (to compare with).
+        goal: Error at the targets that is accepted, [m] or text with a unit (`"2mm"`): the search ends there; None:
+            that of the shot, or none.
         retime: Whether parts may be slower where limits of motors ask for it, and how: `{"slowest": 1.5,
             "fastest": 0.9, "pin": (24, 48, 72)}` has the largest and the smallest stretch, and time codes whose
             distances stay.
@@ -118,7 +121,8 @@ def optimize(
         Cancelled: `cancel` stopped the run before it had curves.
     """
     source = _source(tolerance, step, integrator, pre_roll, motors, verify=verify)
-    chosen: Settings = {"retarget.optimize": {"adjoint": adjoint}} if adjoint is not None else {}
+    named = {"adjoint": adjoint, "goal": quantity_of(goal, "m", "goal")}
+    chosen: Settings = {"retarget.optimize": {name: value for name, value in named.items() if value is not None}}
     outcome = carry_out(
         _opened(shot), "optimize", wanted=_wanted(verify), operators=operators, source=source, outputs=outputs,
         settings=merge([_forced(keep, leave_out), chosen, _tempo(retime), read_settings(settings)]),

@@ -22,6 +22,8 @@ from calmotion.support.memory import peak_memory
 from calmotion.version import __version__
 from calmotion.workflow.reactions import contact_rows, reaction_rows
 from calmotion.workflow.targets import (
+    goal_report,
+    goal_rows,
     main_target,
     remaining_errors,
     robustness_report,
@@ -249,8 +251,10 @@ def _optimized(character: Character, result: Result) -> dict[str, Any]:
     after = target_errors(character, result.after, "_after")
     return {
         "targets": [
-            one | other | robustness_row(result, k) for k, (one, other) in enumerate(zip(before, after, strict=True))
+            one | other | goal | robustness_row(result, k)
+            for k, (one, other, goal) in enumerate(zip(before, after, goal_rows(character, result), strict=True))
         ],
+        **goal_report(character, result),
         **robustness_report(result),
         **_overall(before, "_before"),
         **_overall(after, "_after"),

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.model import Character, Result, Simulation
+from calmotion.model import Character, Result, Simulation, is_exceeded
+from calmotion.model.result import GOAL_REACHED
 from calmotion.model.uncertainty import CURVES
 
 _STILL = 1e-3  # of the tolerance: what moves by less stands still
@@ -66,8 +67,29 @@ def main_target(character: Character, result: Result) -> str | None:
     return main[0].path if main else None
 
 
+def goal_report(character: Character, result: Result) -> dict[str, Any]:
+    """The goal, and whether each target that counts keeps it after the optimisation; None without a goal."""
+    kept = [row["goal_kept"] for row in goal_rows(character, result)]
+    counts = [target.position_weight > 0.0 for target in character.targets]
+    every = None if result.goal_m is None else all(k for k, counted in zip(kept, counts, strict=True) if counted)
+    return {"goal_m": result.goal_m, "goal_kept": every}
+
+
+def goal_rows(character: Character, result: Result) -> list[dict[str, Any]]:
+    """For each target whether it keeps the goal, and where it does not, the limits of motors that hold it."""
+    assert result.after is not None
+    errors = result.after.position_errors[result.after.motion.judged]
+    acting = [
+        {"path": character.motors[limit.motor].path, "quantity": limit.quantity}
+        for limit in result.limits
+        if limit.cost_m is not None or is_exceeded(limit)
+    ]
+    kept = [None if result.goal_m is None else bool(size <= result.goal_m) for size in errors.max(axis=0, initial=0.0)]
+    return [{"goal_kept": one, "limited_by": acting if one is False else []} for one in kept]
+
+
 def remaining_errors(character: Character, result: Result) -> list[dict[str, Any]]:
-    """The targets that the curves found leave farther off than the tolerance, and why.
+    """The targets that the curves found leave farther off than the goal, without one than the tolerance, and why.
 
     Args:
         character: With the motors that move no target marked as idle.
@@ -87,9 +109,9 @@ def remaining_errors(character: Character, result: Result) -> list[dict[str, Any
     weights = [target.position_weight for target in character.targets]
     directions = 3 * sum((t.position_weight > 0.0) + (t.rotation_weight > 0.0) for t in character.targets)
     common = ["limits"] * any(limit.cost_m is not None for limit in result.limits)
-    common += ["search"] * (result.stopped not in ("", "converged"))
+    common += ["search"] * (result.stopped not in ("", "converged", GOAL_REACHED))
     rows = []
-    for k in np.flatnonzero(largest > result.tolerance_m):
+    for k in np.flatnonzero(largest > (result.goal_m or result.tolerance_m)):
         causes = [*common, *["sag"] * bool(errors[0, k] >= 0.5 * largest[k])]
         causes += ["motors"] * (motors < directions) + ["weight"] * (0.0 < weights[k] < max(weights))
         row = {"path": character.targets[k].path, "max_error_m": float(largest[k]), "causes": causes or ["reach"]}

@@ -6,7 +6,7 @@ import argparse
 import os
 from collections.abc import Iterator
 
-from calmotion.cli import plugin_option, simulation_options
+from calmotion.cli import plugin_option, quantity, simulation_options
 
 EXTRAS = {
     "csv": "a table for each shot",
@@ -22,10 +22,11 @@ _VALUES = (
     "robust",
     "scenarios",
     "avoid_reversals",
+    "goal",
     "bake",
     "samples_per_second",
 )
-_OF_SEARCHES = ("robust", "scenarios", "avoid_reversals")
+_OF_SEARCHES = ("robust", "scenarios", "avoid_reversals", "goal")
 _FLAGS = ("verify", "strict", "splines")
 _LISTS = {"keep": "--keep", "leave_out": "--leave-out", "run": "--run", "set": "--set"}
 
@@ -47,6 +48,10 @@ def forwarded_options(command: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--avoid-reversals", metavar="WEIGHT", nargs="?", const="10", help="avoid reversals of gears with backlash"
     )
+    group.add_argument(
+        "--goal", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
+        help="error at the targets that is accepted after optimising, with a unit (2mm)",
+    )  # fmt: skip
     group.add_argument("--bake", nargs="?", const="motors", choices=("motors", "simulated"), help="body transforms")
     group.add_argument("--samples-per-second", metavar="HZ", help="more samples than the frames")
     group.add_argument("--splines", action="store_true", help="curves as splines")
@@ -102,4 +107,4 @@ def _forwarded(args: argparse.Namespace) -> Iterator[str]:
         yield f"--plugins={os.path.abspath(folder)}"
 
 
-_UNITS = {"tolerance": "m", "step": "s", "pre_roll": "s"}  # of values that the parser has read
+_UNITS = {"tolerance": "m", "goal": "m", "step": "s", "pre_roll": "s"}  # of values that the parser has read

@@ -18,7 +18,7 @@ def report(**values):
     budget = [{"source": "mesh", "allowed_m": 4e-4, "estimated_m": None}]
     budget = [{"source": "time step", "allowed_m": 5e-4, "estimated_m": 3e-4}, *budget]
     known = {"error_budget": budget, "tolerance_m": 1e-3, "tolerance_kept": True, "tolerance_missed_by": None}
-    known |= {"shot": "shot.usda", "limits": [], "interrupted": False, "improved": True, "step_s": 2e-3}
+    known |= {"shot": "shot.usda", "limits": [], "interrupted": False, "improved": True, "step_s": 2e-3, "goal_m": None}
     return (
         known
         | {"simulation_error_m": 3e-4, "verified_error_m": None, "targets": [], "can_shake": True, "main_target": None}
@@ -53,6 +53,22 @@ def test_the_delay_of_a_shaper_is_told_with_the_error_without_it(delay, said):
     text = " ".join(printed(report(**values)).split())
     assert "With the shaper zvd, the largest error is 6 mm (at /Arm/Hand)." in text
     assert said in text and ("delays" in text) == bool(said)
+
+
+@pytest.mark.parametrize(
+    ("after", "stopped", "said"),
+    [
+        (1e-3, "goal reached", "The goal is reached: the largest error is at most 2 mm."),
+        (5e-3, "converged", "The goal of 2 mm is out of reach with these motors, limits and weights: 5 mm at /Cup."),
+        (5e-3, "iteration limit", "The goal of 2 mm is not reached: 5 mm at /Cup."),
+        (2.1e-3, "converged", "The error of the simulation, 0.3 mm, decides here: --tolerance 0.2mm makes sure."),
+    ],
+)
+def test_a_goal_is_reached_or_the_targets_that_miss_it_are_named(after, stopped, said):
+    target = {"path": "/Cup", "max_error_before_m": 9e-3, "max_error_after_m": after, "goal_kept": after <= 2e-3}
+    values = report(goal_m=2e-3, goal_kept=after <= 2e-3, stopped=stopped, objective_after=0.0, targets=[target])
+    text = " ".join(printed(values).split())
+    assert said in text and ("decides here" in text) == (after == 2.1e-3)
 
 
 @pytest.mark.parametrize("source", REMEDIES)

@@ -70,19 +70,20 @@ def retarget(stage, path: str, **values) -> None:
 def test_settings_are_automatic_until_authored(tmp_path):
     for character in (read(tmp_path), read(tmp_path, lambda stage: retarget(stage, "/Arm"))):
         found = character.retarget
-        assert (found.tolerance, found.time_step, found.knot_spacing, found.smoothness) == (None,) * 4
+        assert (found.tolerance, found.goal, found.time_step, found.knot_spacing, found.smoothness) == (None,) * 5
         assert (found.reference, found.endpoints, found.cyclic) == ("rigid", "free", False)
 
 
 def test_authored_settings_are_read_in_si(tmp_path):
     def edit(stage):
         retarget(
-            stage, "/Arm", tolerance=0.1, timeStep=0.002, knotSpacing=0.05, smoothness=0.0, reference="static",
-            endpoints="kept", cyclic=True,
+            stage, "/Arm", tolerance=0.1, goal=0.5, timeStep=0.002, knotSpacing=0.05, smoothness=0.0,
+            reference="static", endpoints="kept", cyclic=True,
         )  # fmt: skip
 
     found = read(tmp_path, edit, Scale(0.01, 1.0)).retarget
-    assert found.tolerance == pytest.approx(1e-3) and found.time_step == pytest.approx(0.002)
+    assert found.tolerance == pytest.approx(1e-3) and found.goal == pytest.approx(5e-3)
+    assert found.time_step == pytest.approx(0.002)
     assert found.knot_spacing == pytest.approx(0.05) and found.smoothness == 0.0
     assert (found.reference, found.endpoints, found.cyclic) == ("static", "kept", True)
 

@@ -10,6 +10,7 @@ from calmotion.cli.retiming import refuse_unused_retiming, retime_options
 EXAMPLES = (
     ("calmotion optimize shot.usda -o calm.usda", "the usual case"),
     ("calmotion optimize shot.usda -o calm.usda --tolerance 0.5mm", "finer"),
+    ("calmotion optimize shot.usda -o calm.usda --goal 2mm", "stop when the targets are that good"),
     ("calmotion optimize shot.usda -o calm.usda --video calm.webp", "show others what changed"),
     ("calmotion optimize shot.usda -o calm.usda --retime", "slower where motors cannot follow"),
     ("calmotion optimize shot.usda -o calm.usda --bake simulated", "for viewers without physics"),
@@ -24,6 +25,13 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
     run_options(command)
     simulation_options(command, "optimize supports only bdf2")
+    command.add_argument(
+        "--goal",
+        metavar="LENGTH",
+        type=quantity("m", needs_unit=True, positive=True),
+        help="error at the targets that is accepted after optimising, with a unit (2mm): the search ends there, and "
+        "the report says where it cannot be reached (default: that of the shot, calm:retarget:goal, or none)",
+    )
     command.add_argument(
         "--avoid-reversals",
         metavar="WEIGHT",
@@ -66,6 +74,11 @@ def run(args: argparse.Namespace, output: Output) -> int:
         raise SettingError(
             "this is the number of robots of a robust search, and none is requested", path="--scenarios",
             found=args.scenarios, remedy="Add --robust, or leave it out.",
+        )  # fmt: skip
+    if args.goal is not None and robust:
+        raise SettingError(
+            "a goal ends the search for the robot of the model, and a robust search goes on for others", path="--goal",
+            found=f"{1e3 * args.goal:g}mm", remedy="Remove --goal or --robust.",
         )  # fmt: skip
     refuse_unused_retiming(args)
     return run_shot(optimize, args, output)

@@ -22,6 +22,7 @@ from calmotion.cli.reports.verdict import (
     shakes,
 )
 from calmotion.cli.tables import SHORTENED, print_table, say, with_texts
+from calmotion.model.result import GOAL_REACHED
 from calmotion.support.naming import distinct_names
 
 LONG_PATH = 60  # characters of a prim path from which on sentences and tables have its last names alone
@@ -219,7 +220,7 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
             console,
             f"resumed from the checkpoint of an interrupted run, after {report['resumed_iterations']} iterations",
         )
-    if suffix and report["stopped"] not in ("converged", ""):
+    if suffix and report["stopped"] not in ("converged", GOAL_REACHED, ""):
         gain, left = report["expected_further_gain_m"], max(t["max_error_after_m"] for t in report["targets"])
         # far from the limits, a step of the search promises more than there is
         more = f"; one more iteration may take away {about(gain)}" if gain is not None and gain < left else ""

@@ -73,7 +73,28 @@ def print_verdict(console: Console, report: dict[str, Any]) -> None:
         say(console, f"The table has {counted(len(rows) - HEADLINES, 'more target')}.")
     if is_optimized(report):
         print_reason(console, report)
+        _print_goal(console, report)
     _print_accuracy(console, report)
+
+
+def _print_goal(console: Console, report: dict[str, Any]) -> None:
+    """Whether the goal is reached at every target that counts."""
+    goal = report["goal_m"]
+    if goal is None:
+        return
+    if report["goal_kept"]:
+        say(console, f"The goal is reached: the largest error is at most {length(goal)}.")
+    else:
+        rows = [row for row in main_target_first(report) if not row["goal_kept"]]
+        left = ", ".join(f"{length(row['max_error_after_m'])} at {row['path']}" for row in rows[:HEADLINES])
+        more = f" and {counted(len(rows) - HEADLINES, 'more target')}" if len(rows) > HEADLINES else ""
+        ended = report["stopped"] in ("converged", "no further decrease")
+        how = "is out of reach with these motors, limits and weights" if ended else "is not reached"
+        say(console, f"The goal of {length(goal)} {how}: {left}{more}.")
+    error, apart = report["simulation_error_m"], min(abs(r["max_error_after_m"] - goal) for r in report["targets"])
+    if error is not None and error > apart:
+        finer = f"--tolerance {1e3 * max(apart, 0.1 * goal):.1g}mm"
+        say(console, f"The error of the simulation, {about(error)}, decides here: {finer} makes sure.")
 
 
 def _say_of(console: Console, row: dict[str, Any], rows: list[dict[str, Any]], what: str, is_so: str) -> None:

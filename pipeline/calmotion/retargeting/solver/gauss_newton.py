@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray
+from calmotion.model.result import GOAL_REACHED
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.retargeting.solver.limited_step import LimitedStep, LinearLimited, limited_step
 from calmotion.retargeting.solver.preconditioner import Sharpened
@@ -170,6 +171,7 @@ def minimize(
     max_products: int = 60,
     on_iterate: Callable[[Search], None] | None = None,
     onto_limits: Callable[[Any], tuple[Any, Array]] | None = None,
+    reached: Callable[[Any], bool] = lambda at: False,
 ) -> Search:
     """Minimise over the entries that are not fixed.
 
@@ -182,6 +184,7 @@ def minimize(
         on_iterate: Called with the search after every iteration.
         onto_limits: The problem and the point with which to go on where limits begin to act, from the minimum without
             them.
+        reached: Whether a point is good enough, so that the search ends there.
 
     Raises:
         SimulationFailure: The first point cannot be evaluated.
@@ -202,9 +205,10 @@ def minimize(
         return Search(at.x, radius, recycled, sharpened, tuple(history), *counts, reason, at)
 
     while True:
-        if len(history) >= max_iterations:
+        ended = GOAL_REACHED if reached(at) else "iteration limit" if len(history) >= max_iterations else ""
+        if ended:
             history.append(Iterate(at.merit, np.nan, np.nan, calls.evaluations, calls.products))
-            return here("iteration limit")
+            return here(ended)
         linear = at.linearized()
         gradient = calls.gradient(linear)
         norm = float(np.linalg.norm(gradient))

@@ -98,9 +98,13 @@ def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
             reading.note(f"{other.GetPath()}: {_SCHEMA} is neither on the root of the character nor above it; ignored")
     if not prim:
         return RetargetSettings(uncertainty=Uncertainty(calibrated=known_factors(reading.stage)))
-    tolerance = _positive(prim, "tolerance")
+    tolerance, goal = (
+        None if (found := _positive(prim, name)) is None else reading.units.length(found)
+        for name in ("tolerance", "goal")
+    )
     return RetargetSettings(
-        tolerance=None if tolerance is None else reading.units.length(tolerance),
+        tolerance=tolerance,
+        goal=goal,
         time_step=_positive(prim, "timeStep"),
         knot_spacing=_positive(prim, "knotSpacing"),
         smoothness=_positive(prim, "smoothness", zero=True),
