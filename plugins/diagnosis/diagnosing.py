@@ -57,6 +57,7 @@ class DiagnosedShot:
                 "model": found.situation is not None and found.situation.known,
                 "notes": found.notes,
                 "figures": self.figures,
+                "html": None,  # a page has words of this report, and is written after it
                 "total_wall_s": self.total_wall_s,
             }
         )

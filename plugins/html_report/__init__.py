@@ -36,7 +36,7 @@ class WritePage(Operator):
         from .scene import Detail, scene_of
 
         content, path = context.get(PageContent), context.get(OutputPaths).html or ""
-        character, animation, result = (context.get(kind) for kind in (Character, Animation, Result))
+        character, animation, result = context.get(Character), context.get(Animation), context.get(Result)
         plots = [*content.plots, *(found.figures if (found := context.get(Plots)) else ())]
         scene = None
         if character is not None and animation is not None and result is not None:

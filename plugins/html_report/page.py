@@ -124,8 +124,8 @@ def _provenance(origin: Mapping[str, Any]) -> str:
         rows = tuple((row["role"], row["path"], row["sha256"]) for row in inputs)
         lines.append(_table(TextTable("Inputs", ("input", "file", "SHA-256"), rows, texts=3)))
     if versions := origin.get("versions"):
-        rows = tuple((name, str(number)) for name, number in versions.items())
-        lines.append(_table(TextTable("Versions", ("program", "version"), rows, texts=2)))
+        named = tuple((name, str(number)) for name, number in versions.items())
+        lines.append(_table(TextTable("Versions", ("program", "version"), named, texts=2)))
     if settings := origin.get("settings"):
         shown = json.dumps(settings, indent=2, default=str)
         lines.append(f"<details><summary>Settings</summary><pre>{escape(shown)}</pre></details>")

@@ -140,9 +140,10 @@ def _surfaces(
     entries = []
     for b, s, surface in drawn:
         modes = modes_of(result.skins[b], s) if b >= 0 else None
-        fields = None if modes is None or bases[b] is None else modes @ bases[b][1]
+        basis = bases.get(b)
+        fields = None if modes is None or basis is None else modes @ basis[1]
         entries.append({"body": b} | _surface(surface, fields, share, packing))
-    return entries, {b: basis[0] for b, basis in bases.items() if basis is not None}
+    return entries, {b: found[0] for b, found in bases.items() if found is not None}
 
 
 def _basis(result: Result, body: int, motions: list[Motion]) -> tuple[list[Array], Array] | None:
@@ -170,7 +171,7 @@ def _surface(surface: SurfaceMesh, fields: Array | None, share: float, packing: 
         "color": list(surface.color if surface.color is not None else DEFAULT_COLOR),
         "points": packing.rounded(points.T, unit),
         "normals": packing.rounded(normals.T, 1.0 / 127.0),
-        "triangles": packing.rounded(triangles.ravel(), 1.0),
+        "triangles": packing.rounded(triangles.ravel().astype(float), 1.0),
     }
     if fields is not None:
         entry["fields"] = packing.rounded(np.moveaxis(fields[kept][copies], 2, 0).reshape(fields.shape[2], -1), 1e-4)
@@ -199,4 +200,4 @@ def thinned(points: Array, triangles: IntArray, count: int) -> tuple[IntArray, I
             kept, corners = kept[first], joined[real][np.sort(once)]
             break
         cells *= 0.85
-    return kept, corners
+    return kept, corners.astype(np.int32)

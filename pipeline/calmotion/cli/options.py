@@ -130,7 +130,7 @@ def run_options(command: argparse.ArgumentParser) -> None:
         "--strict",
         action="store_true",
         help="exit with status 1 if the simulation does not keep the tolerance, curves leave a larger error than the "
-        "animation or the goal, or a foot would be pulled, tip or slip; the outputs are written all the same",
+        "animation or the goal, or a foot would not stay; the outputs are written all the same",
     )
 
 

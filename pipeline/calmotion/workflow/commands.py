@@ -121,8 +121,9 @@ def optimize(
         Cancelled: `cancel` stopped the run before it had curves.
     """
     source = _source(tolerance, step, integrator, pre_roll, motors, verify=verify)
-    named = {"adjoint": adjoint, "goal": quantity_of(goal, "m", "goal")}
-    chosen: Settings = {"retarget.optimize": {name: value for name, value in named.items() if value is not None}}
+    named: dict[str, object] = {"adjoint": adjoint, "goal": quantity_of(goal, "m", "goal")}
+    given = {name: value for name, value in named.items() if value is not None}
+    chosen: Settings = {"retarget.optimize": given} if given else {}
     outcome = carry_out(
         _opened(shot), "optimize", wanted=_wanted(verify), operators=operators, source=source, outputs=outputs,
         settings=merge([_forced(keep, leave_out), chosen, _tempo(retime), read_settings(settings)]),

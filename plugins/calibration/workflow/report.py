@@ -20,6 +20,7 @@ def calibration_report(
     report: dict[str, Any] = plain(
         {
             "command": "calibrate",
+            "html": None,  # a page has words of this report, and is written after it
             "version": __version__,
             "parameters": [
                 {

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
     if args.shot is not None:
         args.shot = with_shot(args.shot)
         shot = opened_shot(args)
-    inputs = {} if shot is None else {"shot": args.shot}
+    inputs: dict[str, str] = {} if shot is None else {"shot": str(args.shot)}
     inputs |= {f"recording {k}": name.partition("@")[0] for k, name in enumerate(args.recording, start=1)}
     inputs |= {"commands": args.commands} if args.commands else {}
     host = shot.host if shot else open_host(args.plugins)

@@ -109,6 +109,7 @@ class BatchResult:
             "on": self.on,
             "wall_s": self.wall_s,
             "jobs_wall_s": worked,
+            "html": None,  # a page has words of this report, and is written after it
             "interrupted": self.interrupted,
             "outcomes": self.outcomes,
             "jobs": [job.as_dict() for job in self.jobs],

@@ -76,7 +76,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
             args.shots, args.output, command=command_of(args), arguments=forwarded(args), extras=extras_of(args),
             on=args.on, workers=args.workers, progress=display,
         )  # fmt: skip
-    report = result.report() | {"html": None}
+    report = result.report()
     if host is not None:
         from ..batch.drawing import plots_of
 

@@ -177,7 +177,7 @@ def test_a_compiler_takes_the_header(write, servos, tmp_path):
     written = write("ticks", file="2 shows.json", motors=str(servos))
     assert written.files[1].endswith("2 shows.h")
     program = tmp_path / "a.c"
-    values = "_2_SHOWS_FRAMES, (int)_2_shows_ticks[7][1], (int)_2_shows_start[0]"
+    values = "_2_SHOWS_FRAMES, (int)_2_shows_at(7, 1), (int)_2_shows_start[0]"
     lines = [f'#include "{written.files[1]}"', "#include <stdio.h>", "int main(void)", "{"]
     program.write_text("\n".join([*lines, f'printf("%d %d %d", {values}); return 0;', "}", ""]))
     from shutil import which

@@ -43,7 +43,7 @@ def test_a_calibration_says_what_the_recordings_tell_before_what_they_cost():
     channel = {"name": "marker /Arm/Hand", "unit": "m", "rms_before": 8e-4, "rms": 2e-4, "noise": 2e-4}
     report = {
         "parameters": rows, "channels": [channel | {"validation_rms": None}], "notes": ["a note"], "figures": [],
-        "layer": "mine.usda", "root": "mine_root.usda", "simulations": 3, "wall_s": 1.0, "step_s": 1e-3,
+        "html": None, "layer": "mine.usda", "root": "mine_root.usda", "simulations": 3, "wall_s": 1.0, "step_s": 1e-3,
         "step_shift": 0.1,
     }  # fmt: skip
     lines = printed(calibrate, report)
