@@ -64,6 +64,10 @@ def test_a_limit_of_effort_with_gravity_and_one_that_holds_no_pose():
     assert 0.0 < found.least_added_s < found.uniform_added_s
     lame = needed_tempo(times, values, limits(effort=0.9 * weight), efforts)
     assert lame.uniform == np.inf and lame.least_added_s == np.inf
+    assert lame.too_weak is not None and (lame.too_weak.motor, lame.too_weak.needed) == (0, pytest.approx(weight))
+    # a pose that only haste would carry is not held either
+    carried = MotorEfforts(np.full((801, 1), weight), np.full((801, 1), -0.5), np.zeros((801, 1)))
+    assert needed_tempo(times, values, limits(effort=0.8 * weight), carried).too_weak is not None
 
 
 def test_the_fastest_performance_keeps_the_limits_when_it_is_played():

@@ -295,6 +295,22 @@ def test_inspect_finds_animations_beyond_the_limits_of_motors(tmp_path, attribut
         assert tempo is None
 
 
+def test_inspect_names_the_motor_that_no_tempo_helps(tmp_path, calmotion):
+    """A hinge that lifts: the weight of its link, at its middle, needs more than the motor has."""
+    text = ONE_HINGE.replace('"PhysicsDriveAPI:angular"', '"PhysicsDriveAPI:angular", "CalmMotorAPI"')
+    text = text.replace("rel physics:body1", "float calm:motor:maxTorque = 1.5\n        rel physics:body1")
+    text = text.replace("physics:mass = 2", "physics:mass = 2\n        point3f physics:centerOfMass = (0.1, 0, 0)")
+    shot = tmp_path / "shot.usda"
+    shot.write_text(text + 'def PhysicsScene "Physics" {\n vector3f physics:gravityDirection = (0, -1, 0)\n'
+                    " float physics:gravityMagnitude = 9.81\n}\n")  # fmt: skip
+    tempo = cm.inspect(shot).report()["tempo"]
+    assert not tempo["possible"]
+    assert tempo["too_weak"]["path"] == HINGE and tempo["too_weak"]["limit"] == pytest.approx(1.5)
+    assert tempo["too_weak"]["needed"] == pytest.approx(2.0 * 9.81 * 0.1, rel=1e-3)
+    ended = calmotion("optimize", shot, "-o", tmp_path / "calm.usda", "--retime", "--step", "4ms")
+    assert ended.returncode != 0 and "no tempo helps" in ended.stderr and HINGE in ended.stderr
+
+
 def test_inspecting_a_robot_with_gains_and_without_animation_is_no_problem(tmp_path):
     samples = ".timeSamples = { 0: 0, 6: 10, 12: 30, 18: 20, 24: 0 }"
     still = ONE_HINGE.replace(samples, " = 0\n        float drive:angular:physics:stiffness = 5")

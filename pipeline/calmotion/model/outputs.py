@@ -195,6 +195,21 @@ class MotorEffects:
     ideal_droop: Array
 
 
+@dataclass(frozen=True)
+class TooWeak:
+    """A pose that a motor cannot hold, whatever the tempo: weight and springs alone need more than it has.
+
+    Attributes:
+        motor: Its index.
+        time_s: When, in the animation [s].
+        needed: Effort [N m or N].
+    """
+
+    motor: int
+    time_s: float
+    needed: float
+
+
 @dataclass(frozen=True, eq=False)
 class Tempo:
     """How much slower a motion has to be.
@@ -206,6 +221,7 @@ class Tempo:
             [s]. The latter does not know limits of jerk.
         times: Of the animation [s], shape [T].
         stretch: Of the fastest performance at these, shape [T].
+        too_weak: The pose that is farthest beyond its motor; None where all are held.
     """
 
     uniform: float
@@ -213,6 +229,7 @@ class Tempo:
     least_added_s: float
     times: Array
     stretch: Array
+    too_weak: TooWeak | None = None
 
 
 @dataclass(frozen=True, eq=False)

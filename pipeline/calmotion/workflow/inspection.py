@@ -101,17 +101,27 @@ def _beyond(character: Character, exceeded: ExceededLimits) -> Iterator[Finding]
         )  # fmt: skip
 
 
-def _tempo_report(exceeded: ExceededLimits | None) -> dict[str, Any] | None:
+def _tempo_report(character: Character, exceeded: ExceededLimits | None) -> dict[str, Any] | None:
     """How much slower the animation has to be; None where it need not, or that is not known."""
     tempo = None if exceeded is None else exceeded.tempo
     if tempo is None:
         return None
-    possible = bool(np.isfinite(tempo.uniform))
+    possible, weak = bool(np.isfinite(tempo.uniform)), tempo.too_weak
+    held = None if weak is None else character.motors[weak.motor]
     return {
         "possible": possible,
         "uniform_stretch": tempo.uniform if possible else None,
         "uniform_added_s": tempo.uniform_added_s if possible else None,
         "least_added_s": tempo.least_added_s if possible else None,
+        "too_weak": None
+        if weak is None or held is None
+        else {
+            "path": held.path,
+            "time_s": weak.time_s,
+            "needed": weak.needed,
+            "limit": held.max_torque,
+            "unit": measure_of(held).effort_unit,
+        },
     }
 
 
@@ -175,7 +185,7 @@ def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]
             for target in character.targets
         ],
         "limits": [limit_row(character, use) for use in exceeded.uses] if exceeded else [],
-        "tempo": _tempo_report(exceeded),
+        "tempo": _tempo_report(character, exceeded),
         "effects_of_gains": _effects(character, run.get(MotorEffects)),
         "expected": _expected(character, animation),
         "system_frequencies_hz": modes.frequencies[:SHOWN_MODES].tolist() if modes else [],

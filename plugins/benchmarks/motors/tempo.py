@@ -5,7 +5,7 @@ animation needs, and finds tempo and curves. Added times are compared with the l
 what TOPP-RA adds (where the package `toppra` is there; it knows no efforts here), and with one tempo for the whole.
 Limits are checked on fine samples of the curves, efforts in a simulation by Newmark's scheme and a quarter of the
 step. The command fails where a limit is exceeded by more than a thousandth, or the error is above the tolerance and
-above that at full tempo.
+was not at full tempo.
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ class Row:
 
     @property
     def kept(self) -> bool:
-        """Whether the limits and the error are."""
-        missed = self.after_mm > max(self.tolerance_mm, self.full_tempo_mm)
+        """Whether the limits are, and the error is within the tolerance where it was at full tempo."""
+        missed = self.full_tempo_mm <= self.tolerance_mm < self.after_mm
         return not (self.excess > EXCEEDED or missed)
 
 

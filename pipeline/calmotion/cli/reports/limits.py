@@ -32,7 +32,9 @@ def print_tempo(console: Console, tempo: dict[str, Any] | None) -> None:
     if tempo is None:
         return
     if not tempo["possible"]:
-        say(console, "No tempo helps: in some pose a motor is too weak to hold the robot.")
+        if (weak := tempo["too_weak"]) is not None:
+            needed = f"{weak['needed']:.4g} {weak['unit']} at {weak['time_s']:.2f} s against weight"
+            say(console, f"No tempo helps: {weak['path']} has {weak['limit']:.4g} {weak['unit']}, and needs {needed}.")
         return
     whole, parts = tempo["uniform_added_s"], tempo["least_added_s"]
     stretch = f"{tempo['uniform_stretch']:.0%} of its time ({whole:.2f} s more)"

@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import Track
 from calmotion.model.curves import held_curve
+from calmotion.model.motor import measure_of
 from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
@@ -45,4 +46,8 @@ def tempo_input(shot: CompiledShot, options: RunSettings, tracks: Sequence[Track
         except SimulationFailure as failure:
             raise failure_error(prepared, failure) from failure
     frames = shot.animation.frame_times
-    return TempoInput(grid.times[grid.judged], curves, limits, efforts, float(frames[1] - frames[0]))
+    motors = shot.character.motors
+    return TempoInput(
+        grid.times[grid.judged], curves, limits, efforts, float(frames[1] - frames[0]),
+        tuple(motor.path for motor in motors), tuple(measure_of(motor).effort_unit for motor in motors),
+    )  # fmt: skip

@@ -33,6 +33,7 @@ class TempoInput:
         limits: Of the motors.
         efforts: Of the rigid robot at these times; None where none is limited.
         frame: Length of a frame [s].
+        names, units: Paths of the motors and units of their efforts, for errors.
     """
 
     times: Array
@@ -40,6 +41,8 @@ class TempoInput:
     limits: TempoLimits
     efforts: MotorEfforts | None
     frame: float
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +74,15 @@ def find_tempo(given: TempoInput, settings: TempoSettings, path: str) -> FoundTe
         ShotError: Pinned times and limits contradict each other, or no tempo helps.
     """
     needed = needed_tempo(given.times, given.curves(given.times, 0), given.limits, given.efforts)
-    if not np.isfinite(needed.uniform):
+    if (weak := needed.too_weak) is not None:
+        unit = given.units[weak.motor] if given.units else "N m"
         raise ShotError(
-            "no tempo helps: in some pose a motor is too weak to hold the robot",
-            path=path,
+            "no tempo helps: the motor is too weak to hold the robot in a pose against its weight",
+            path=given.names[weak.motor] if given.names else path,
             attribute="calm:motor:maxTorque",
-            remedy="Raise it where `calmotion inspect` says that it is exceeded, or leave --retime out.",
+            found=f"{given.limits.effort[weak.motor]:.4g} {unit}, where it takes {weak.needed:.4g} {unit} at "
+            f"{weak.time_s:.2f} s however slow the motion is",
+            remedy="Raise it if the motor can do more, make the robot lighter, change the pose, or leave --retime out.",
         )
     end = float(given.times[-1])
     if needed.uniform == 1.0:

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import linprog
 
 from calmotion.arrays import Array
-from calmotion.model.outputs import Tempo
+from calmotion.model.outputs import Tempo, TooWeak
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,8 @@ def needed_tempo(
     if uniform <= 1.0 + FINEST and fastest == 1.0:
         return Tempo(1.0, 0.0, 0.0, few, np.ones(len(few)))
     if not np.isfinite(uniform):
-        return Tempo(np.inf, np.inf, np.inf, few, np.full(len(few), np.inf))
+        weak = _too_weak(times, limits, efforts)
+        return Tempo(np.inf, np.inf, np.inf, few, np.full(len(few), np.inf), weak)
     square = _fastest(few, curve, limits, _between(times, few, efforts), (fastest, 2.0 * uniform))
     root = np.sqrt(square)
     added = float(np.sum(np.diff(few) * (2.0 / (root[:-1] + root[1:]) - 1.0)))
@@ -86,10 +87,18 @@ def _uniform(derivatives: list[Array], limits: TempoLimits, efforts: MotorEffort
         found = max(found, float(np.max(np.abs(derivatives[order]) / largest, initial=0.0)) ** (1.0 / order))
     if efforts is None:
         return found
-    left = np.where(efforts.by_square > 0.0, limits.effort - efforts.at_rest, limits.effort + efforts.at_rest)
-    if np.any(left <= 0.0):
+    if np.any(np.abs(efforts.at_rest) >= limits.effort):
         return np.inf
+    left = np.where(efforts.by_square > 0.0, limits.effort - efforts.at_rest, limits.effort + efforts.at_rest)
     return max(found, float(np.sqrt(np.max(np.abs(efforts.by_square) / left, initial=0.0))))
+
+
+def _too_weak(times: Array, limits: TempoLimits, efforts: MotorEfforts | None) -> TooWeak | None:
+    if efforts is None:
+        return None
+    needed = np.abs(efforts.at_rest)
+    at, motor = np.unravel_index(np.argmax(needed / limits.effort), needed.shape)
+    return TooWeak(int(motor), float(times[at]), float(needed[at, motor]))
 
 
 def _between(times: Array, few: Array, efforts: MotorEfforts | None) -> MotorEfforts | None:
