@@ -127,9 +127,9 @@ def plot_convergence(result: Result) -> Figure:
     """
     figure = new_figure(WIDTH, 3.2)
     # A step counts the sweeps of its own linear solve as well, which come after its objective is known.
-    sweeps = [0, *(step.linearized_sweeps for step in result.steps[:-1])]
-    work = [step.forward_simulations + before for step, before in zip(result.steps, sweeps, strict=True)]
-    objectives = [step.objective for step in result.steps]
+    sweeps = [0, *(step.linearized_sweeps for step in result.search.steps[:-1])]
+    work = [step.forward_simulations + before for step, before in zip(result.search.steps, sweeps, strict=True)]
+    objectives = [step.objective for step in result.search.steps]
     finer = [k for k in range(1, len(objectives)) if objectives[k] > objectives[k - 1]]
     told = sorted(finer, key=lambda k: objectives[k] / objectives[k - 1])[-1:]  # where it makes most of a difference
     panels = (
@@ -137,7 +137,7 @@ def plot_convergence(result: Result) -> Figure:
         ("gradient_norm", "norm of the projected gradient [m² s/rad]", INTENDED),
     )
     for axes, (name, title, color) in zip(figure.subplots(1, 2), panels, strict=True):
-        values = [getattr(step, name) for step in result.steps]
+        values = [getattr(step, name) for step in result.search.steps]
         for first, end in zip([0, *finer], [*finer, len(values)], strict=True):
             axes.semilogy(work[first:end], values[first:end], color=color, marker="o", markersize=4)
         if name == "objective" and result.objective_before > 1.001 * values[0]:

@@ -34,7 +34,7 @@ def plots_of(
     for page, first in enumerate(range(0, len(character.motors), MOTORS_ON_A_PAGE), start=1):
         motors = range(first, min(first + MOTORS_ON_A_PAGE, len(character.motors)))
         yield "motors" if page == 1 else f"motors_{page}", "Motors", plot_motors(character, result, motors)
-    if len(result.steps) > 1:
+    if len(result.search.steps) > 1:
         yield "convergence", "The search", plot_convergence(result)
     if result.retimed is not None and result.retimed.animation.tempo is not None:
         yield "tempo", "Tempo", plot_tempo(character, result.retimed)

@@ -40,7 +40,6 @@ _FORCED = {
     "elasticity": "Nonlinear elasticity of all flexible bodies, or linear",
     "motors": "All motors that may change, or only those that move a target, without a check at the end",
     "directions": "All elastic coordinates of nonlinear bodies and all pairs of them, or the smallest subspaces",
-    "ranges": "The whole shot, or only its active intervals, without a check at the end",
 }
 _AUTO = {"bodies": "of all"}  # of the others: by the tolerance
 

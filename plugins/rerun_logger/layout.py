@@ -45,7 +45,7 @@ def make_blueprint(character: Character, animation: Animation, result: Result, s
     tabs += [motor_tab(motor) for motor in character.motors[:MOTOR_TABS]]
     if result.before.motion.joint_forces is not None:
         tabs.append(reactions_tab())
-    if result.steps:
+    if result.search.steps:
         tabs.append(plot("Optimiser (choose the timeline: iteration)", "optimizer"))
     below = rrb.Horizontal(
         rrb.Tabs(*tabs, active_tab=0),

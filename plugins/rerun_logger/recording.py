@@ -240,12 +240,12 @@ def log_changes(recording: rr.RecordingStream, character: Character, result: Res
 
 def log_progress(recording: rr.RecordingStream, result: Result) -> None:
     """Objective and gradient of each iteration, as powers of ten since a plot has no logarithmic axis."""
-    if not result.steps:
+    if not result.search.steps:
         return
-    iterations = [rr.TimeColumn(ITERATION, sequence=range(len(result.steps)))]
+    iterations = [rr.TimeColumn(ITERATION, sequence=range(len(result.search.steps)))]
     series = {
-        "log10_objective": [step.objective for step in result.steps],
-        "log10_gradient_norm": [step.gradient_norm for step in result.steps],
+        "log10_objective": [step.objective for step in result.search.steps],
+        "log10_gradient_norm": [step.gradient_norm for step in result.search.steps],
     }
     for (name, values), color in zip(series.items(), ((0, 114, 178), (150, 150, 150)), strict=True):
         powers = np.log10(np.maximum(np.abs(np.array(values, dtype=float)), 1e-300))

@@ -29,7 +29,7 @@ def describe(
     parts += [budget(result), left_out(result)]
     if character.notes:
         parts.append("## Notes on the shot\n" + "\n".join(f"- {note}" for note in character.notes))
-    if result.steps:
+    if result.search.steps:
         parts.append(progress_table(result))
     if operators:
         parts.append(operators_table(operators))
@@ -77,7 +77,9 @@ def sizes(character: Character, result: Result, system: SystemModes | None) -> s
         size = f"{table.nodes} nodes, {table.elements} elements, {table.mass:.3g} kg"
         lines.append(f"- `{names[character.bodies[table.body].path]}`: {size}; clamped at its parent: {shown}{more} Hz")
     if result.after is not None:
-        lines.append(f"- {result.iterations} iterations in {result.wall_s:.2f} s, {result.parameters} parameters")
+        lines.append(
+            f"- {result.search.iterations} iterations in {result.wall_s:.2f} s, {result.search.parameters} parameters"
+        )
     return "## Model\n" + "\n".join(lines)
 
 
@@ -119,7 +121,7 @@ def operators_table(operators: Sequence[OperatorResult]) -> str:
 def progress_table(result: Result) -> str:
     """The optimiser's iterations."""
     rows = ["| iteration | objective | gradient | simulations | linearised sweeps |", "|---:|---:|---:|---:|---:|"]
-    for k, step in enumerate(result.steps):
+    for k, step in enumerate(result.search.steps):
         numbers = f"{step.objective:.4g} | {step.gradient_norm:.3g}"
         rows.append(f"| {k} | {numbers} | {step.forward_simulations} | {step.linearized_sweeps} |")
     return "## Optimiser\n" + "\n".join(rows)

@@ -271,7 +271,7 @@ class OptimizeShot(Operator):
                 "warning", "interrupted: these are the best curves so far; the same command resumes from them"
             )
         if not result.improved:
-            reason = f"the search ended: {result.stopped}"
+            reason = f"the search ended: {result.search.stopped}"
             if any(map(is_exceeded, result.limits)):
                 reason = "limits of motors are still exceeded. Slow the animation down there, or raise the limits"
             elif any(map(is_reached, result.limits)):

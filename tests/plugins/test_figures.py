@@ -146,7 +146,7 @@ def test_convergence_begins_with_the_motion_as_animated(figures):
     axes = figures.curves.plot_convergence(result).axes[0]
     work, objective = axes.get_lines()[0].get_data()
     assert list(work) == [1, 2, 23, 44], "simulations, and the sweeps that came before each iterate"
-    assert list(objective) == [step.objective for step in result.steps] and axes.get_xlim()[0] == 0.0
+    assert list(objective) == [step.objective for step in result.search.steps] and axes.get_xlim()[0] == 0.0
 
 
 def robustness():

@@ -5,7 +5,7 @@ import pytest
 import synthetic
 from calmotion import ShotError
 from calmotion.host import NotAsked
-from calmotion.model import Character, Result
+from calmotion.model import Character, Result, SearchRecord
 from calmotion.model.limits.use import LimitUse
 from calmotion.model.outputs import ShapedTracks, SystemModes, Verification
 from calmotion.model.run import OutputPaths, RunSettings, Source
@@ -71,7 +71,7 @@ def test_properties_reach_the_optimiser(with_mesher):
     outcomes = {result.idname: (result.outcome, result.error) for result in run}
     assert outcomes["retarget.optimize"][0] == "done", outcomes
     result = run.get(Result)
-    assert result.gradients == 1 and result.objective_after < result.objective_before
+    assert result.search.gradients == 1 and result.objective_after < result.objective_before
     moving = [curve for curve in result.curves if curve.changed]
     assert moving and np.all(np.diff(moving[0].knots) > 0.15)
     frequencies, damping = run.get(SystemModes).frequencies, run.get(SystemModes).damping
@@ -142,7 +142,7 @@ def test_worse_curves_are_blamed_on_limits_only_where_one_is_reached(host, monke
     made = dataclasses.replace(
         synthetic.result(),
         objective_after=1.0,
-        stopped="iteration limit",
+        search=SearchRecord(stopped="iteration limit"),
         limits=(LimitUse(0, "position", 1.0, 0.5, 1.0 + excess, 0.1, excess, cost),),
     )
     monkeypatch.setattr("calmotion.retargeting.retiming.retime.optimize_with_tempo", lambda *rest: made)

@@ -39,7 +39,7 @@ def result(looping, dance, bodies):
 def test_a_cyclic_shot_has_no_shake_and_no_seam(result):
     before, after = (s.position_errors[:, 1].max() for s in (result.before, result.after))
     assert before > 0.01 and after < 0.15 * before
-    assert result.objective_after < 0.1 * result.objective_before and result.stopped == "converged"
+    assert result.objective_after < 0.1 * result.objective_before and result.search.stopped == "converged"
     assert result.before.seam.max() < 1e-8 and result.after.seam.max() < 1e-8
     # the instant before the loop is no part of the result
     assert result.after.motion.times[0] == 0.0 and len(result.after.motion.times) == 361

@@ -52,7 +52,7 @@ def test_the_hand_that_was_off_by_a_quarter_of_a_metre_follows_to_a_few_millimet
     assert before[1] > 0.2
     assert after[1] < 0.01 and after[1] < before[1] / 35.0
     assert max(result.before.max_joint_gap, result.after.max_joint_gap) < 1e-6
-    assert result.stopped == "converged"
+    assert result.search.stopped == "converged"
 
 
 @pytest.mark.long

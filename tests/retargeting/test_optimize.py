@@ -51,7 +51,7 @@ def test_error_at_the_payload_falls_at_least_tenfold(result):
     assert before[1] > 0.01, "the input should shake visibly"
     assert after[1] < 0.1 * before[1]
     assert result.objective_after < 0.03 * result.objective_before
-    values = [step.objective for step in result.steps]
+    values = [step.objective for step in result.search.steps]
     assert all(b < a for a, b in zip(values, values[1:], strict=False))
 
 
@@ -99,7 +99,7 @@ def test_optimising_the_result_again_gains_nothing(result, arm, animation, bodie
     again = optimize_shot(
         compile_shot(arm, Animation(animation.frame_times, animation.tracks, tracks), bodies), OPTIONS, checked
     )
-    assert again.iterations <= 2
+    assert again.search.iterations <= 2
     assert again.objective_after <= result.objective_after * (1 + 1e-6)
 
 

@@ -33,7 +33,7 @@ def begun_with(found, animation):
 
 
 def products(result):
-    return result.linearized_sweeps
+    return result.search.linearized_sweeps
 
 
 def test_the_directions_of_the_last_search_save_sweeps(arm, animation, bodies, left):

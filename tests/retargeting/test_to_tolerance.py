@@ -18,7 +18,7 @@ def test_an_interrupt_after_the_search_keeps_its_curves(arm, animation, bodies, 
 
     monkeypatch.setattr(to_tolerance, where, interrupt)
     found = optimize_to_tolerance(compile_shot(arm, animation, bodies), OPTIONS, ignore_progress)
-    assert found.interrupted and found.stopped == "interrupted"
+    assert found.interrupted and found.search.stopped == "interrupted"
     assert found.objective_after < 0.1 * found.objective_before
     interrupts.check()  # it was answered
 

@@ -27,13 +27,15 @@ def test_a_target_at_the_hinge_of_a_link_that_nothing_moves_is_named(tmp_path, b
 
 def test_the_main_target_and_the_causes_of_what_remains_follow_from_weights_motors_and_limits(tmp_path):
     found = cm.optimize(write_arm(tmp_path / "arm.usda"), step=1 / 48, pre_roll=0.0)
-    character, result = found.shot.character, replace(found.result, tolerance_m=0.0, limits=(), stopped="converged")
+    character, result = found.shot.character, replace(found.result, tolerance_m=0.0, limits=())
+    result = replace(result, search=replace(result.search, stopped="converged"))
     (tip,) = character.targets
     assert main_target(character, result) == tip.path
     (row,) = remaining_errors(character, result)
     assert row["path"] == tip.path and row["max_error_m"] == found.max_error
     assert (row["directions"], row["motors"], row["causes"]) == (3, 2, ["motors"])
-    assert remaining_errors(character, replace(result, stopped="no further decrease"))[0]["causes"][0] == "search"
+    ended = replace(result, search=replace(result.search, stopped="no further decrease"))
+    assert remaining_errors(character, ended)[0]["causes"][0] == "search"
     assert remaining_errors(character, replace(result, tolerance_m=1.0)) == []
     assert remaining_errors(character, replace(result, after=None)) == []
     light = replace(tip, path="/light", position_weight=0.5)

@@ -22,7 +22,6 @@ MEANINGS = {
     "directions": "subspaces for nonlinear bodies and their quadratic strain",
     "elasticity": "linear elastic law",
     "motors": "no optimisation of motors without influence on the targets",
-    "ranges": "no optimisation in inactive intervals",
 }
 KINDS = tuple(MEANINGS)
 

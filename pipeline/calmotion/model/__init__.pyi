@@ -78,7 +78,6 @@ from calmotion.model.result import Accuracy as Accuracy
 from calmotion.model.result import ModeTable as ModeTable
 from calmotion.model.result import Motion as Motion
 from calmotion.model.result import MotorCurve as MotorCurve
-from calmotion.model.result import OptimizerStep as OptimizerStep
 from calmotion.model.result import Result as Result
 from calmotion.model.result import Simplification as Simplification
 from calmotion.model.result import Simulation as Simulation
@@ -88,9 +87,11 @@ from calmotion.model.retiming.tempo import TempoSettings as TempoSettings
 from calmotion.model.run import LONG_SHOT as LONG_SHOT
 from calmotion.model.run import SHAPERS as SHAPERS
 from calmotion.model.run import InputLayer as InputLayer
+from calmotion.model.run import OptimizerStep as OptimizerStep
 from calmotion.model.run import OutputPaths as OutputPaths
 from calmotion.model.run import Provenance as Provenance
 from calmotion.model.run import RunSettings as RunSettings
+from calmotion.model.run import SearchRecord as SearchRecord
 from calmotion.model.run import Source as Source
 from calmotion.model.table import columns as columns
 from calmotion.model.tolerance import reach as reach

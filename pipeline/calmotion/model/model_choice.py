@@ -12,7 +12,7 @@ from calmotion.model.result import Result, Simplification
 from calmotion.model.run import RunSettings, Source
 
 # What can be forced on or off.
-KINDS = ("bodies", "turning", "loops", "modes", "directions", "elasticity", "motors", "ranges")
+KINDS = ("bodies", "turning", "loops", "modes", "directions", "elasticity", "motors")
 AUTO, ON, OFF = "auto", "on", "off"
 
 
@@ -77,7 +77,7 @@ def run_settings(source: Source | None, choices: ModelChoices | None = None, **m
         more: Other fields of the settings.
     """
     if choices is not None:
-        more |= {kind: choices.choice(kind) for kind in ("directions", "motors", "ranges")}
+        more |= {kind: choices.choice(kind) for kind in ("directions", "motors")}
     return replace(RunSettings() if source is None else source.settings, **more)
 
 

@@ -1,4 +1,4 @@
-"""Results: simulated motions, errors, curves, and the optimiser's progress."""
+"""Results: simulated motions, errors, and curves."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from calmotion.model.animation import Animation
 from calmotion.model.budget import BudgetEntry
 from calmotion.model.limits.use import LimitUse
 from calmotion.model.retiming.retimed import Retimed
+from calmotion.model.run import SearchRecord
 from calmotion.model.uncertainty import Robustness
 
 
@@ -140,16 +141,6 @@ _NOTICED_RISE = 0.01  # of the tolerance
 
 
 @dataclass(frozen=True, eq=False)
-class OptimizerStep:
-    """One iteration of the optimiser: objective, gradient norm (projected), products and simulations so far."""
-
-    objective: float
-    gradient_norm: float
-    forward_simulations: int
-    linearized_sweeps: int
-
-
-@dataclass(frozen=True, eq=False)
 class ModeTable:
     """Frequencies of a flexible body [Hz], clamped at its parent side, the size of its mesh, and the relative error of
     its stiffness by the mesh (None: not known).
@@ -231,25 +222,17 @@ class Result:
         skins: One for each body; None for a rigid one.
         modes: One for each flexible body.
         curves: One for each motor, empty for `simulate`.
-        steps: The optimiser's progress, first entry the start.
+        search: How the curves were found; that of no iteration for `simulate`.
         objective_before, objective_after: Value of the objective.
-        gradients, linearized_sweeps, forward_simulations, iterations, parameters: Counts.
         wall_s: The optimisation alone (or the simulation, for `simulate`) [s].
-        processor_s: Processor time of the optimisation alone [s]; None for `simulate`.
         step_s: Time step [s].
         pre_roll_s: Length of the pre-roll [s].
         dof: Number of position coordinates (6 a body, and the elastic ones).
         left_out: What was left out.
         limits: Limits of the motors.
-        stopped: Why the optimiser stopped.
-        expected_gain_m: By how much the root-mean-square error was expected to fall in one more iteration [m].
-        interrupted: Whether the user stopped it; the best curves so far are here.
         performed: A rigid robot performing the curves that were found (or simulated); same times. None where a
             linkage cannot follow them rigidly.
         accuracy: Of the motion that counts, `after` or else `before`; None where it was not estimated.
-        idle_gain_m: By how much the root-mean-square error would fall with the motors that were left out of the search
-            since they move no target [m]; None where there are none.
-        resumed_iterations: Iterations of an interrupted search from which this one resumed.
         tolerance_m: Accuracy of the simulation at the targets [m].
         budget: What each approximation may cost and is estimated to cost, largest first; empty where it is not known.
         error_shares: What motors and links have in the error of the input; None where motors are ideal.
@@ -266,36 +249,30 @@ class Result:
     skins: tuple[Skin | None, ...]
     modes: tuple[ModeTable, ...]
     curves: tuple[MotorCurve, ...]
-    steps: tuple[OptimizerStep, ...]
     objective_before: float
     objective_after: float | None
-    gradients: int
-    linearized_sweeps: int
-    forward_simulations: int
-    iterations: int
-    parameters: int
     wall_s: float
     step_s: float
     pre_roll_s: float
     dof: int
+    search: SearchRecord = SearchRecord()
     left_out: tuple[Simplification, ...] = ()
     limits: tuple[LimitUse, ...] = ()
-    stopped: str = ""
-    expected_gain_m: float | None = None
-    interrupted: bool = False
     performed: Motion | None = None
     accuracy: Accuracy | None = None
-    idle_gain_m: float | None = None
-    resumed_iterations: int = 0
     tolerance_m: float = 0.0
     budget: tuple[BudgetEntry, ...] = ()
     error_shares: ErrorShares | None = None
     lost_motion: tuple[LostMotion, ...] = ()
     robustness: Robustness | None = None
-    processor_s: float | None = None
     friction_band_m: Array | None = None
     retimed: Retimed | None = None
     goal_m: float | None = None
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the user ended the search; the best curves so far are here."""
+        return self.search.interrupted
 
     def performed_animation(self, animation: Animation) -> Animation:
         """An animation at the tempo of this result."""

@@ -1,9 +1,9 @@
-"""Input of the user: the command, the settings of the run, and the files to write."""
+"""A run: the command, its settings, the files to write, and the work of its search."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from calmotion.model.budget import SEARCH_SHARE
 from calmotion.model.retiming.tempo import TempoSettings
@@ -25,7 +25,6 @@ class RunSettings:
         max_iterations: Largest number of Gauss-Newton iterations.
         least_gain: A smaller predicted gain ends the search, a part of the tolerance.
         adjoint: `discrete` or `continuous`.
-        ranges: `auto`, `on` (the whole shot is searched) or `off` (inactive intervals are not checked at the end).
         motors: `auto`, `on` (every motor may change) or `off` (idle motors are not checked at the end).
         ideal_motors: Whether joints follow their curves exactly, whatever the models of their motors say.
         directions: `auto`, `on` (bodies keep all coordinates) or `off` (the smallest POD subspaces at any error).
@@ -47,7 +46,6 @@ class RunSettings:
     max_iterations: int = 30
     least_gain: float = SEARCH_SHARE
     adjoint: str = "discrete"
-    ranges: str = "auto"
     motors: str = "auto"
     ideal_motors: bool = False
     directions: str = "auto"
@@ -144,3 +142,65 @@ class Provenance:
     default_prim: str
     earlier_layers: tuple[str, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class OptimizerStep:
+    """One iteration of the optimiser: objective, gradient norm (projected), products and simulations so far."""
+
+    objective: float
+    gradient_norm: float
+    forward_simulations: int
+    linearized_sweeps: int
+
+
+@dataclass(frozen=True)
+class SearchRecord:
+    """One or several searches.
+
+    Attributes:
+        steps: Progress, first entry the start; empty without a search.
+        parameters, iterations, forward_simulations, gradients, linearized_sweeps: Counts.
+        processor_s: Processor time [s]; None: not measured.
+        stopped: Why it ended.
+        expected_gain_m: By how much the root-mean-square error was expected to fall in one more iteration [m].
+        interrupted: Whether the user ended it.
+        idle_gain_m: By how much the root-mean-square error would fall with the motors that were left out of the search
+            since they move no target [m]; None where there are none.
+        resumed_iterations: Iterations of an interrupted search from which this one resumed.
+    """
+
+    steps: tuple[OptimizerStep, ...] = ()
+    parameters: int = 0
+    iterations: int = 0
+    forward_simulations: int = 0
+    gradients: int = 0
+    linearized_sweeps: int = 0
+    processor_s: float | None = None
+    stopped: str = ""
+    expected_gain_m: float | None = None
+    interrupted: bool = False
+    idle_gain_m: float | None = None
+    resumed_iterations: int = 0
+
+    def after(self, first: SearchRecord) -> SearchRecord:
+        """This search, with the work of the one before it."""
+        simulations, sweeps = first.steps[-1].forward_simulations, first.steps[-1].linearized_sweeps
+        steps = tuple(
+            replace(
+                step,
+                forward_simulations=simulations + step.forward_simulations,
+                linearized_sweeps=sweeps + step.linearized_sweeps,
+            )
+            for step in self.steps
+        )
+        return replace(
+            self,
+            steps=first.steps + steps,
+            iterations=first.iterations + self.iterations,
+            forward_simulations=first.forward_simulations + self.forward_simulations,
+            gradients=first.gradients + self.gradients,
+            linearized_sweeps=first.linearized_sweeps + self.linearized_sweeps,
+            processor_s=(first.processor_s or 0.0) + (self.processor_s or 0.0),
+            resumed_iterations=first.resumed_iterations + self.resumed_iterations,
+        )

@@ -1,35 +1,33 @@
-"""State of a search on disk: written atomically, verified, and read only for the same problem and the same code."""
+"""The best point of a search on disk: written atomically, verified, and read only for the same problem and code.
+
+A search that resumes begins at the point. What the file says of it is simulated again; nothing else is believed.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
 import logging
-from dataclasses import astuple, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from calmotion.arrays import BoolArray, IntArray
-from calmotion.retargeting.problem.limits import LimitTerms
+from calmotion.arrays import Array, BoolArray, IntArray
+from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.retargeting.solver.gauss_newton import Iterate, Search
-from calmotion.retargeting.solver.preconditioner import Sharpened
-from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.support.caching.sources import source_digest
 from calmotion.support.caching.verified_files import DamagedFileError, read_arrays, write_arrays
 
-# The state of a search belongs to the code that computed it.
+# A point belongs to the code that computed it.
 _ROOMS = ("linear_algebra", "multibody", "retargeting", "simulation", "support")
-_OF_LIMITS = ("rho", "first", "left", "reached", "stalled", "on")
-MERIT_ROUNDING = 1e-4  # largest relative difference of the merit when a stored point is simulated again
+OBJECTIVE_ROUNDING = 1e-4  # largest relative difference of the objective when a stored point is simulated again
 LOG = logging.getLogger("calmotion")
 
 
 def checkpoint_path(layer: str) -> Path:
-    """The file beside a layer that contains the state of its optimisation."""
+    """The file beside a layer that contains the best point of its optimisation."""
     path = Path(layer)
     return path.with_name(f".{path.name}.checkpoint.npz")
 
@@ -61,33 +59,35 @@ def problem_key(problem: RetargetProblem, fixed: BoolArray, settings: object) ->
 
 
 @dataclass(frozen=True, eq=False)
-class StoredSearch:
-    """A search as it was stored.
+class StoredPoint:
+    """The best point of a search that was interrupted.
 
     Attributes:
-        search: Its state.
-        breaks: Frames of its knots.
-        merit: At its point, with the multipliers of its limits.
-        limits: Multipliers and state of its limits, by name; empty without limits.
+        x: Its coefficients, shape [n].
+        breaks: Frames of its knots, shape [k].
+        objective: Its objective, without the terms of limits.
+        iterations: That led to it.
     """
 
-    search: Search
+    x: Array
     breaks: IntArray
-    merit: float
-    limits: dict[str, Any]
+    objective: float
+    iterations: int
 
-    def matches(self, merit: float) -> bool:
-        """Whether the point has the recorded merit when it is simulated again."""
-        return bool(np.isfinite(merit) and abs(merit - self.merit) <= MERIT_ROUNDING * max(abs(self.merit), abs(merit)))
+    def fits(self, basis: OffsetBasis) -> bool:
+        """Whether its knots are knots of the shot of a basis."""
+        ends = basis.breaks[[0, -1]]
+        return bool(np.all(np.diff(self.breaks) > 0) and np.array_equal(self.breaks[[0, -1]], ends))
 
-    def restored(self, limits: LimitTerms | None) -> LimitTerms | None:
-        """Limits in the stored state."""
-        return None if limits is None else replace(limits, **self.limits)
+    def matches(self, objective: float) -> bool:
+        """Whether the point has the recorded objective when it is simulated again."""
+        rounding = OBJECTIVE_ROUNDING * max(abs(self.objective), abs(objective))
+        return bool(np.isfinite(objective) and abs(objective - self.objective) <= rounding)
 
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """The state of the search of one problem in one verified file; without a path nothing is written.
+    """The best point of the search of one problem in one verified file; without a path nothing is written.
 
     Attributes:
         path: The file.
@@ -97,32 +97,16 @@ class Checkpoint:
     path: Path | None
     key: str
 
-    def save(self, search: Search, limits: LimitTerms | None, breaks: IntArray, merit: float) -> None:
-        """Write the state. If the folder cannot be written, nothing happens and the run continues.
-
-        Args:
-            merit: At the point of the search.
-        """
+    def save(self, point: StoredPoint) -> None:
+        """Write the point. If the folder cannot be written, nothing happens and the run continues."""
         if self.path is None:
             return
-        values: dict[str, Any] = {
-            "x": search.x, "breaks": breaks, "p": search.recycled.p, "Hp": search.recycled.Hp,
-            "sharpened": np.zeros(0) if search.sharpened is None else search.sharpened.point,
-            "history": np.array([astuple(iterate) for iterate in search.history], float),
-        }  # fmt: skip
-        state: dict[str, object] = {
-            "key": self.key, "merit": merit, "radius": search.radius, "evaluations": search.evaluations,
-            "gradients": search.gradients, "products": search.products, "reason": search.reason,
-        }  # fmt: skip
-        if limits is not None:
-            state |= {name: getattr(limits, name) for name in _OF_LIMITS}
-            values |= {f"limit {name}": y for name, y in limits.multipliers.items()}
-        values["state"] = np.frombuffer(json.dumps(state).encode(), np.uint8)
+        key = np.frombuffer(self.key.encode(), np.uint8)
         with contextlib.suppress(OSError):
-            write_arrays(self.path, values)
+            write_arrays(self.path, {"key": key, **asdict(point)})
 
-    def load(self, limits: LimitTerms | None) -> StoredSearch | None:
-        """The stored search; None if there is none of this problem, with a warning if the file is damaged."""
+    def load(self) -> StoredPoint | None:
+        """The stored point; None if there is none of this problem, with a warning if the file is damaged."""
         if self.path is None:
             return None
         try:
@@ -133,77 +117,28 @@ class Checkpoint:
         except OSError:
             return None
         try:
-            state = json.loads(values["state"].tobytes())
-            if state["key"] != self.key:
-                return None
-            stored = _stored(values, state, limits)
-        except (ValueError, KeyError, TypeError, IndexError, OverflowError) as error:
+            return _point(values) if values["key"].tobytes() == self.key.encode() else None
+        except (ValueError, KeyError) as error:
             self.refuse(f"is not usable ({error})")
             return None
-        return stored
 
     def refuse(self, reason: str) -> None:
         """Warn that the file is not used."""
         LOG.warning("The checkpoint %s %s; the search begins anew.", self.path, reason)
 
 
-def _check_kinds(values: dict[str, np.ndarray], state: dict[str, Any], limits: LimitTerms | None) -> None:
-    """Numbers of a file must be of the kinds that a search computes with: kernels take no others.
+def _point(values: dict[str, np.ndarray]) -> StoredPoint:
+    """The point of a file; kernels take no numbers of another kind.
 
     Raises:
-        ValueError: An array or a number is of another kind.
-        KeyError, TypeError: It is missing.
+        ValueError: An array is of another kind.
+        KeyError: It is missing.
     """
-    arrays = {"x": 1, "sharpened": 1, "p": 2, "Hp": 2}
-    arrays["history"] = 2 if values["history"].size else values["history"].ndim
-    arrays |= {name: values[name].ndim for name in values if name.startswith("limit ")}
-    for name, axes in arrays.items():
-        if values[name].dtype != np.float64 or values[name].ndim != axes:
-            raise ValueError(f"{name} is no array of numbers with {axes} axes")
-    breaks = values["breaks"]
-    if breaks.dtype.kind != "i" or breaks.ndim != 1 or len(breaks) < 2:
-        raise ValueError("its knots are no frames")
-    counts = ["evaluations", "gradients", "products", *(["stalled"] if limits is not None else [])]
-    sizes = ["radius", *(["rho", "first", "left"] if limits is not None else [])]
-    # limits that are kept are exceeded by less than 0
-    numbers = ["merit", *(["reached"] if limits is not None else [])]
-    for name in counts:
-        if type(state[name]) is not int or state[name] < 0:
-            raise ValueError(f"{name} is no count")
-    for name in sizes:
-        if type(state[name]) not in (int, float) or not state[name] >= 0.0:
-            raise ValueError(f"{name} is no size")
-    for name in numbers:
-        if type(state[name]) not in (int, float) or np.isnan(state[name]):
-            raise ValueError(f"{name} is no number")
-    if type(state["reason"]) is not str or (limits is not None and type(state["on"]) is not bool):
-        raise ValueError("its state is of another kind")
-
-
-def _stored(values: dict[str, np.ndarray], state: dict[str, Any], limits: LimitTerms | None) -> StoredSearch:
-    """The search of a file.
-
-    Raises:
-        ValueError: An array has another size, or numbers that are not finite.
-        KeyError, TypeError, IndexError, OverflowError: Something is missing or of another kind.
-    """
-    x, p, Hp = values["x"], values["p"], values["Hp"]
-    _check_kinds(values, state, limits)
-    finite = all(np.all(np.isfinite(values[name])) for name in values if name not in ("state", "history"))
-    if not finite or not p.shape == Hp.shape == (len(p), len(x)):
-        raise ValueError("its coefficients are not finite or have a wrong size")
-    if not np.all(np.einsum("kn,kn->k", p, Hp) > 0.0):  # those of conjugate gradients have
-        raise ValueError("its directions have no curvature")
-    rows = values["history"].tolist()
-    history = tuple(Iterate(row[0], row[1], row[2], int(row[3]), int(row[4])) for row in rows)
-    search = Search(
-        x, state["radius"], Recycled(p, Hp), Sharpened(values["sharpened"]) if len(values["sharpened"]) else None,
-        history, state["evaluations"], state["gradients"], state["products"], state["reason"],
-    )  # fmt: skip
-    kept: dict[str, Any] = {}
-    if limits is not None:
-        kept = {name: state[name] for name in _OF_LIMITS}
-        kept["multipliers"] = {name: values[f"limit {name}"] for name in limits.bounds}
-        if any(kept["multipliers"][name].shape != old.shape for name, old in limits.multipliers.items()):
-            raise ValueError("the multipliers of its limits have a wrong size")
-    return StoredSearch(search, values["breaks"], float(state["merit"]), kept)
+    count, real = np.signedinteger, np.float64
+    for name, kind, axes in (("x", real, 1), ("breaks", count, 1), ("objective", real, 0), ("iterations", count, 0)):
+        array = values[name]
+        if not np.issubdtype(array.dtype, kind) or array.ndim != axes or not np.all(np.isfinite(array)):
+            raise ValueError(f"{name} is of another kind")
+    if len(values["breaks"]) < 2 or values["iterations"] < 0:
+        raise ValueError("it has no knots, or no iterations")
+    return StoredPoint(values["x"], values["breaks"], float(values["objective"]), int(values["iterations"]))

@@ -35,4 +35,4 @@ def found_curves(problem: RetargetProblem, motors: int, x: Array) -> tuple[tuple
 def best_so_far(result: Result) -> Result:
     """The result of a search after which the user stopped the run; answers the interrupt."""
     interrupts.answer()
-    return replace(result, interrupted=True, stopped="interrupted")
+    return replace(result, search=replace(result.search, interrupted=True, stopped="interrupted"))

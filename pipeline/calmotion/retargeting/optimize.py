@@ -10,7 +10,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import Character, OptimizerStep, Result
+from calmotion.model import Character, Result
 from calmotion.model.limits.bounds import Excess, excesses, motor_bounds
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import goal_of, tolerance_of
@@ -43,10 +43,6 @@ from calmotion.simulation.target_errors import IntendedMotion
 from calmotion.tolerance.reduced_bodies import DIRECTIONS, RunMemory
 
 
-def _progress_of(search: Search) -> tuple[OptimizerStep, ...]:
-    return tuple(OptimizerStep(i.value, i.gradient_norm, i.evaluations, 2 * i.products) for i in search.history)
-
-
 def optimize_shot(
     shot: CompiledShot, options: RunSettings, progress: Progress, checkpoint: Path | None = None,
     scenarios: Sequence[Scenario] = (), memory: RunMemory | None = None,
@@ -56,7 +52,7 @@ def optimize_shot(
     An interrupt (Ctrl-C) ends the search; the result then has the best curves so far.
 
     Args:
-        checkpoint: File that stores the search after each iteration, and from which a search resumes if the file
+        checkpoint: File that stores the best point after each iteration, and from which a search resumes if the file
             exists; None stores nothing.
         scenarios: Robots for all of which the curves are optimised, the nominal one first; none: that one alone.
         memory: With what the last search left, and where this one leaves the same.
@@ -111,7 +107,7 @@ def _optimized(
     locked = locked_coefficients(animation, problem.space.basis, problem.space.motors, problem.grid.end)
     kept = Checkpoint(checkpoint, problem_key(problem, locked, (options, tolerance)))
     searched = RetargetSearch(
-        at, Search.start(start), (), character, animation, options, tolerance,
+        at, Search.start(start), character, animation, options, tolerance,
         lowest_frequency(prepared), adaptive, kept, progress,
     )  # fmt: skip
     searched.run(start, None if memory is None else memory.search)
@@ -126,7 +122,7 @@ def _optimized(
     costs = {} if searched.interrupted or options.retime is not None else limit_costs(after, fixed)
     wall = time.perf_counter() - begin
     rows = left_out_rows(prepared)
-    rows += search_rows(problem, character, curves, searched.inactive, options, searched.idle_gain)
+    rows += search_rows(problem, character, curves, options, searched.idle_gain)
     return Result(
         reference=reference_motion(prepared.model, problem.grid, intended, problem.curves.angles),
         before=simulation_of(prepared, before.run, intended),
@@ -134,34 +130,18 @@ def _optimized(
         skins=skins(prepared.bodies),
         modes=mode_tables(prepared.bodies),
         curves=curves,
-        steps=_progress_of(search),
         objective_before=before.objective_value,
         objective_after=after.objective_value,
-        gradients=search.gradients,
-        linearized_sweeps=2 * search.products + search.gradients,
-        forward_simulations=search.evaluations + 2,
-        iterations=len(search.history),
-        parameters=problem.size,
+        search=searched.record(),
         wall_s=wall,
         step_s=problem.grid.h,
         pre_roll_s=problem.grid.pre_roll,
         dof=prepared.model.dof,
         left_out=tuple(rows),
         limits=limit_uses(_used(before, character), _used(after, character), problem.grid, costs),
-        stopped="interrupted" if searched.interrupted else search.reason,
-        expected_gain_m=_expected(search),
-        interrupted=searched.interrupted,
         performed=performed_motion(prepared, after.curves),
-        idle_gain_m=searched.idle_gain,
         goal_m=goal_of(character, options.goal),
-        resumed_iterations=searched.resumed_iterations,
     )
-
-
-def _expected(search: Search) -> float | None:
-    """The predicted gain of one more iteration [m]; None if it was not computed."""
-    gain = search.history[-1].gain if search.history else np.nan
-    return gain if np.isfinite(gain) else None
 
 
 def _used(at: Evaluation, character: Character) -> list[Excess]:

@@ -1,4 +1,4 @@
-"""The search for offsets: Gauss-Newton on adaptive knots, with inactive intervals and pruning of small offsets."""
+"""The search for offsets: Gauss-Newton on adaptive knots, with pruning of small offsets."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray
-from calmotion.model import Animation, Character
-from calmotion.model.model_choice import OFF
+from calmotion.model import Animation, Character, OptimizerStep, SearchRecord
 from calmotion.model.result import GOAL_REACHED
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import goal_of
-from calmotion.retargeting.checkpoint import Checkpoint
+from calmotion.retargeting.checkpoint import Checkpoint, StoredPoint
 from calmotion.retargeting.feasible_start import on_sufficient_knots, onto_limits, with_moving_end, with_possible_limits
 from calmotion.retargeting.problem.adaptive_knots import converted, refined_breaks
 from calmotion.retargeting.problem.linear_problem import LinearProblem
@@ -21,14 +20,8 @@ from calmotion.retargeting.problem.posing import locked_coefficients
 from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
 from calmotion.retargeting.search_memory import SearchMemory
 from calmotion.retargeting.search_progress import SearchProgress
+from calmotion.retargeting.simplification.first_change import first_change
 from calmotion.retargeting.simplification.idle_motors import idle_gain, idle_motors
-from calmotion.retargeting.simplification.inactive_intervals import (
-    InactiveInterval,
-    first_change,
-    inactive_coefficients,
-    inactive_intervals,
-    with_gains,
-)
 from calmotion.retargeting.simplification.pruning import block_energies, negligible_coefficients
 from calmotion.retargeting.simplification.report_rows import FINER, PRUNED
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
@@ -40,7 +33,6 @@ from calmotion.support import interrupts
 AS_THEY_ARE = "converged"  # reason of the end where nothing is searched: another search has found the curves
 NEAR = 2.0  # where a largest error is beyond the goal, else the tolerance, but not by this factor, smaller gains count
 GAIN_NEAR = 0.2  # share of the least gain, which is one of a mean over time, that counts there
-MISSED = 0.5  # share of the least gain that changes in the inactive intervals may gain together
 
 
 @dataclass(eq=False)
@@ -50,12 +42,11 @@ class RetargetSearch:
     Attributes:
         input: The animator's curves; its problem is the one at the start.
         search: State of the minimisation.
-        inactive: Intervals in which no motor changes.
         character, animation, options: Of the shot.
         tolerance: Accuracy of the simulation [m].
         frequency: Lowest frequency of the character [Hz].
         adaptive: Whether knots are refined.
-        checkpoint: Stores the search after each iteration.
+        checkpoint: Stores the best point after each iteration.
         progress: Called after each iteration.
         idle_gain: Gain that idle motors would bring at the end [m]; None where there are none.
         interrupted: Whether the user ended it.
@@ -65,7 +56,6 @@ class RetargetSearch:
 
     input: Evaluation
     search: Search
-    inactive: tuple[InactiveInterval, ...]
     character: Character
     animation: Animation
     options: RunSettings
@@ -78,8 +68,6 @@ class RetargetSearch:
     interrupted: bool = False
     resumed_iterations: int = 0
     took_over: bool = False
-
-    _unconfirmed: bool = False  # whether the state is that of a file
 
     def __post_init__(self) -> None:
         self.problem: RetargetProblem = self.input.problem  # on the current knots, with the limits as they are now
@@ -99,17 +87,13 @@ class RetargetSearch:
             last: What the search of almost the same shot left.
         """
         self.problem, start = with_moving_end(self.input, start)
-        begin = self.input
-        if self.problem is not begin.problem:
-            begin = replace(begin, problem=self.problem, x=np.zeros(self.problem.size))
-        self.inactive = inactive_intervals(begin, start, self.frequency, self.tolerance, self.options.ranges)
         if self.adaptive:
-            self.problem, start = on_sufficient_knots(self.problem, start, self._fixed_on)
-        fixed = self._fixed_on(self.problem.space.basis)
+            self.problem, start = on_sufficient_knots(self.problem, start, self.locked_on)
+        fixed = self.locked_on(self.problem.space.basis)
         self.problem = with_possible_limits(self.problem, fixed)
         self.search = Search.start(np.where(fixed, 0.0, start), self.input)
         if not self.options.max_iterations:
-            self.inactive, self.search = (), replace(self.search, reason=AS_THEY_ARE)
+            self.search = replace(self.search, reason=AS_THEY_ARE)
             return
         if last is not None:
             begun = last.begun(self.problem, self.search)
@@ -130,10 +114,28 @@ class RetargetSearch:
             self.interrupted = True
             self.progress(0.95, "interrupted: writing the best so far")
 
+    def record(self) -> SearchRecord:
+        """The work so far, with the simulations of the input and of the result."""
+        search = self.search
+        gain = search.history[-1].gain if search.history else np.nan
+        return SearchRecord(
+            steps=tuple(OptimizerStep(i.value, i.gradient_norm, i.evaluations, 2 * i.products) for i in search.history),
+            parameters=self.problem.size,
+            iterations=len(search.history),
+            forward_simulations=search.evaluations + 2,
+            gradients=search.gradients,
+            linearized_sweeps=2 * search.products + search.gradients,
+            stopped="interrupted" if self.interrupted else search.reason,
+            expected_gain_m=gain if np.isfinite(gain) else None,
+            interrupted=self.interrupted,
+            idle_gain_m=self.idle_gain,
+            resumed_iterations=self.resumed_iterations,
+        )
+
     def hold(self) -> BoolArray:
         """The fixed coefficients, shape [n], bool; curves stay as they are before the first free one acts."""
-        self._held(first_change(self.problem.grid, self.problem.space.basis, self._fixed_on))
-        return self._fixed_on(self.problem.space.basis)
+        self._held(first_change(self.problem.grid, self.problem.space.basis, self.locked_on))
+        return self.locked_on(self.problem.space.basis)
 
     def _held(self, first: int) -> None:
         """Curves stay as they are before an instant."""
@@ -146,55 +148,39 @@ class RetargetSearch:
         """Coefficients of a basis that the shot locks, shape [n], bool."""
         return locked_coefficients(self.animation, basis, self.problem.space.motors, self.problem.grid.end)
 
-    def _fixed_on(self, basis: OffsetBasis) -> BoolArray:
-        return self.locked_on(basis) | inactive_coefficients(basis, self.inactive, len(self.problem.space.motors))
-
     def _resume(self) -> bool:
-        """Resume from the checkpoint; whether there is one whose point has the recorded merit."""
-        stored = self.checkpoint.load(self.problem.limits)
+        """Begin at the point of the checkpoint; whether there is one that has the recorded objective."""
+        stored = self.checkpoint.load()
         if stored is None:
             return False
-        problem, x = self.problem, stored.search.x
-        breaks, motors = stored.breaks, len(problem.space.motors)
-        first, last = problem.space.basis.breaks[[0, -1]]
-        if breaks.dtype.kind != "i" or np.any(np.diff(breaks) <= 0) or breaks[0] != first or breaks[-1] != last:
+        problem, motors = self.problem, len(self.problem.space.motors)
+        if not stored.fits(problem.space.basis):
             self.checkpoint.refuse("has other knots than the shot")
             return False
-        basis = problem.space.basis.on(problem.grid, breaks)
-        if len(x) != basis.count * motors:
+        basis = problem.space.basis.on(problem.grid, stored.breaks)
+        if len(stored.x) != basis.count * motors:
             self.checkpoint.refuse("has a wrong number of coefficients")
             return False
-        resumed = replace(problem.on_basis(basis), limits=stored.restored(problem.limits))
-        there = resumed.tried(x)
-        if there is None or not stored.matches(there.merit):
-            merit = "nothing" if there is None else f"{there.merit:.6g}"
-            self.checkpoint.refuse(f"does not fit the shot (objective {stored.merit:.6g}, simulated {merit})")
+        resumed = problem.on_basis(basis)
+        there = resumed.tried(stored.x)
+        if there is None or not stored.matches(there.objective_value):
+            found = "nothing" if there is None else f"{there.objective_value:.6g}"
+            self.checkpoint.refuse(f"does not fit the shot (objective {stored.objective:.6g}, simulated {found})")
             return False
-        self.problem, self.search, self._unconfirmed = resumed, replace(stored.search, at=there), True
-        self.resumed_iterations = len(self.search.history)
-        self.progress(0.1, f"resuming after {self.resumed_iterations} iterations of an interrupted search")
-        if np.any(x[inactive_coefficients(basis, self.inactive, motors)]):
-            self.inactive = ()  # the stored search had already continued with all coefficients
+        self.problem, self.search = resumed, Search.start(stored.x, there)
+        self.resumed_iterations = stored.iterations
+        self.progress(0.1, f"resuming after {stored.iterations} iterations of an interrupted search")
         return True
 
     def _descend(self, fixed: BoolArray) -> None:
-        """Minimise and refine the knots; then include the inactive intervals if they would gain too much."""
+        """Minimise, and refine the knots while that gains enough."""
         while True:
             if not self.search.reason:
                 self.search = self._minimized(self.search, fixed)
                 self._keep()
-            if self._unconfirmed:
-                self._confirm(fixed)
-            if self.search.reason in ("iteration limit", GOAL_REACHED):
+            over = self.search.reason in ("iteration limit", GOAL_REACHED)
+            if over or not (self.adaptive and self._refine()):
                 return
-            if not (self.adaptive and self._refine()):
-                if self.inactive:
-                    self._held(first_change(self.problem.grid, self.problem.space.basis, self.locked_on))
-                    self.inactive, self.search = with_gains(self.problem, self.search, self.inactive, self.locked_on)
-                missed = sum(interval.gain for interval in self.inactive)
-                if self.options.ranges == OFF or missed <= MISSED * self._least:
-                    return
-                self.inactive, self.search = (), _restarted(self.search, self.search.x)
             self._done.next_pass(len(self.search.history))
             fixed = self.hold()
 
@@ -231,20 +217,6 @@ class RetargetSearch:
         off = at.run.target_positions - at.problem.objective.intended.target_positions
         return float(np.linalg.norm(off, axis=2)[at.problem.grid.judged][:, weighs].max(initial=0.0))
 
-    def _confirm(self, fixed: BoolArray) -> None:
-        """Look for the minimum once more where the state was read from a file: its trust region, its directions and the
-        reason of its end are not known to be right, although its point is."""
-        self._unconfirmed, ended = False, self.search
-        if len(ended.history) >= self.options.max_iterations:
-            return
-        found = self._minimized(_restarted(ended, ended.x), fixed)
-        if np.array_equal(found.x, ended.x):  # it was the minimum
-            self.search = replace(ended, reason=found.reason, evaluations=found.evaluations, gradients=found.gradients,
-                                  products=found.products)  # fmt: skip
-        else:
-            self.search = found
-        self._keep()
-
     def _on_iterate(self, search: Search) -> None:
         self.search, self.problem = search, search.at.problem
         self._keep()
@@ -253,20 +225,20 @@ class RetargetSearch:
         self.progress(done, f"optimising: weighted error {error:.3f} mm, {search.evaluations} simulations")
 
     def _keep(self) -> None:
-        at = self.search.at
-        self.checkpoint.save(self.search, at.problem.limits, at.problem.space.basis.breaks, at.merit)
+        at, done = self.search.at, self.resumed_iterations + len(self.search.history)
+        self.checkpoint.save(StoredPoint(self.search.x, at.problem.space.basis.breaks, at.objective_value, done))
 
     def _refine(self) -> bool:
         """Continue on finer knots if these gain enough; whether they do."""
         at, linear = self._linearized()
-        breaks = refined_breaks(at, linear, self._fixed_on, FINER * self._least)
+        breaks = refined_breaks(at, linear, self.locked_on, FINER * self._least)
         if breaks is None:
             return False
         space = self.problem.space
         basis = space.basis.on(self.problem.grid, breaks)
         # fixed coefficients stay exactly zero
         x = np.where(
-            self._fixed_on(basis), 0.0, converted(space.basis, basis, self.search.x, len(space.motors))
+            self.locked_on(basis), 0.0, converted(space.basis, basis, self.search.x, len(space.motors))
         )  # fmt: skip
         self.problem, self.search = self.problem.on_basis(basis), _restarted(self.search, x)
         return True

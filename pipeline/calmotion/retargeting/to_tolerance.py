@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calmotion.model import OptimizerStep, Result, Track
+from calmotion.model import Result, Track
 from calmotion.model.model_choice import OFF
 from calmotion.model.result import GOAL_REACHED
 from calmotion.model.run import RunSettings
@@ -94,7 +94,8 @@ def optimize_to_tolerance(
             if result.interrupted:
                 break
             tracks = found_tracks(result, animation)
-            ended = latest.iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
+            # a new POD subspace would allow no further iteration
+            ended = latest.search.iterations >= options.max_iterations
             unknown = not again and not number and not ended  # later searches end near the motion of the first
             result, accurate = _with_accuracy(result, reduced, projected, tracks, options, unknown)
             accuracy = result.accuracy
@@ -200,9 +201,10 @@ def _searched(
     character = shot.character
     first = _search(shot, options, progress, checkpoint, memory)
     enough = JOINING_GAIN * tolerance_of(character, options.tolerance)
-    if first.interrupted or first.idle_gain_m is None or first.idle_gain_m <= enough or options.motors == OFF:
+    gain = first.search.idle_gain_m
+    if first.interrupted or gain is None or gain <= enough or options.motors == OFF:
         return first
-    if first.stopped == GOAL_REACHED:
+    if first.search.stopped == GOAL_REACHED:
         return first
     progress.ended()
     motors = tuple(replace(motor, idle=False) for motor in character.motors)
@@ -216,27 +218,9 @@ def _search(
     """One search, with its processor time."""
     begin = time.process_time()
     found = optimize_shot(shot, options, progress, checkpoint, memory=memory)
-    return replace(found, processor_s=time.process_time() - begin)
+    return replace(found, search=replace(found.search, processor_s=time.process_time() - begin))
 
 
 def continued(first: Result, second: Result) -> Result:
     """The result of the second search, with the work of both."""
-    done = first.steps[-1]
-    steps = tuple(
-        OptimizerStep(
-            s.objective, s.gradient_norm, done.forward_simulations + s.forward_simulations,
-            done.linearized_sweeps + s.linearized_sweeps,
-        )
-        for s in second.steps
-    )  # fmt: skip
-    return replace(
-        second,
-        steps=first.steps + steps,
-        gradients=first.gradients + second.gradients,
-        linearized_sweeps=first.linearized_sweeps + second.linearized_sweeps,
-        forward_simulations=first.forward_simulations + second.forward_simulations,
-        iterations=first.iterations + second.iterations,
-        wall_s=first.wall_s + second.wall_s,
-        processor_s=(first.processor_s or 0.0) + (second.processor_s or 0.0),
-        resumed_iterations=first.resumed_iterations + second.resumed_iterations,
-    )
+    return replace(second, search=second.search.after(first.search), wall_s=first.wall_s + second.wall_s)

@@ -65,9 +65,9 @@ def _budget(result: Result, tolerance: float, least_gain: float, fine: bool) -> 
         left = max(rest, mesh_budget.SHARE * tolerance)  # other entries may be beyond their shares
         entries.append(replace(_mesh_entry(result, accuracy.mesh_m, left), counted=not fine))
     if result.after is not None:
-        ended = result.stopped == "converged"
-        why = "a smaller gain is not pursued" if ended else f"the search ended before: {result.stopped}"
-        entries.append(entry(SEARCH, least_gain, least_gain * tolerance if ended else None, result.stopped, why))
+        ended = result.search.stopped == "converged"
+        why = "a smaller gain is not pursued" if ended else f"the search ended before: {result.search.stopped}"
+        entries.append(entry(SEARCH, least_gain, least_gain * tolerance if ended else None, result.search.stopped, why))
     return tuple(sorted(entries, key=lambda e: -(e.estimated_m or 0.0)))
 
 

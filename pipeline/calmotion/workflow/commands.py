@@ -52,7 +52,7 @@ def simulate(
         motors: `authored`: as the models of the motors say; `ideal`: joints follow their curves exactly.
         shaper: Input shaper (`zv`, `zvd`, `zv2`, `zvd2`) or `lowpass` filter for the motors' tracks, to compare with.
         keep, leave_out: Kinds of simplification that are forbidden or forced (`bodies`, `turning`, `loops`, `modes`,
-            `directions`, `elasticity`, `motors`, `ranges`, or `all`); the others follow from the tolerance.
+            `directions`, `elasticity`, `motors`, or `all`); the others follow from the tolerance.
         verify: Measure the error against a finer run as well.
         outputs: Files to write in the same run; the result's methods write them later as well.
         operators: Idnames of operators of plugins to run as well.

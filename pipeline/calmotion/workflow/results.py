@@ -331,4 +331,4 @@ class OptimizationResult(SimulationResult):
     @property
     def stopped(self) -> str:
         """Why the optimiser stopped: `converged`, `interrupted`, ..."""
-        return self.result.stopped
+        return self.result.search.stopped

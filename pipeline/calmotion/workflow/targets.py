@@ -109,7 +109,7 @@ def remaining_errors(character: Character, result: Result) -> list[dict[str, Any
     weights = [target.position_weight for target in character.targets]
     directions = 3 * sum((t.position_weight > 0.0) + (t.rotation_weight > 0.0) for t in character.targets)
     common = ["limits"] * any(limit.cost_m is not None for limit in result.limits)
-    common += ["search"] * (result.stopped not in ("", "converged", GOAL_REACHED))
+    common += ["search"] * (result.search.stopped not in ("", "converged", GOAL_REACHED))
     rows = []
     for k in np.flatnonzero(largest > (result.goal_m or result.tolerance_m)):
         causes = [*common, *["sag"] * bool(errors[0, k] >= 0.5 * largest[k])]

@@ -79,7 +79,7 @@ def measure(path: str) -> Stages:
     with tempfile.TemporaryDirectory() as folder:
         found = optimize(path, outputs=OutputPaths(layer=str(Path(folder) / "layer.usda")), on_operator=done).result
     used["compile"] = compiling.seconds - already
-    sweeps = found.forward_simulations + found.linearized_sweeps
+    sweeps = found.search.forward_simulations + found.search.linearized_sweeps
     wall = time.perf_counter() - begin
     return Stages(Path(path).stem, dict(used), wall, sweeps, _single_simulation(path, found.step_s))
 

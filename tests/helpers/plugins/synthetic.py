@@ -22,6 +22,7 @@ from calmotion.model import (
     MotorCurve,
     OptimizerStep,
     Result,
+    SearchRecord,
     Simplification,
     Simulation,
     Skin,
@@ -163,16 +164,13 @@ def result(optimized=True):
         skins=(None, Skin((modes,)), None),
         modes=(ModeTable(1, np.array([4.0]), 120, 300, 0.2),),
         curves=(curve,) if optimized else (),
-        steps=tuple(OptimizerStep(10.0 ** (-2 - k), 10.0 ** (-1 - k), 1 + k, 20 * k) for k in range(4))
-        if optimized
-        else (),
         objective_before=1e-2,
         objective_after=1e-5 if optimized else None,
-        gradients=4,
-        linearized_sweeps=60,
-        forward_simulations=5,
-        iterations=3,
-        parameters=7,
+        search=SearchRecord(
+            tuple(OptimizerStep(10.0 ** (-2 - k), 10.0 ** (-1 - k), 1 + k, 20 * k) for k in range(4)), 7, 3, 5, 4, 60
+        )
+        if optimized
+        else SearchRecord(),
         wall_s=1.5,
         step_s=STEP,
         pre_roll_s=PRE_ROLL,

@@ -43,7 +43,7 @@ def result_with(character, animation, bumps) -> Result:
     shape = motion.target_positions.shape[:2]
     simulation = Simulation(motion, np.zeros(shape), np.zeros(shape), 0, 0.0, 0.0)
     return Result(
-        motion, simulation, simulation, tuple(None for _ in character.bodies), (), curves, (), 0.0, 0.0, 0, 0, 0, 0, 0,
+        motion, simulation, simulation, tuple(None for _ in character.bodies), (), curves, 0.0, 0.0,
         0.0, 1 / 120, 0.0, 0, performed=motion,
     )  # fmt: skip
 

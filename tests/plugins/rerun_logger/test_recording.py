@@ -14,6 +14,7 @@ import rerun as rr
 import synthetic
 from calmotion.errors import ShotError
 from calmotion.host import PluginError
+from calmotion.model import SearchRecord
 from calmotion.model.run import OutputPaths
 from calmotion.testing import host_with, run_operator
 from recordings import PLUGIN, write
@@ -78,7 +79,7 @@ def test_a_recording_without_its_end_is_refused(tmp_path, monkeypatch):
 def test_a_failure_half_way_leaves_the_old_recording(tmp_path):
     path = tmp_path / "out.rrd"
     path.write_bytes(b"old")
-    broken = dataclasses.replace(synthetic.result(), steps=(None,))
+    broken = dataclasses.replace(synthetic.result(), search=SearchRecord(steps=(None,)))
     with pytest.raises(AttributeError):
         write(path, broken)
     assert path.read_bytes() == b"old" and [p.name for p in tmp_path.iterdir()] == ["out.rrd"]

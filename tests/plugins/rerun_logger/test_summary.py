@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import synthetic
+from calmotion.model import SearchRecord
 from calmotion.model.outputs import SystemModes
 from calmotion.model.run import OutputPaths
 from calmotion.testing import host_with, run_operator
@@ -21,7 +22,7 @@ def test_the_summary_lists_simplifications_and_errors(columns):
 
 
 def test_a_simulation_alone_has_neither_before_nor_after(tmp_path):
-    write(tmp_path / "out.rrd", replace(synthetic.result(), after=None, steps=()))
+    write(tmp_path / "out.rrd", replace(synthetic.result(), after=None, search=SearchRecord()))
     columns = read_recording(tmp_path / "out.rrd")
     text = columns["/summary", "TextDocument:text"][1][0][0]
     assert "| target | largest | rms |" in text and "before" not in text

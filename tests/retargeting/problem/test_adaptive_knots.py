@@ -112,7 +112,7 @@ def test_knots_that_follow_the_motion_reach_what_uniform_ones_do_not(arm, bodies
     )
     gained = uniform.objective_after - every.objective_after
     assert gained > 0.0 and uniform.objective_after - found.objective_after > 0.8 * gained
-    assert uniform.parameters < found.parameters < 0.8 * every.parameters
-    values = [step.objective for step in found.steps]
+    assert uniform.search.parameters < found.search.parameters < 0.8 * every.search.parameters
+    values = [step.objective for step in found.search.steps]
     dropped = 1.01  # at the end, what offsets that gain next to nothing may cost
     assert all(b <= a * dropped for a, b in zip(values, values[1:], strict=False))

@@ -51,7 +51,7 @@ def test_an_interrupt_while_curves_are_measured_keeps_them(arm, animation, bodie
             raise KeyboardInterrupt
 
     found = optimize_to_tolerance(compile_shot(arm, animation, bodies), OPTIONS, interrupt)
-    assert found.interrupted and found.stopped == "interrupted" and found.robustness is None
+    assert found.interrupted and found.search.stopped == "interrupted" and found.robustness is None
     assert found.objective_after < 0.1 * found.objective_before
 
 

@@ -45,22 +45,22 @@ def test_a_motor_of_the_head_is_not_optimised_and_the_loss_is_small(shot, bodies
     assert list(idle_motors(_marked(shot))) == [2, 3]
     every = optimize_shot(compile_shot(_marked(shot, {"motors": ON}), shot.animation, bodies), FAST, ignore_progress)
     assert [curve.changed for curve in lean.curves] == [True, True, False, False]
-    assert lean.parameters < every.parameters and every.idle_gain_m is None
+    assert lean.search.parameters < every.search.parameters and every.search.idle_gain_m is None
     unit = np.sqrt(2.0 * lean.objective_after / np.mean(lean.after.position_errors[lean.after.motion.judged] ** 2))
     lost = (np.sqrt(2.0 * lean.objective_after) - np.sqrt(2.0 * every.objective_after)) / unit
-    assert 0.0 <= lean.idle_gain_m < 1e-3
-    assert lost < max(5.0 * lean.idle_gain_m, 2e-5)
+    assert 0.0 <= lean.search.idle_gain_m < 1e-3
+    assert lost < max(5.0 * lean.search.idle_gain_m, 2e-5)
     rows = {row.what: row for row in lean.left_out}
-    assert rows["/Arm/Nod: not optimised"].estimated_error_m == lean.idle_gain_m
+    assert rows["/Arm/Nod: not optimised"].estimated_error_m == lean.search.idle_gain_m
     assert "/Arm/Shake: not optimised" in rows and "/Arm/Nod: curve unchanged" not in rows
 
 
 def test_the_search_continues_on_finer_knots_where_they_promise_a_gain(shot, bodies, monkeypatch):
     monkeypatch.setattr(to_tolerance, "JOINING_GAIN", -1.0)
     result = optimize_to_tolerance(compile_shot(_marked(shot), shot.animation, bodies), FAST, ignore_progress)
-    assert result.idle_gain_m is None
+    assert result.search.idle_gain_m is None
     assert not any("Nod" in row.what and "moves no target" in row.why for row in result.left_out)
     kept = optimize_to_tolerance(
         compile_shot(_marked(shot), shot.animation, bodies), replace(FAST, motors="off"), ignore_progress
     )
-    assert kept.idle_gain_m is not None and kept.parameters < result.parameters
+    assert kept.search.idle_gain_m is not None and kept.search.parameters < result.search.parameters

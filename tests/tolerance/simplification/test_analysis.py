@@ -78,7 +78,7 @@ def test_everything_can_be_forced_off_and_on():
     assert flexible.elasticity == "stvk" and flexible.modes_share < 1.0 and flexible.pairs_share == 0.0
     assert off.character.bodies[0].flexible.elasticity == "linear"
     assert all(row.forced for row in (*_rows(on, "bodies"), *_rows(off, "bodies"), *_rows(on, "turning")))
-    assert on.choice("ranges") == ON
+    assert on.choice("motors") == ON
 
 
 def test_the_second_pins_of_a_clevis_are_removed_and_the_motion_is_the_same():

@@ -32,6 +32,7 @@ from calmotion.simulation.target_errors import IntendedMotion, Objective
 SMOOTHNESS = 1e-10
 CLOSENESS = 1e-4  # an offset of 0.1 rad has the weight of an error of 1 mm [m^2/rad^2]
 AHEAD = 1e-4  # error of the spline fit to the rigid robot's commands, from which a search only starts [rad or m]
+STILL = 1e3  # an animation that is slower by this factor has no inertial forces: they fall by its square
 CLOSENESS_OF_COMMANDS = 3e-6  # the same where motors give: commands are ahead of the motion by what motors lag
 
 
@@ -79,16 +80,28 @@ def _merit(problem: RetargetProblem, x: Array) -> float:
 
 def _rigid_offsets(prepared: Prepared, curves: Curves) -> Array | None:
     """What the commands of the rigid robot on its motors are ahead of the animation, shape [T, m]; None where the rigid
-    robot cannot follow it."""
-    model, grid, character = prepared.model, prepared.grid, prepared.character
-    rigid = rigid_model(model)
+    robot cannot follow it. Where the sag of each pose is intended, the motion alone counts and not the weight."""
+    character = prepared.character
     try:
-        run = Simulator(rigid, grid.h, prepared.world, grid.cyclic).run(curves.angles, curves.rates)
+        commands = _rigid_commands(prepared, curves, 1.0)
+        still = curves.angles if character.retarget.reference == "rigid" else _rigid_commands(prepared, curves, STILL)
     except SimulationFailure:
         return None
+    return np.asarray((commands - still)[:, leaders(character)])
+
+
+def _rigid_commands(prepared: Prepared, curves: Curves, slower: float) -> Array:
+    """Commands under which the rigid robot on its motors performs the animation, slower by a factor, shape [T, M].
+
+    Raises:
+        SimulationFailure: It cannot follow the animation.
+    """
+    model, grid = prepared.model, prepared.grid
+    rigid = rigid_model(model)
+    run = Simulator(rigid, slower * grid.h, prepared.world, grid.cyclic).run(curves.angles, curves.rates / slower)
     found = reactions(rigid.system, run.trajectory, run.joint_angles, run.joint_rates)
-    commands = inverse_commands(character.motors, grid.times, curves.angles, model.motor_values(found.efforts))
-    return np.asarray((commands - curves.angles)[:, leaders(character)])
+    efforts = model.motor_values(found.efforts)
+    return inverse_commands(prepared.character.motors, slower * grid.times, curves.angles, efforts)
 
 
 @dataclass(frozen=True, eq=False)

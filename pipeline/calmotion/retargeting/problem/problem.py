@@ -259,12 +259,6 @@ class Evaluation:
         """Decrease of the merit that reduces the root-mean-square error by `gain` [m], from here."""
         return float(self.problem.unit * gain * max(self.error, gain))
 
-    def rigid_gradient(self) -> Array:
-        """Gradient of the errors if the robot were rigid: each is answered as it occurs."""
-        problem, weights = self.problem, self.problem.objective.weights
-        residuals = sum(np.sqrt(run.robot.weight) * run.errors for run in self.runs)
-        return problem.rigid.gradient(problem.space, weights, np.asarray(residuals).reshape(weights.shape))
-
     def linearized(self) -> LinearProblem:
         """The derivatives here.
 

@@ -46,16 +46,6 @@ class RigidRobot:
         response = RigidResponse.along(rigid, motion.c, motion.q, angles, moved, roots, times, self.STRIDE)
         return response.coupled(self.coupling[moved])
 
-    def gradient(self, space: OffsetSpace, weights: Array, residuals: Array) -> Array:
-        """Gradient of the errors if the robot were rigid: an offset acts at its own instant alone.
-
-        Args:
-            space: The unknowns.
-            weights, residuals: Of the targets, shape [T, K, 6].
-        """
-        pulls = np.einsum("nkim,nki->nm", self.response.targets, weights * residuals)
-        return np.asarray(space.basis.values.T @ pulls).ravel()
-
     def metric(self, weights: Array) -> Array:
         """Second derivatives of the objective by the angles of the unknowns' motors, shape [T, m, m]."""
         weighted = self.response.targets * weights[..., None]

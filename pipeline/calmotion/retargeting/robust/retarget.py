@@ -105,15 +105,15 @@ def _simulated(shot: CompiledShot, options: RunSettings, worst: LeastMaximum, be
     """The result with the curves of the smallest largest error, and the work since a time of clock and processor."""
     as_they_are = replace(options, max_iterations=0)
     found = optimize_shot(shot.with_tracks(worst.tracks), as_they_are, silent, None, worst.scenarios)
-    return replace(
-        found,
+    record = replace(
+        found.search,
         iterations=len(worst.search.history),
         gradients=worst.search.gradients,
         linearized_sweeps=2 * worst.search.products + worst.search.gradients,
-        forward_simulations=found.forward_simulations + worst.search.evaluations,
-        wall_s=time.perf_counter() - begin[0],
+        forward_simulations=found.search.forward_simulations + worst.search.evaluations,
         processor_s=time.process_time() - begin[1],
     )
+    return replace(found, search=record, wall_s=time.perf_counter() - begin[0])
 
 
 def _named(shot: CompiledShot, options: RunSettings, robots: Sequence[Scenario], reason: str = "") -> ShotError:

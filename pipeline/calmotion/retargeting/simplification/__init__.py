@@ -1,1 +1,1 @@
-"""Offsets, intervals and motors that the optimiser leaves unchanged."""
+"""Offsets and motors that the optimiser leaves unchanged."""

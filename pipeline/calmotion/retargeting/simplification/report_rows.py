@@ -1,4 +1,4 @@
-"""The rows of the report about the simplifications of a search: inactive intervals, knots, motors."""
+"""The rows of the report about the simplifications of a search: knots, motors."""
 
 from __future__ import annotations
 
@@ -11,29 +11,27 @@ from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import tolerance_of
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.simplification.idle_motors import idle_motors
-from calmotion.retargeting.simplification.inactive_intervals import InactiveInterval, interval_rows
 
 FINER = 0.1  # share of the least gain of a search that finer knots must gain
 PRUNED = 0.2  # share of it that the removed offsets may cost together
 
 
 def search_rows(
-    problem: RetargetProblem, character: Character, curves: Sequence[MotorCurve], inactive: Sequence[InactiveInterval],
-    options: RunSettings, idle_gain_m: float | None,
+    problem: RetargetProblem, character: Character, curves: Sequence[MotorCurve], options: RunSettings,
+    idle_gain_m: float | None,
 ) -> list[Simplification]:  # fmt: skip
     """The rows of a search that ended.
 
     Args:
         problem: On the final knots.
         curves: Of all motors.
-        inactive: The inactive intervals.
         options: Of the run.
         idle_gain_m: Gain that idle motors would bring [m]; None where there are none.
     """
     tolerance = tolerance_of(character, options.tolerance)
     pruned = PRUNED * options.least_gain
     idle = idle_motors(character)
-    rows = [*interval_rows(inactive), _knots_row(problem, character, options)]
+    rows = [_knots_row(problem, character, options)]
     rows += [
         Simplification(
             character.motors[k].path + ": not optimised", "it moves no target; the error is its possible gain", gain

@@ -192,9 +192,6 @@ def minimize(
     calls = _Counter(fixed, search.evaluations, search.gradients, search.products)
     radius, recycled, history, sharpened = search.radius, search.recycled, list(search.history), search.sharpened
     eager = sharpened is not None
-    if sharpened is not None and sharpened.preconditioner is None and len(sharpened.point) == len(search.x):
-        calls.evaluations, calls.gradients = calls.evaluations + 1, calls.gradients + 1  # a resumed search
-        sharpened = problem.at(sharpened.point).linearized().sharpened()
     calls.evaluations += 1
     at = problem.at(search.x, search.at)
     if sharpened is not None and len(sharpened.point) != len(search.x):
@@ -205,6 +202,7 @@ def minimize(
         return Search(at.x, radius, recycled, sharpened, tuple(history), *counts, reason, at)
 
     while True:
+        widened = False
         ended = GOAL_REACHED if reached(at) else "iteration limit" if len(history) >= max_iterations else ""
         if ended:
             history.append(Iterate(at.merit, np.nan, np.nan, calls.evaluations, calls.products))
@@ -220,9 +218,15 @@ def minimize(
             calls.products += limited.products
             at, predicted = at.with_limits(limited.limits), limited.predicted(1.0)
         else:
-            path, sharpened = _path(linear, calls, gradient, (recycled, sharpened), radius, enough, max_products, eager)
-            recycled = recycled.followed_by(path.p, path.Hp, RECYCLED_PAIRS)
-            _, predicted, _ = path.within(radius)
+            for size in (radius, np.inf):
+                known = recycled, sharpened
+                path, sharpened = _path(linear, calls, gradient, known, size, enough, max_products, eager)
+                recycled = recycled.followed_by(path.p, path.Hp, RECYCLED_PAIRS)
+                _, predicted, length = path.within(size)
+                widened = size > radius
+                if at.gain(predicted, at.merit) >= gain or length < size:
+                    break  # else the region ends the search, not a minimum: it shrank where the model was poor
+            radius = size
         expected = at.gain(predicted, at.merit)
         history.append(Iterate(at.merit, norm, expected, calls.evaluations, calls.products))
         better = None
@@ -235,9 +239,12 @@ def minimize(
             if onto_limits is not None and not at.limits_act:
                 tightened = _moved(calls, tightened, *onto_limits(tightened))
             better = tightened, np.inf
+        gained = at.gain(at.merit - better[0].merit, at.merit)
         at, radius = better
         if on_iterate is not None:
             on_iterate(here())
+        if widened and gained < gain:
+            return here("no further decrease")
 
 
 def _moved(calls: _Counter, at: Any, problem: LeastSquares, x: Array) -> Any:

@@ -99,19 +99,17 @@ class Preconditioner(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Sharpened:
-    """A preconditioner from what was worked out at a point, shape [n]; None while only the point is known."""
+    """A preconditioner from what was worked out at a point, shape [n]."""
 
     point: Array
-    preconditioner: Preconditioner | None = None
+    preconditioner: Preconditioner
 
     def factor(self, fixed: BoolArray, terms: list[tuple[csr_matrix, Array]] | None = None) -> None:
         """As of `Preconditioner`."""
-        assert self.preconditioner is not None
         self.preconditioner.factor(fixed, terms)
 
     def solve(self, x: Array) -> Array:
         """As of `Preconditioner`."""
-        assert self.preconditioner is not None
         return self.preconditioner.solve(x)
 
 
