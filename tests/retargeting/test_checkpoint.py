@@ -52,7 +52,7 @@ def agree(again, whole):
     assert again.objective_after < 0.1 * again.objective_before
     largest = max(np.abs(curve.frame_values - curve.frame_values[0]).max() for curve in whole.curves)
     for one, other in zip(again.curves, whole.curves, strict=True):
-        assert np.abs(one.frame_values - other.frame_values).max() < 2e-2 * largest
+        assert np.abs(one.frame_values - other.frame_values).max() < 1e-3 * largest
 
 
 @pytest.mark.parametrize("evaluations", [1, 3, 4, 5, 7, 8])
@@ -83,8 +83,8 @@ def test_a_search_that_was_killed_on_finer_knots_resumes_with_them(
         with pytest.raises(Killed):
             optimize_shot(compile_shot(arm, jerking(), bodies), OPTIONS, ignore_progress, path)
     again = optimize_shot(compile_shot(arm, jerking(), bodies), OPTIONS, ignore_progress, path)
-    assert again.search.resumed_iterations > 0
-    agree(again, direct)
+    assert again.search.resumed_iterations > 0 and again.objective_after < 0.1 * again.objective_before
+    assert again.objective_after == pytest.approx(direct.objective_after, rel=1e-2)
 
 
 def test_an_interrupt_keeps_the_best_so_far(limited, animation, bodies, whole, tmp_path, monkeypatch):

@@ -58,13 +58,13 @@ def test_error_at_the_payload_falls_at_least_tenfold(result):
 def test_a_search_ends_at_its_goal_and_says_where_it_cannot_be_reached(result, arm, animation, bodies):
     shot, before = compile_shot(arm, animation, bodies), judged(result.before).max()
     near = optimize_shot(shot, dataclasses.replace(OPTIONS, goal=0.6 * before), checked)
-    assert near.stopped == "goal reached" and judged(near.after).max() <= 0.6 * before
-    assert near.forward_simulations < result.forward_simulations
+    assert near.search.stopped == "goal reached" and judged(near.after).max() <= 0.6 * before
+    assert near.search.forward_simulations < result.search.forward_simulations
     assert goal_report(arm, near) == {"goal_m": 0.6 * before, "goal_kept": True}
     of_shot = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, goal=0.6 * before))
-    assert optimize_shot(shot.with_character(of_shot), OPTIONS, checked).stopped == "goal reached"
+    assert optimize_shot(shot.with_character(of_shot), OPTIONS, checked).search.stopped == "goal reached"
     far = optimize_shot(shot, dataclasses.replace(OPTIONS, goal=1e-7), checked)
-    assert far.stopped != "goal reached" and not goal_report(arm, far)["goal_kept"]
+    assert far.search.stopped != "goal reached" and not goal_report(arm, far)["goal_kept"]
     assert judged(far.after)[1] <= 1.05 * judged(result.after)[1]
     missed = {row["path"] for row in remaining_errors(arm, far)}
     assert missed == {target.path for target, size in zip(arm.targets, judged(far.after), strict=True) if size > 1e-7}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -218,15 +219,12 @@ def minimize(
             calls.products += limited.products
             at, predicted = at.with_limits(limited.limits), limited.predicted(1.0)
         else:
-            for size in (radius, np.inf):
-                known = recycled, sharpened
-                path, sharpened = _path(linear, calls, gradient, known, size, enough, max_products, eager)
-                recycled = recycled.followed_by(path.p, path.Hp, RECYCLED_PAIRS)
-                _, predicted, length = path.within(size)
-                widened = size > radius
-                if at.gain(predicted, at.merit) >= gain or length < size:
-                    break  # else the region ends the search, not a minimum: it shrank where the model was poor
-            radius = size
+            before = radius
+            least = partial(at.gain, value=at.merit), gain
+            path, (recycled, sharpened), radius = _solved(
+                linear, calls, gradient, (recycled, sharpened), radius, enough, max_products, eager, least
+            )  # fmt: skip
+            predicted, widened = path.within(radius)[1], radius > before
         expected = at.gain(predicted, at.merit)
         history.append(Iterate(at.merit, norm, expected, calls.evaluations, calls.products))
         better = None
@@ -257,6 +255,27 @@ def _last_products(history: list[Iterate]) -> int:
     """Products of the last linear system."""
     counts = [0, *(iterate.products for iterate in history)]
     return counts[-1] - counts[-2] if history else 0
+
+
+def _solved(
+    linear: Linear, calls: _Counter, gradient: Array, known: tuple[Recycled, Sharpened | None], radius: float,
+    enough: float, max_products: int, eager: bool, least: tuple[Callable[[float], float], float],
+) -> tuple[Path, tuple[Recycled, Sharpened | None], float]:  # fmt: skip
+    """As `_path`, with what is known after it and the trust region; without a region where this would end the search.
+
+    A region shrinks where the model is poor, and what little is to be gained within it says nothing of a minimum.
+
+    Args:
+        least: The gain that a decrease of the merit is, and the one that ends a search [m].
+    """
+    gain_of, gain = least
+    for size in (radius, np.inf):
+        path, sharpened = _path(linear, calls, gradient, known, size, enough, max_products, eager)
+        known = known[0].followed_by(path.p, path.Hp, RECYCLED_PAIRS), sharpened
+        _, predicted, length = path.within(size)
+        if gain_of(predicted) >= gain or length < size:
+            break
+    return path, known, size
 
 
 def _path(
