@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +13,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.model import Body
 from calmotion.reduction import inertia_integrals, modal_damping
-from calmotion.support import distinct_names, replaced, write_text
+from calmotion.support import replaced, write_text
 
 from .picture import draw_modes
 
@@ -49,15 +50,12 @@ def write_modes(
     target = Path(folder)
     written: list[str] = []
     rows: list[tuple[object, ...]] = []
-    paths: list[str] = []
+    used: set[str] = set()
     try:
         target.mkdir(parents=True, exist_ok=True)
         for k, (body, linear) in enumerate(modes):
             progress(k / total, body.path)
-            paths.append(body.path)
-            name = distinct_names(paths)[body.path].replace("/", "_")
-            if len({n.replace("/", "_") for n in distinct_names(paths).values()}) < len(paths):
-                name = body.path.strip("/").replace("/", "_")
+            name = _file_name(body.path, used)
             shapes = scaled_modes(linear)
             frequencies = np.sqrt(np.maximum(linear.basis.omega_squared, 0.0)) / (2.0 * np.pi)
             path = target / f"{name}.vtu"
@@ -78,6 +76,21 @@ def write_modes(
             f"the mode shapes cannot be written: {error}", path=folder, remedy="Choose another --modes."
         ) from error
     return written
+
+
+def _file_name(path: str, used: set[str]) -> str:
+    """A name for the files of a body that no other has, also where capitals make no difference.
+
+    Args:
+        path: Of the body.
+        used: Names of others, in small letters; that of this body is added.
+    """
+    parts = path.strip("/").split("/")
+    short = ("_".join(parts[-count:]) for count in range(1, len(parts) + 1))
+    numbered = (f"{'_'.join(parts)}_{number}" for number in itertools.count(2))
+    name = next(name for name in itertools.chain(short, numbered) if name.casefold() not in used)
+    used.add(name.casefold())
+    return name
 
 
 def scaled_modes(linear: LinearModes) -> np.ndarray:

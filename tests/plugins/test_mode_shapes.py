@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 
 import meshio
 import numpy as np
 import pytest
+from calmotion.model import FEMeshes
 from calmotion.model.outputs import ModeShapes
 from calmotion.model.run import OutputPaths, RunSettings, Source
+from calmotion.simulation import flexible_modes
 from calmotion.testing import host_with, small_shot
+from calmotion_plugins.mode_shapes.writing import write_modes
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +26,7 @@ def run(repository_folder, tmp_path_factory):
     run = host.run([character, animation, source, OutputPaths(modes=str(folder))], [ModeShapes])
     outcomes = {result.idname: (result.outcome, result.error) for result in run}
     assert outcomes["modes.write"][0] == "done", outcomes
-    return folder, run.get(ModeShapes), character
+    return folder, run.get(ModeShapes), character, run.get(FEMeshes)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +37,7 @@ def repository_folder():
 
 
 def test_each_flexible_body_gets_its_files_and_all_one_table(run):
-    folder, shapes, character = run
+    folder, shapes, character, _ = run
     flexible = [body for body in character.bodies if body.flexible]
     names = sorted(path.name for path in folder.iterdir())
     assert len(names) == 2 * len(flexible) + 1 and "modes.csv" in names
@@ -44,7 +48,7 @@ def test_each_flexible_body_gets_its_files_and_all_one_table(run):
 
 
 def test_the_table_has_frequencies_damping_and_effective_masses(run):
-    folder, _, character = run
+    folder, _, character, _ = run
     with open(folder / "modes.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     (body,) = {row["body"] for row in rows}
@@ -60,7 +64,7 @@ def test_the_table_has_frequencies_damping_and_effective_masses(run):
 
 
 def test_the_vtk_file_has_quadratic_elements_of_the_right_order_and_a_field_for_each_mode(run):
-    folder, _, _ = run
+    folder, _, _, _ = run
     mesh = meshio.read(next(folder.glob("*.vtu")))
     (block,) = mesh.cells
     assert block.type == "tetra10"
@@ -80,3 +84,12 @@ def test_without_requested_modes_it_does_not_run(repository_folder):
     assert "--modes" in poll({OutputPaths: OutputPaths()})
     character, _ = small_shot()
     assert "flexible" in poll({type(character): character})
+
+
+def test_bodies_of_like_names_have_files_of_their_own_also_where_capitals_make_no_difference(run, tmp_path):
+    _, _, character, meshes = run
+    ((body, linear),) = flexible_modes(character, meshes, None, 1e-3)
+    paths = ("/Arm/Link", "/Arm/link", "/Other/LINK", "/Arm_link", "/arm_link")
+    modes = [(replace(body, path=path), linear) for path in paths]
+    written = write_modes(str(tmp_path), modes, total=len(modes), dpi=30, pictures=1)
+    assert len({name.casefold() for name in written}) == len(written) == 2 * len(paths) + 1

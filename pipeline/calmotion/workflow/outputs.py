@@ -66,9 +66,9 @@ def refuse_overwriting(inputs: Mapping[str, str], files: Mapping[str, str]) -> N
 
     options: dict[str, str] = {}
     if "-o" in files:
-        options[os.path.realpath(root_path(files["-o"]))] = _ROOT
+        options[_on_all_systems(root_path(files["-o"]))] = _ROOT
     for option, path in files.items():
-        if (other := options.setdefault(os.path.realpath(path), option)) != option:
+        if (other := options.setdefault(_on_all_systems(path), option)) != option:
             raise SettingError(
                 f"this is the output of {other} as well", path=option, found=path, remedy="Choose another."
             )
@@ -78,6 +78,11 @@ def refuse_overwriting(inputs: Mapping[str, str], files: Mapping[str, str]) -> N
                     f"this file is read as {what}, and what is read is never overwritten", path=option, found=path,
                     remedy="Choose another.",
                 )  # fmt: skip
+
+
+def _on_all_systems(path: str) -> str:
+    """What two names have in common that are one file on some systems: capitals make no difference on two of three."""
+    return os.path.realpath(path).casefold()
 
 
 def refuse_layers(shot: str, provenance: Provenance, character: Character | None, files: Mapping[str, str]) -> None:

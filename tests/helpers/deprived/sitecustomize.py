@@ -2,10 +2,15 @@
 
 For Calmotion's modules, POSIX's modules, functions, flags and signals are not there. For the dependencies they are,
 which choose by `sys.platform` and are tested on Windows by others. Nobody can make links, and processes are spawned.
+Capitals in names of files make no difference to Python's functions, files that are opened without an encoding have that
+of western Windows, and there is no folder of open files.
 """
 
 import builtins
+import errno
+import functools
 import importlib
+import io
 import multiprocessing
 import os
 import signal
@@ -49,6 +54,54 @@ def without(imported):
     return load
 
 
+def as_on_disk(path):
+    """A path, its parts spelled as those that are there."""
+    if not isinstance(path, (str, bytes, os.PathLike)):
+        return path
+    text = os.fspath(path)
+    head, name = os.path.split(text)
+    if not name or head == text:
+        return path
+    folder = as_on_disk(head)
+    try:
+        there = real_listdir(folder or (b"." if isinstance(text, bytes) else "."))
+    except OSError:
+        return os.path.join(folder, name)
+    like = [other for other in there if len(other) == len(name) and other.lower() == name.lower()]
+    return os.path.join(folder, name if name in like or not like else like[0])
+
+
+def caseless(function, names=1):
+    """A function of files to which capitals make no difference in the first of its arguments, which are paths."""
+
+    @functools.wraps(function)
+    def call(*arguments, **options):
+        if str(arguments[:1]).startswith("('/dev/fd"):
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), *arguments[:1])
+        if not {"dir_fd", "src_dir_fd", "dst_dir_fd"} & set(options):
+            arguments = (*map(as_on_disk, arguments[:names]), *arguments[names:])
+        return function(*arguments, **options)
+
+    return call
+
+
+def opened_as_on_windows(function):
+    """`open` in the encoding of western Windows where none is named."""
+
+    def call(file, mode="r", buffering=-1, encoding=None, *arguments, **options):
+        if encoding in (None, "locale") and "b" not in mode:
+            encoding = "cp1252"
+        return function(file, mode, buffering, encoding, *arguments, **options)
+
+    return call
+
+
+real_listdir = os.listdir
+for name in ("access", "listdir", "lstat", "mkdir", "open", "remove", "rmdir", "scandir", "stat", "unlink", "utime"):
+    setattr(os, name, caseless(getattr(os, name)))
+for name in ("rename", "replace"):
+    setattr(os, name, caseless(getattr(os, name), 2))
+builtins.open = io.open = opened_as_on_windows(caseless(io.open))
 multiprocessing.set_start_method("spawn", force=True)
 builtins.__import__ = without(builtins.__import__)
 importlib.import_module = without(importlib.import_module)

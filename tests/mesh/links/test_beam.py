@@ -72,9 +72,10 @@ def test_without_mass_or_length_there_is_no_beam(beam_of):
     assert "physics:mass" in caught.value.remedy
     with pytest.raises(ShotError, match="no joint"):
         beam_of(bar(0.02, 0.02, 0.2))
-    ball = MassProperties(1.0, np.zeros(3), np.eye(3))
-    with pytest.raises(ShotError, match="in one place"):
-        beam_of(ball, ROOT)
+    for rounding in (0.0, 1e-17, 1e-216):
+        ball = MassProperties(1.0, np.full(3, rounding), np.eye(3))
+        with pytest.raises(ShotError, match="in one place"):
+            beam_of(ball, ROOT)
 
 
 def test_a_heavy_tip_makes_the_bar_wider_there(beam_of):

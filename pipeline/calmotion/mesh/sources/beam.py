@@ -20,7 +20,7 @@ from calmotion.model import Body, Frame, MassProperties
 
 _FLATTEST = 10.0  # width over height of a section
 _TAPER = 0.6  # largest share by which the area differs at an end
-_SHORT = 1e-6  # of the longest bar: joints at one place
+_SHORT = 1e-6  # of the longest bar and of the radius of gyration: joints at one place
 
 
 def equivalent_beam(body: Body, frames: Sequence[Frame]) -> Solid:
@@ -47,7 +47,9 @@ def equivalent_beam(body: Body, frames: Sequence[Frame]) -> Solid:
     bars = [frame.position - root for frame in frames[1:]]
     if not any(np.linalg.norm(bar) > 0.0 for bar in bars):
         bars = [2.0 * (body.mass.center - root)]
-    longest = max(float(np.linalg.norm(bar)) for bar in bars)
+    # a center of mass that rounding alone moves off the joint makes no beam: it is compared with the radius of gyration
+    size = float(np.sqrt(np.trace(body.mass.inertia) / (2.0 * body.mass.mass)))
+    longest = max(size, *(float(np.linalg.norm(bar)) for bar in bars))
     bars = [bar for bar in bars if np.linalg.norm(bar) > _SHORT * longest]
     if not bars:
         raise ShotError(
