@@ -1,6 +1,7 @@
 # make demo     optimise the bartender sample, and print the errors before and after
 # make test     lint, format, types, documentation and tests
 # make test-lowest    the tests with the lowest supported versions of the dependencies (needs Python 3.11)
+# make release-check  these, and with the newest versions as well; the result goes into docs/installation.md
 # make test-portable  the tests as on other processors, with meshes made anew and other numbers of threads
 # make docs     the documentation, in build/docs
 # make fuzz     ten minutes of damage to each of shots, meshes, motions, manifests, settings and caches
@@ -33,11 +34,11 @@ TESTS ?= tests
 # Two processes test at a time; threads of linear algebra that wait for each other would make that several times slower.
 test: export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo wheel wheels test test-lowest test-portable docs fuzz torture audit golden samples pictures blender blender-test blender-pictures clean
+.PHONY: help demo wheel wheels test test-lowest release-check test-portable docs fuzz torture audit golden samples pictures blender blender-test blender-pictures clean
 .DELETE_ON_ERROR:
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,14p'
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,15p'
 
 demo: $(INSTALLED)
 	$(RUN) -m calmotion demo -o build
@@ -98,6 +99,10 @@ $(LOWEST_VENV)/.installed: pyproject.toml .ci/lowest_versions.py
 test-lowest: export OPENBLAS_NUM_THREADS := 1
 test-lowest: $(LOWEST_VENV)/.installed
 	$(LOWEST_VENV)/bin/python -m pytest -n 2 -q $(TESTS)
+
+# Python 3.11 with the lowest versions, and the newest Python that is here with the newest.
+release-check:
+	$(PYTHON) .ci/release_check.py
 
 # Each line: kernels of OpenBLAS, threads, and what NumPy and numba may use. Each run has a cache folder of its own, so
 # that meshes and kernels are made anew. Results that a test compares must not depend on any of this.
@@ -162,7 +167,7 @@ pictures: $(INSTALLED)
 	$(RUN) samples/pictures.py
 
 clean:
-	rm -rf $(VENV) .venv-wheel-* $(LOWEST_VENV) $(BLENDER_VENV) build dist .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) .venv-wheel-* $(LOWEST_VENV) .venv-newest $(BLENDER_VENV) build dist .mypy_cache .pytest_cache .ruff_cache
 	find pipeline plugins samples tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The interpreter that the environment was made with may be gone: then it is made again.

@@ -57,6 +57,20 @@ def test_folders_have_any_name_and_length(simulated, tmp_path, name):
     simulated(tmp_path / name)
 
 
+@pytest.mark.skipif(os.sep == "\\", reason="a backslash parts folders")
+def test_a_backslash_in_a_name_is_refused_for_layers_alone(calmotion, tmp_path):
+    """USD takes it for a slash, and would look for the layer in another folder."""
+    folder = tmp_path / "a\\b"
+    folder.mkdir()
+    (tmp_path / "shot.usda").write_text(ONE_HINGE)
+    (tmp_path / "motion.csv").write_text(MOTION)
+    run = ("simulate", tmp_path / "shot.usda", "--motion", tmp_path / "motion.csv", "--json", "--quiet")
+    assert calmotion(*run, "--csv", folder / "calm.csv").returncode == 0
+    refused = json.loads(calmotion(*run, "-o", folder / "calm.usda").stdout)["error"]
+    assert "backslash" in refused["problem"] and refused["remedy"]
+    assert [path.name for path in folder.iterdir()] == ["calm.csv"]
+
+
 def test_text_is_written_and_read_in_one_encoding_on_all_systems(repository, tmp_path):
     """Python warns of each file that is opened in the encoding of the system."""
     (tmp_path / "shot.usda").write_text(ONE_HINGE)

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
+import shutil
 import signal
 import subprocess
 import threading
@@ -15,6 +17,21 @@ from pathlib import Path
 ENDED = {0: "done", 130: "interrupted"}
 PROGRESS = "progress\t"
 _PATIENCE = 20.0  # wait after a request to stop [s]
+_NO_CONSOLE = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # on Windows a window would open with it
+
+
+def words_of(command: str, windows: bool = os.name == "nt") -> list[str]:
+    """The words of a command as a person writes it: a path with spaces may stand in quotes, or be all there is.
+
+    Args:
+        command: From the preferences, or the environment.
+        windows: Whether a backslash parts folders; elsewhere it takes the meaning from the next character.
+    """
+    text = command.strip()
+    if shutil.which(text) is not None:
+        return [text]
+    words = shlex.split(text, posix=not windows)
+    return [word.strip("\"'") for word in words] if windows else words
 
 
 @dataclass(frozen=True)
@@ -69,10 +86,19 @@ def composed(robot: str, shot: Path, target: Path) -> str:
         if line.strip().split("=")[0].strip() in ("metersPerUnit", "upAxis", "timeCodesPerSecond", "startTimeCode",
                                                   "endTimeCode", "framesPerSecond", "defaultPrim")
     ]  # fmt: skip
-    layers = [os.path.relpath(Path(path).resolve(), target.parent.resolve()) for path in (robot, shot)]
-    names = ",\n        ".join(f"@{Path(layer).as_posix()}@" for layer in layers)
+    names = ",\n        ".join(
+        f"@{_seen_from(target.parent.resolve(), Path(path).resolve())}@" for path in (robot, shot)
+    )
     lines = [*head, f"subLayers = [\n        {names}\n    ]"]
     return "#usda 1.0\n(\n    " + "\n    ".join(lines) + "\n)\n"
+
+
+def _seen_from(folder: Path, file: Path) -> str:
+    """A file as seen from a folder; the whole path where that is on another drive."""
+    try:
+        return Path(os.path.relpath(file, folder)).as_posix()
+    except ValueError:
+        return file.as_posix()
 
 
 class PipelineRun:
@@ -108,6 +134,7 @@ class PipelineRun:
         process = self._process
         if process is None or process.poll() is not None:
             return
+        # Windows interrupts only who shares a console; what is ended at once leaves whole files, and no process
         process.send_signal(signal.SIGINT if os.name != "nt" else signal.SIGTERM)
         threading.Timer(_PATIENCE, process.kill).start()
 
@@ -125,10 +152,12 @@ class PipelineRun:
     def _carry_out(self, command: Sequence[str], number: int) -> bool:
         """Run one command; whether to go on."""
         environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONHOME", "PYTHONPATH")}
+        environment["PYTHONIOENCODING"] = "utf-8"  # Windows would have its own
         try:
             self._process = subprocess.Popen(
-                command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8", env=environment
-            )
+                command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8",
+                errors="replace", env=environment, creationflags=_NO_CONSOLE,
+            )  # fmt: skip
         except OSError as error:
             self.errors.append(f"{command[0]} cannot be started: {error.strerror}")
             return False

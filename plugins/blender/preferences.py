@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import os
-import shlex
 import shutil
 
 import bpy
+
+from .pipeline import words_of
 
 COMMAND_VARIABLE = "CALMOTION_COMMAND"
 
@@ -40,7 +41,7 @@ def preferences_of(context: bpy.types.Context) -> CalmotionPreferences | None:
 def command_of(context: bpy.types.Context) -> list[str] | None:
     """The words that start calmotion: from the preferences, the environment, or the PATH; None without one."""
     preferences = preferences_of(context)
-    words = shlex.split((preferences.command if preferences else "") or os.environ.get(COMMAND_VARIABLE, ""))
+    words = words_of((preferences.command if preferences else "") or os.environ.get(COMMAND_VARIABLE, ""))
     if not words:
         command = shutil.which("calmotion")
         return [command] if command else None

@@ -76,7 +76,7 @@ def test_materials_are_those_of_the_rigger():
 def script(tmp_path: Path, text: str) -> list[str]:
     """A program that stands in for calmotion."""
     file = tmp_path / "program.py"
-    file.write_text("import sys, json, time\n" + text)
+    file.write_text("import sys, json, time\n" + text, encoding="utf-8")
     return [sys.executable, str(file)]
 
 
@@ -104,6 +104,40 @@ def test_a_robot_of_one_s_own_is_put_over_the_shot(pipeline, tmp_path):
     assert command[1] == "optimize" and stage.GetPrimAtPath("/root/Robot")
     assert stage.GetEndTimeCode() == 25 and stage.GetTimeCodesPerSecond() == 24
     assert Sdf.Layer.FindOrOpen(str(tmp_path / "robot.usda")).pseudoRoot.GetInfo("metersPerUnit") == 1.0
+
+
+def test_a_layer_on_another_drive_is_named_as_a_whole(pipeline, tmp_path, monkeypatch):
+    def on_another_drive(path, start):
+        raise ValueError("path is on mount 'D:', start on mount 'C:'")
+
+    monkeypatch.setattr(pipeline.os.path, "relpath", on_another_drive)
+    (tmp_path / "shot.usda").write_text("#usda 1.0\n")
+    text = pipeline.composed(str(tmp_path / "own.usda"), tmp_path / "shot.usda", tmp_path / "robot.usda")
+    assert f"@{(tmp_path / 'own.usda').as_posix()}@" in text
+
+
+@pytest.mark.parametrize(
+    ("command", "windows", "words"),
+    [
+        (r"C:\Users\Jörg\env\Scripts\calmotion.exe", True, [r"C:\Users\Jörg\env\Scripts\calmotion.exe"]),
+        (r'"C:\Program Files\env\calmotion.exe" --x', True, [r"C:\Program Files\env\calmotion.exe", "--x"]),
+        (r"C:\env\python.exe -m calmotion", True, [r"C:\env\python.exe", "-m", "calmotion"]),
+        ("/opt/calmotion/bin/calmotion", False, ["/opt/calmotion/bin/calmotion"]),
+        ("'/Applications/My Tools/calmotion'", False, ["/Applications/My Tools/calmotion"]),
+        ("/opt/python -m calmotion", False, ["/opt/python", "-m", "calmotion"]),
+        ("", False, []),
+    ],
+)
+def test_the_command_is_written_as_on_the_system(pipeline, command, windows, words):
+    assert pipeline.words_of(command, windows) == words
+
+
+@pytest.mark.posix
+def test_a_program_may_have_spaces_in_its_path_without_quotes(pipeline, tmp_path):
+    program = tmp_path / "My Tools" / "calmotion"
+    program.parent.mkdir()
+    program.touch(0o700)
+    assert pipeline.words_of(f" {program} ", False) == [str(program)]
 
 
 def test_the_errors_of_a_table_are_read_at_the_frames(tmp_path):
@@ -135,7 +169,7 @@ def test_the_errors_of_a_table_are_read_at_the_frames(tmp_path):
 
 def test_progress_and_the_report_are_read(pipeline, tmp_path):
     command = script(tmp_path, """
-print("note: something", file=sys.stderr)
+print("note: für etwas", file=sys.stderr)
 print("progress\\tMesh\\t0.5\\tlink 3", file=sys.stderr, flush=True)
 print(json.dumps({"max_error_after_m": 0.001}))
 """)  # fmt: skip

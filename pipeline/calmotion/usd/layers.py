@@ -20,7 +20,7 @@ def refuse_input_as_output(output: str, inputs: Iterable[str]) -> None:
     """Refuse to write over a layer that was read.
 
     Raises:
-        ShotError: `output` is one of `inputs` (the same file, also through links), or is not named like a layer.
+        ShotError: `output` is one of `inputs`, also through links, or has a name that USD does not support.
     """
     if os.path.splitext(output)[1].lower() not in EXTENSIONS:
         raise ShotError(
@@ -33,6 +33,12 @@ def refuse_input_as_output(output: str, inputs: Iterable[str]) -> None:
             "the name of the output has a control character, which USD does not support",
             path=repr(output)[1:-1],
             remedy="Remove line ends and tabs from it",
+        )
+    if os.sep != "\\" and "\\" in os.path.abspath(output):
+        raise ShotError(
+            "the name or a folder of the output has a backslash, which USD takes for a slash",
+            path=output,
+            remedy="Write the layer into another folder, or rename it",
         )
     if os.path.isdir(output):
         raise ShotError("the output is a folder", path=output, remedy="Name a file")
