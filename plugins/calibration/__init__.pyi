@@ -19,7 +19,6 @@ from .model.estimates import CalibrationFigures as CalibrationFigures
 from .model.estimates import Estimate as Estimate
 from .workflow.calibrate import CalibratedShot as CalibratedShot
 from .workflow.calibrate import calibrate as calibrate
-from .workflow.calibrate import calibrate_together as calibrate_together
 from .workflow.calibrate import read_performed as read_performed
 from .workflow.excite import ExcitedShot as ExcitedShot
 from .workflow.excite import excite as excite

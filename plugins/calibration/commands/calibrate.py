@@ -128,7 +128,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.workflow import prepare_page, with_shot
 
     from ..drawing import plots_of
-    from ..workflow.calibrate import calibrate_together
+    from ..workflow.calibrate import calibrate
 
     performed = _performed(args)
     shots = []
@@ -142,8 +142,9 @@ def run(args: argparse.Namespace, output: Output) -> int:
     if args.html:
         prepare_page(shots[0].host, args.html, inputs)
     with progress_display(args) as display:
-        made = calibrate_together(
-            list(zip(shots, (files for _, files in performed), strict=True)), layer=args.output,
+        (shot, files), *others = zip(shots, (files for _, files in performed), strict=True)
+        made = calibrate(
+            shot, files, others=others, layer=args.output,
             **parameter_arguments(args), validate=not args.no_validation, tolerance=args.tolerance, step=args.step,
             integrator=args.integrator, figures=args.figures, operators=args.run, settings=assignments(args),
             progress=display, on_operator=display.done,

@@ -87,6 +87,7 @@ def calibrate(
     shot: Shot | Path,
     recordings: Sequence[Path] | Path,
     *,
+    others: Sequence[tuple[Shot | Path, Sequence[Path] | Path]] = (),
     layer: Path | None = None,
     parameters: Sequence[str] = DEFAULT,
     priors: Mapping[str, float] | None = None,
@@ -104,9 +105,13 @@ def calibrate(
 ) -> CalibratedShot:
     """Estimate the parameters of a robot from recordings of its performance, with their standard deviations.
 
+    Of several shots, nominal values may differ by known factors, as gains of the firmware; clocks, biases and places of
+    sensors are those of each shot. The layer lies over the first shot, and over any other of the robot.
+
     Args:
         shot: The shot that was performed, or its USD file; with a layer of results, the curves of that layer.
         recordings: Files, each as FILE or FILE@/PRIM, the prim where the sensor of a file sits that does not name it.
+        others: Further shots of the robot, each with its recordings.
         layer: USD layer to write.
         parameters: What to estimate: kinds, each by itself or as `KIND:PATTERN` for some prim paths.
         priors: Standard deviations of what is known before, by kind; relative ones, or SI of those about zero.
@@ -117,44 +122,6 @@ def calibrate(
         integrator: Of the simulations; None: automatic.
         figures: Folder for figures.
         operators, settings, progress, on_operator, cancel: As of `simulate`.
-
-    Raises:
-        ShotError: The shot cannot be processed, or a recording does not fit it.
-        SettingError: An argument does not fit.
-    """
-    return calibrate_together(
-        [(shot, recordings)], layer=layer, parameters=parameters, priors=priors, validate=validate,
-        by_motor_type=by_motor_type, tolerance=tolerance, step=step, integrator=integrator, figures=figures,
-        operators=operators, settings=settings, progress=progress, on_operator=on_operator, cancel=cancel,
-    )  # fmt: skip
-
-
-# parameters: those of `calibrate`
-def calibrate_together(
-    performed: Sequence[tuple[Shot | Path, Sequence[Path] | Path]],
-    *,
-    layer: Path | None = None,
-    parameters: Sequence[str] = DEFAULT,
-    priors: Mapping[str, float] | None = None,
-    validate: bool = True,
-    by_motor_type: bool = False,
-    tolerance: float | str | None = None,
-    step: float | str | None = None,
-    integrator: str | None = None,
-    figures: Path | None = None,
-    operators: Sequence[str] = (),
-    settings: Given = None,
-    progress: Callable[[Progress], None] | None = None,
-    on_operator: Callable[[Any], None] | None = None,
-    cancel: Callable[[], bool] | None = None,
-) -> CalibratedShot:
-    """`calibrate` from several shots of one robot, each with its recordings.
-
-    Nominal values may differ from shot to shot by known factors, as gains of the firmware; clocks, biases and places of
-    sensors are those of each shot. The layer lies over the first shot, and over any other of the robot.
-
-    Args:
-        performed: Shots and their recordings, as of `calibrate`, which has the other arguments.
 
     Raises:
         ShotError: A shot cannot be processed, a recording does not fit it, or the shots are not of one robot.
@@ -173,10 +140,9 @@ def calibrate_together(
     )
     target = None if layer is None else os.fspath(layer)
     opened, taken, outcomes = [], list[tuple[CompiledShot, Sequence[SensorRecording]]](), []
-    for shot, recordings in performed:
-        files = [recordings] if isinstance(recordings, (str, os.PathLike)) else recordings
-        names = [os.fspath(file) for file in files]
-        opened.append(with_sensors(shot))
+    for one, files in ((shot, recordings), *others):
+        names = [os.fspath(file) for file in ([files] if isinstance(files, (str, os.PathLike)) else files)]
+        opened.append(with_sensors(one))
         read = read_recordings(opened[-1].host, names, merge([opened[-1].settings, chosen]))
         _refuse_twice(read, [recording for _, earlier in taken for recording in earlier])
         outcomes.append(compiled_with_sensors(opened[-1], read, options, target, operators, chosen, hooks))
