@@ -6,7 +6,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import Operator, Property, RunContext, registration
-from calmotion.model import Animation, Character, Figures, OutputPaths, Plots, Result, SystemModes
+from calmotion.model import (
+    Animation,
+    Character,
+    ExceededLimits,
+    Figures,
+    OutputPaths,
+    Plots,
+    Result,
+    SystemModes,
+    TempoFigure,
+)
 
 
 class PlotFigures(Operator):
@@ -61,4 +71,34 @@ class PlotCurves(Operator):
         return (Plots(tuple((heading, figure) for _, heading, figure in drawn)),)
 
 
-register, unregister = registration(PlotFigures, PlotCurves)
+class PlotNeededTempo(Operator):
+    """How much slower an animation would have to be, and where."""
+
+    idname = "figures.tempo"
+    label = "Draw the tempo that the motors allow"
+    requires = (Character, ExceededLimits, OutputPaths)
+    provides = (TempoFigure,)
+    properties = PlotFigures.properties[:1]
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        paths, exceeded = data.get(OutputPaths), data.get(ExceededLimits)
+        if not (paths and paths.figures):
+            return "no figures are requested (--figures)"
+        if exceeded is not None and exceeded.tempo is None:
+            return "the animation keeps the limits of the motors"
+        if exceeded is not None and exceeded.tempo is not None and exceeded.tempo.too_weak is not None:
+            return "no tempo helps"
+        return None
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from .tempo import write_needed_tempo
+
+        folder = context.get(OutputPaths).figures or ""
+        path = write_needed_tempo(
+            folder, context.get(Character), context.get(ExceededLimits), context.properties.dpi
+        )  # fmt: skip
+        return (TempoFigure(path),)
+
+
+register, unregister = registration(PlotFigures, PlotCurves, PlotNeededTempo)

@@ -39,6 +39,9 @@ def make_blueprint(character: Character, animation: Animation, result: Result, s
         tabs.append(plot("Rotation error [deg]", "errors/rotation_deg"))
     if character.targets:
         tabs.append(rrb.BarChartView(origin="spectra", name="Spectra [mm over Hz]"))
+    if result.retimed is not None and result.retimed.animation.tempo is not None:
+        reasons = rrb.TextLogView(origin="tempo_reasons", name="Why it is slower")
+        tabs.append(rrb.Vertical(plot("Tempo [%]", "tempo"), reasons, name="Tempo"))
     if optimized:
         units = dict.fromkeys(measure_of(motor).unit for motor in character.motors)
         tabs += [plot(f"Change of the motors [{unit}]", f"changes_{unit}") for unit in units]

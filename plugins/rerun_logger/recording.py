@@ -17,7 +17,7 @@ from calmotion.errors import ShotError
 from calmotion.host import OperatorResult
 from calmotion.model import Animation, Character, Motion, Result, Simulation, SystemModes, measure_of
 from calmotion.support import distinct_names, replaced
-from calmotion.views import error_spectrum, highest_frequency, sample_motion
+from calmotion.views import error_spectrum, highest_frequency, pace_of, sample_motion
 
 from .bodies import log_bodies, log_ghost, log_scenery
 from .colors import Style
@@ -121,6 +121,7 @@ def log_all(
         for log in (log_errors, log_motors, log_reactions):
             log(recording, character, root, simulation, samples_per_plot, style)
     log_spectra(recording, character, result)
+    log_tempo(recording, character, result)
     if result.after is not None:
         log_changes(recording, character, result, samples_per_plot)
     log_progress(recording, result)
@@ -236,6 +237,18 @@ def log_changes(recording: rr.RecordingStream, character: Character, result: Res
         color = STYLES[OPTIMIZED].shade(m, len(character.motors))
         name = f"{names[motor.path]} [{measure.unit}]"
         log_curve(recording, f"changes_{measure.unit}{motor.path}", after.times[rows], change, color, name)
+
+
+def log_tempo(recording: rr.RecordingStream, character: Character, result: Result) -> None:
+    """Tempo of the performance [% of the animation's], and what makes each part slower, where it begins."""
+    pace = pace_of(character, result)
+    if pace is None:
+        return
+    log_curve(recording, "tempo/percent", pace.times, pace.percent, STYLES[OPTIMIZED].color, "tempo [%]")
+    texts = [f"to {part.end:.2f} s {part.factor:.2f} times as long: {', '.join(part.because)}" for part in pace.parts]
+    if texts:
+        starts = [rr.TimeColumn(TIME, duration=[part.start for part in pace.parts])]
+        recording.send_columns("tempo_reasons", starts, rr.TextLog.columns(text=texts))
 
 
 def log_progress(recording: rr.RecordingStream, result: Result) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from calmotion.model import Animation, Character, Result, Simulation
 from calmotion.multibody import processors
 from calmotion.support import distinct_names
+from calmotion.views import Pace, pace_of
 from PIL import Image, ImageDraw
 
 from .chart import FAINT, GRID, INK, Chart, Color, Curve, draw_chart, font
@@ -50,6 +51,7 @@ class Film:
         chart: The error curves.
         target: Name of the target of the near view.
         width: Of the video [pixels].
+        pace: The tempo; None where it is the animation's.
     """
 
     stage: Stage
@@ -57,6 +59,7 @@ class Film:
     chart: Chart | None
     target: str
     width: int
+    pace: Pace | None = None
 
     @property
     def text(self) -> int:
@@ -140,7 +143,8 @@ def plan(character: Character, animation: Animation, result: Result, settings: S
     size = (width, max(round(CHART * width), LEAST_CHART))
     chart = Chart(curves, span, size, slow, title, INTENDED) if paths else None
     name = distinct_names(paths)[paths[worst.target]] if worst.target >= 0 else ""
-    return Film(stage, tuple(runs), chart, name, width), moments(*span, worst, settings.rate, settings.slow)
+    film = Film(stage, tuple(runs), chart, name, width, pace_of(character, result))
+    return film, moments(*span, worst, settings.rate, settings.slow)
 
 
 def draw_frame(film: Film, moment: Moment) -> Image.Image:
@@ -189,6 +193,8 @@ def write_time(draw: ImageDraw.ImageDraw, film: Film, moment: Moment, bottom: in
     speed = ""
     if moment.near > 0.0:
         speed = f"  slow motion {moment.speed:g}×" if moment.speed else ""
+    elif film.pace is not None and (pace := film.pace.text(moment.time)):
+        speed = f"  {pace}"
     halo = max(round(film.text / 8), 1)
     draw.text(
         (film.text, base), f"{moment.time:.2f} s{speed}", font=letters, fill=INK, anchor="ls",

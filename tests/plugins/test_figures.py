@@ -12,9 +12,8 @@ import pytest
 import synthetic
 from calmotion.errors import ShotError
 from calmotion.host import PluginError
-from calmotion.model.outputs import SystemModes
-from calmotion.model.retiming.retimed import Retimed
-from calmotion.model.retiming.tempo import Stretch, TempoReport, TimeMap
+from calmotion.model.limits.use import LimitUse
+from calmotion.model.outputs import ExceededLimits, SystemModes, Tempo
 from calmotion.model.run import OutputPaths
 from calmotion.model.uncertainty import Robustness
 from calmotion.testing import host_with, run_operator
@@ -60,16 +59,30 @@ def test_a_simulation_alone_has_no_convergence_and_draws_twice_the_same(tmp_path
 
 
 def test_a_performance_at_another_tempo_has_its_tempo_with_reasons(tmp_path, figures):
-    tempo = TimeMap(np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9) + 0.1 * np.linspace(0.0, 1.0, 9) ** 2)
-    character, animation = synthetic.character(), synthetic.animation()
-    report = TempoReport(1.0, 0.08, (Stretch(0.2, 0.8, 1.2, ((0, "velocity"),)),), ((0.5, 0.02),))
-    retimed = Retimed(dataclasses.replace(animation, tempo=tempo), character, report)
-    paths = draw(tmp_path, dataclasses.replace(synthetic.result(), retimed=retimed), {"figures.plot": {"dpi": 60}})
+    character, result = synthetic.character(), synthetic.retimed_result()
+    paths = draw(tmp_path, result, {"figures.plot": {"dpi": 60}})
     assert "tempo.png" in [Path(path).name for path in paths]
-    axes = sys.modules[f"{figures.__name__}.tempo"].plot_tempo(character, retimed).axes[0]
+    axes = sys.modules[f"{figures.__name__}.tempo"].plot_tempo(character, result.retimed).axes[0]
     line = axes.get_lines()[0]
     assert line.get_xdata()[-1] == pytest.approx(1.1) and line.get_ydata()[-1] == pytest.approx(100.0 / 1.2)
     assert [text.get_text() for text in axes.texts] == [f"velocity of {character.motors[0].path}"]
+
+
+def test_the_tempo_that_a_robot_needs_is_drawn_where_limits_are_exceeded(tmp_path, figures):
+    times = np.linspace(0.0, 1.0, 11)
+    stretch = np.where((times > 0.3) & (times < 0.7), 1.25, 1.0)
+    tempo = Tempo(1.25, 0.25, 0.1, times, stretch)
+    exceeded = ExceededLimits((LimitUse(0, "velocity", 1.0, 1.25, 1.25, 0.5, 0.25),), tempo)
+    values = [synthetic.character(), exceeded, OutputPaths(figures=str(tmp_path))]
+    (drawn,) = run_operator(host_with(PLUGIN), "figures.tempo", values, {"figures.tempo": {"dpi": 60}})
+    assert Path(drawn.path) == tmp_path / "tempo.png" and Path(drawn.path).stat().st_size > 5000
+    axes = sys.modules[f"{figures.__name__}.tempo"].plot_needed_tempo(synthetic.character(), exceeded).axes[0]
+    assert axes.get_lines()[0].get_ydata() == pytest.approx(100.0 / stretch)
+    (told,) = (text.get_text() for text in axes.texts)
+    assert told.startswith("velocity of") and told.endswith("+25%")
+    with pytest.raises(PluginError, match="keeps the limits"):
+        kept = dataclasses.replace(exceeded, tempo=None)
+        run_operator(host_with(PLUGIN), "figures.tempo", [values[0], kept, values[2]])
 
 
 def test_errors_are_drawn_in_millimetres_and_degrees_from_the_first_frame_on(figures):

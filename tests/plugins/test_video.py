@@ -43,6 +43,20 @@ def ink(picture, color):
     return np.all(np.abs(np.asarray(picture.convert("RGB")).astype(int) - color) < 12, axis=-1)
 
 
+def test_a_slower_part_tells_its_tempo_and_what_forces_it(video):
+    character, result = synthetic.character(), synthetic.retimed_result()
+    film, _ = video.film.plan(character, synthetic.animation(), result, video.film.Settings(320, 8.0, 0.5))
+    assert film.pace.text(0.5) == f"tempo {film.pace.percent[np.searchsorted(film.pace.times, 0.5)]:.0f}%: " + (
+        f"velocity of {character.motors[0].path}"
+    )
+    assert film.pace.text(0.05) == ""
+    frames = [
+        video.film.draw_frame(dataclasses.replace(film, pace=pace), video.timeline.Moment(0.5, 0.0, 1.0))
+        for pace in (film.pace, None)
+    ]
+    assert np.any(np.asarray(frames[0]) != np.asarray(frames[1]))
+
+
 def test_a_video_plays_the_shot_then_its_worst_moment_and_is_twice_the_same(tmp_path, video):
     result = synthetic.result()
     first, second = (Path(write(tmp_path / f"{name}.webp", result)) for name in "ab")

@@ -70,6 +70,7 @@ from calmotion.model.outputs import Section as Section
 from calmotion.model.outputs import ShapedTracks as ShapedTracks
 from calmotion.model.outputs import SystemModes as SystemModes
 from calmotion.model.outputs import Tempo as Tempo
+from calmotion.model.outputs import TempoFigure as TempoFigure
 from calmotion.model.outputs import TextTable as TextTable
 from calmotion.model.outputs import Verification as Verification
 from calmotion.model.outputs import Video as Video

@@ -79,6 +79,13 @@ class Figures:
 
 
 @dataclass(frozen=True)
+class TempoFigure:
+    """Path of the figure of the tempo that a robot needs for an animation."""
+
+    path: str
+
+
+@dataclass(frozen=True)
 class Video:
     """Path of a video."""
 

@@ -1,5 +1,7 @@
 """Public names of `calmotion.views`: each is imported when it is first used."""
 
+from calmotion.views.pace import Pace as Pace
+from calmotion.views.pace import pace_of as pace_of
 from calmotion.views.playback import carriers as carriers
 from calmotion.views.playback import deformed_points as deformed_points
 from calmotion.views.playback import deviations as deviations

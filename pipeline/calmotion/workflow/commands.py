@@ -159,6 +159,7 @@ def inspect(
     leave_out: Sequence[str] = (),
     strict: bool = False,
     modes: Path | None = None,
+    figures: Path | None = None,
     operators: Sequence[str] = (),
     settings: Given = None,
     progress: ProgressCallback | None = None,
@@ -172,16 +173,20 @@ def inspect(
             on_operator: As of `simulate`.
         strict: Check the shot instead, with USD's validators as well, and list all findings; nothing costly runs.
         modes: Folder for the mode shapes of the flexible bodies.
+        figures: Folder for the figure of the tempo, where limits of motors ask for another one.
 
     Raises:
         SettingError: An argument does not fit.
     """
-    kinds, optional = wanted_of(strict, modes is not None)
+    kinds, optional = wanted_of(strict, modes is not None, figures is not None)
     return Inspection(
         carry_out(
             _opened(shot), "check" if strict else "inspect", wanted=kinds, optional=optional, operators=operators,
             source=_source(tolerance, step, integrator, pre_roll, motors), known=(),
-            outputs=OutputPaths(modes=None if modes is None else os.fspath(modes)),
+            outputs=OutputPaths(
+                modes=None if modes is None else os.fspath(modes),
+                figures=None if figures is None else os.fspath(figures),
+            ),
             settings=merge([_forced(keep, leave_out), read_settings(settings)]), hooks=Hooks(progress, on_operator),
         )
     )  # fmt: skip

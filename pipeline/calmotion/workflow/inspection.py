@@ -26,7 +26,7 @@ from calmotion.model import (
 )
 from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.model.motor import SERVO, measure_of
-from calmotion.model.outputs import WARNING, Finding, ModeShapes, MotorEffects, PlannedStep, SystemModes
+from calmotion.model.outputs import WARNING, Finding, ModeShapes, MotorEffects, PlannedStep, SystemModes, TempoFigure
 from calmotion.model.run import RunSettings
 from calmotion.tolerance.reduced_bodies import ReducedBodies
 from calmotion.version import __version__
@@ -38,17 +38,18 @@ SHOWN_MODES = 10
 _CONTENTS: tuple[type, ...] = (Character, Animation, Provenance)
 
 
-def wanted_of(strict: bool, modes: bool) -> tuple[tuple[type, ...], tuple[type, ...]]:
+def wanted_of(strict: bool, modes: bool, figures: bool = False) -> tuple[tuple[type, ...], tuple[type, ...]]:
     """What an inspection needs, and what it makes where it can.
 
     Args:
         strict: Whether the shot is only checked, without costly work.
         modes: Whether mode shapes are requested.
+        figures: Whether figures are.
     """
     wanted: tuple[type, ...] = (Findings,) if strict else _CONTENTS
     costly = (ModelChoices, ReducedBodies, SystemModes, PlannedStep, MotorEffects)
     optional = (ExceededLimits, *(_CONTENTS if strict else costly))
-    return (*wanted, *((ModeShapes,) if modes else ())), optional
+    return (*wanted, *((ModeShapes,) if modes else ())), (*optional, *((TempoFigure,) if figures else ()))
 
 
 class Inspection:
@@ -190,6 +191,7 @@ def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]
         "expected": _expected(character, animation),
         "system_frequencies_hz": modes.frequencies[:SHOWN_MODES].tolist() if modes else [],
         "system_damping_ratios": modes.damping[:SHOWN_MODES].tolist() if modes else [],
+        "figures": [drawn.path] if (drawn := run.get(TempoFigure)) else [],
         "mode_shapes": list(shapes.paths) if (shapes := run.get(ModeShapes)) else [],
         "notes": list(character.notes),
         "written_names": dict(provenance.names),

@@ -5,6 +5,8 @@ A fixed base, a box link that turns about z and bends by one mode (x / L)^2 alon
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 from calmotion.model import (
     WORLD,
@@ -22,6 +24,7 @@ from calmotion.model import (
     MotorCurve,
     OptimizerStep,
     Result,
+    Retimed,
     SearchRecord,
     Simplification,
     Simulation,
@@ -30,6 +33,7 @@ from calmotion.model import (
     Target,
     Track,
 )
+from calmotion.model.retiming.tempo import Stretch, TempoReport, TimeMap
 
 LENGTH = 0.5
 FRAME_RATE = 24.0
@@ -177,3 +181,11 @@ def result(optimized=True):
         dof=19,
         left_out=(Simplification("modes above 40 Hz", "the motion does not excite them", 2e-5),),
     )
+
+
+def retimed_result():
+    """An optimised result that is a tenth slower at its end, because of its first motor's speed."""
+    tempo = TimeMap(np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9) + 0.1 * np.linspace(0.0, 1.0, 9) ** 2)
+    report = TempoReport(1.0, 0.08, (Stretch(0.2, 0.8, 1.2, ((0, "velocity"),)),), ((0.5, 0.02),))
+    performed = Retimed(dataclasses.replace(animation(), tempo=tempo), character(), report)
+    return dataclasses.replace(result(), retimed=performed)

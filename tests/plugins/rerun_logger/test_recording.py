@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import recordings
 import rerun as rr
@@ -24,6 +25,16 @@ def test_it_is_skipped_when_no_recording_is_requested():
     values = [synthetic.character(), synthetic.animation(), synthetic.result(), OutputPaths()]
     with pytest.raises(PluginError, match="--rrd"):
         run_operator(host_with(PLUGIN), "rerun.log", values)
+
+
+def test_a_performance_at_another_tempo_has_its_tempo_and_what_forces_it(tmp_path):
+    result = synthetic.retimed_result()
+    write(tmp_path / "out.rrd", result)
+    columns = recordings.read_recording(tmp_path / "out.rrd")
+    times, percent = columns["/tempo/percent", "Scalars:scalars"]
+    assert times[-1] == pytest.approx(1.1) and np.ravel(percent)[-1] == pytest.approx(100.0 / 1.2)
+    begins, told = columns["/tempo_reasons", "TextLog:text"]
+    assert begins == pytest.approx([0.204]) and "1.20 times as long: velocity of" in str(told[0])
 
 
 def test_a_folder_that_cannot_be_written_is_reported_and_nothing_is_left(tmp_path):

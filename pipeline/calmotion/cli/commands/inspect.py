@@ -33,6 +33,10 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="folder for the mode shapes of the flexible bodies (.vtu, .png) and their table",
     )  # fmt: skip
     command.add_argument(
+        "--figures", metavar="DIR",
+        help="folder for tempo.png: where the animation would have to be slower, and for which motors",
+    )  # fmt: skip
+    command.add_argument(
         "--strict",
         action="store_true",
         help="check the shot before publishing: run every cheap check and USD's validators, list all findings, and end "
@@ -62,6 +66,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
             shot,
             strict=args.strict,
             modes=args.modes,
+            figures=args.figures,
             **simulation_arguments(args),
             **run_arguments(args, display),
         )

@@ -99,6 +99,8 @@ def _print_contents(console: Console, report: dict[str, Any], verbose: bool) -> 
     print_tempo(console, report["tempo"])
     _print_gains(console, report)
     print_left_out(console, report["left_out"], verbose)
+    if report["figures"]:
+        say(console, f"figures: {', '.join(report['figures'])}")
     if report["mode_shapes"]:
         say(console, f"mode shapes: {', '.join(report['mode_shapes'])}")
     print_notes(console, report["notes"])
