@@ -1,4 +1,4 @@
-"""The tutorials, followed by their text alone: the shell blocks of each page, in order, in an empty folder."""
+"""Tutorials and how-to pages, followed by their text alone: the shell blocks of each page, in an empty folder."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,13 +14,21 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-PAGES = REPOSITORY / "docs" / "tutorials"
+DOCS = REPOSITORY / "docs"
+PAGES = DOCS / "tutorials"
 FOLLOWED = ("usd", "urdf", "skinned_character", "calibration", "two_workers", "puppeteer")
+HOW_TO = ("arduino", "phone", "weights", "remaining_error", "offline_or_live")
 
 
 def script(page: str) -> str:
     """The shell blocks of a page, one after the other."""
-    return "\n".join(re.findall(r"```sh\n(.*?)```", (PAGES / f"{page}.md").read_text(), re.DOTALL))
+    return "\n".join(blocks(page, "sh"))
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """The blocks of a page in a language; a page is a tutorial, or has its folder in its name."""
+    text = (DOCS / f"{page if '/' in page else f'tutorials/{page}'}.md").read_text()
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
 
 
 def follow(page: str, folder: Path) -> str:
@@ -31,7 +40,7 @@ def follow(page: str, folder: Path) -> str:
         file.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} {command}"$@"\n')
         file.chmod(0o755)
     work = folder / "work"
-    work.mkdir()
+    work.mkdir(exist_ok=True)
     environment = os.environ | {
         "PATH": os.pathsep.join(map(str, (tools, Path(sys.executable).parent, os.environ["PATH"]))),
         "PYTHONPATH": str(REPOSITORY / "pipeline"),
@@ -49,14 +58,14 @@ def errors_of(printed: str) -> list[tuple[float, float]]:
     return [(float(before), float(after)) for before, after in found]
 
 
-@pytest.mark.parametrize("page", FOLLOWED)
-def test_the_commands_of_a_tutorial_are_accepted(page, capsys):
+@pytest.mark.parametrize("page", [*FOLLOWED, *(f"how_to/{page}" for page in HOW_TO)])
+def test_the_commands_of_a_page_are_accepted(page, capsys):
     from calmotion.cli.commands.table import all_commands
     from calmotion.cli.main import build_parser
 
     text = re.sub(r"<<'END'\n.*?\nEND\n", "\n", script(page), flags=re.DOTALL)
     lines = [line for line in text.splitlines() if line.startswith("calmotion ")]
-    assert len(lines) >= 3
+    assert len(lines) >= 2
     if absent := {line.split()[1] for line in lines if all_commands()[line.split()[1]].disabled}:
         pytest.skip(f"the plugins that bring {', '.join(absent)} are not there")
     for line in lines:
@@ -128,6 +137,115 @@ def test_a_show_on_two_workers(tmp_path):
     for folder in ("calm", "farm"):
         jobs = json.loads((tmp_path / "work" / folder / "batch.json").read_text())["jobs"]
         assert len(jobs) == 2 and all(job["outcome"] in ("done", "kept") for job in jobs)
+
+
+SKETCHES = {
+    "Arduino.h": """
+#include <stdint.h>
+uint32_t micros();
+void delay(uint32_t milliseconds);
+""",
+    "Servo.h": """
+struct Servo { void attach(int pin, int least, int most); void writeMicroseconds(int pulse); };
+""",
+    "Adafruit_PWMServoDriver.h": """
+struct Adafruit_PWMServoDriver {
+  void begin(); void setPWMFreq(float rate); void setPWM(uint8_t n, uint16_t on, uint16_t off);
+};
+""",
+    "avr/pgmspace.h": """
+#include <string.h>
+#define PROGMEM
+#define memcpy_P memcpy
+""",
+}  # libraries in name alone: what the sketches call
+
+
+@pytest.mark.long
+def test_a_sketch_of_an_arduino_plays_what_is_exported(tmp_path):
+    compiler = shutil.which("c++")
+    if compiler is None:
+        pytest.skip("no C++ compiler")
+    printed = follow("how_to/arduino", tmp_path)
+    work = tmp_path / "work" / "calmotion_demo"
+    losses = [float(loss) for loss in re.findall(r"playing them costs up to ([\d.]+) mm", printed)]
+    assert losses == pytest.approx([4.0, 2.2], abs=0.1), "as on the page"
+    for name, text in SKETCHES.items():
+        (work / name).parent.mkdir(exist_ok=True)
+        (work / name).write_text(text)
+    for sketch in blocks("how_to/arduino", "cpp"):
+        for board in ([], ["-D__AVR__"]):
+            command = [
+                compiler,
+                "-fsyntax-only",
+                "-Wall",
+                "-Werror",
+                "-Wno-sign-compare",
+                "-x",
+                "c++",
+                "-include",
+                "Arduino.h",
+                *board,
+            ]
+            subprocess.run([*command, "-I", work, "-"], input=sketch, text=True, check=True)
+
+
+@pytest.mark.long
+def test_weights_over_time_make_better_what_the_audience_looks_at(tmp_path):
+    printed = follow("how_to/weights", tmp_path)
+    found = [float(size) for size in re.findall(r"s: ([\d.]+) mm", printed)]
+    assert found == pytest.approx([5.50, 1.41, 4.77, 0.93], abs=0.03), "as on the page"
+
+
+@pytest.mark.long
+def test_why_error_remains_is_answered_with_a_goal(tmp_path):
+    printed = " ".join(follow("how_to/remaining_error", tmp_path).split())
+    for line in re.findall(r"^ {4}(\S.*)", (DOCS / "how_to" / "remaining_error.md").read_text(), re.MULTILINE):
+        assert line.split(",")[0] in printed, line
+    assert printed.endswith("[('/Bartender/UpperArm/ElbowTarget', ['motors'])]")
+
+
+@pytest.mark.long
+def test_offline_and_live_play_the_same_robot(tmp_path):
+    follow("how_to/offline_or_live", tmp_path)
+    work = tmp_path / "work" / "calmotion_demo"
+    assert len((work / "commands.jsonl").read_text().splitlines()) > 900 and (work / "show.csv").is_file()
+
+
+@pytest.mark.long
+def test_a_phone_shows_the_modulus_of_an_arm(tmp_path):
+    import calmotion as cm
+    import numpy as np
+    from calmotion.views.playback import rotation_matrices
+
+    work = tmp_path / "work"
+    work.mkdir()
+    robot, shot = re.findall(r"<<'END'\n(.*?)END\n", script("calibration"), re.DOTALL)[:2]
+    (work / "robot.usda").write_text(robot)
+    (work / "shot.usda").write_text(shot)
+    phone = re.search(r"<<'END'\n(.*?)END\n", script("how_to/phone"), re.DOTALL)[1]
+    real = phone.replace('"PhysicsMassAPI"]', '"PhysicsMassAPI", "CalmTargetAPI"]').replace("def Xform", "def Xform", 1)
+    real = (
+        real[: real.rindex("}")]
+        + 'over "ABS" { float physics:youngsModulus = 1.6e9\n float calm:damping:ratio = 0.04 } }'
+    )
+    (work / "real.usda").write_text(real)
+    result = cm.simulate(work / "real.usda", step="0.5ms", tolerance="0.2mm")
+    path = "/Robot/Phone"
+    times, motion = result.times, result.targets[path]
+    acceleration = np.gradient(np.gradient(motion.position, times, axis=0), times, axis=0) + [0.0, 0.0, 9.81]
+    own = np.einsum("tji,tj->ti", rotation_matrices(motion.orientation), acceleration)
+    own += 0.02 * np.random.default_rng(3).standard_normal(own.shape)
+    names = ["Time (s)", *(f"Acceleration {axis} (m/s^2)" for axis in "xyz")]
+    table = np.column_stack([times, own])[20:-20:5]
+    np.savetxt(work / "take.csv", table, delimiter=",", header=",".join(f'"{name}"' for name in names), comments="")
+    follow("how_to/phone", tmp_path)
+    from pxr import Usd
+
+    stage = Usd.Stage.Open(str(work / "mine.usda"))
+    assert not stage.GetPrimAtPath(path)
+    modulus = stage.GetPrimAtPath("/Robot/ABS").GetAttribute("physics:youngsModulus").Get()
+    assert modulus == pytest.approx(1.6e9, rel=0.03)
 
 
 @pytest.mark.long
