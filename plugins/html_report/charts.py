@@ -13,7 +13,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedFormatter
+from matplotlib.ticker import FixedLocator
 
 from .packing import Packing
 
@@ -70,8 +70,9 @@ def _panel(axes: Axes, xlabel: str, packing: Packing, points: int) -> dict[str, 
         if isinstance(collection, LineCollection)
         for segment in collection.get_segments()
     ]
-    named = axes.yaxis.get_major_formatter()
-    rows = zip(axes.get_yticks().tolist(), named.seq, strict=False) if isinstance(named, FixedFormatter) else ()
+    named = isinstance(axes.yaxis.get_major_locator(), FixedLocator)
+    labels = [label.get_text() for label in axes.get_yticklabels()] if named else []
+    rows = zip(axes.get_yticks().tolist() if named else [], labels, strict=True)
     return {
         "title": axes.get_title(loc="left") or axes.get_title(),
         "more": axes.get_title(loc="right"),
@@ -85,7 +86,7 @@ def _panel(axes: Axes, xlabel: str, packing: Packing, points: int) -> dict[str, 
         "marks": marks,
         "spans": spans,
         "bars": bars,
-        "rows": [[at, str(name)] for at, name in rows],
+        "rows": [[at, name] for at, name in rows],
     }
 
 

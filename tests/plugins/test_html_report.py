@@ -182,8 +182,13 @@ def test_a_figure_keeps_its_lines_labels_limits_and_marks():
     lower.axhline(2.0)
     lower.axvspan(4.0, 5.0)
     lower.set_xlabel("time [s]")
-    shown = charts.charts_of([("Errors", figure)])
+    rows = Figure()
+    listed = rows.subplots()
+    listed.plot([3.0, 1.0], [0, 1], "o", label="before")
+    listed.set_yticks([0, 1], ["lamp", "bartender"])
+    shown = charts.charts_of([("Errors", figure), ("Shots", rows)])
     first, second = shown["groups"][0]["panels"]
+    assert shown["groups"][1]["panels"][0]["rows"] == [[0, "lamp"], [1, "bartender"]] and not first["rows"]
     read = unpacked(f'<script type="t" id="a-arrays">{shown["arrays"]}</script>', "a")
     assert first["title"] == "/Arm/Tip" and first["xlabel"] == second["xlabel"] == "time [s]"
     (curve,) = first["curves"]
