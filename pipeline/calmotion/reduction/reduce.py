@@ -22,7 +22,7 @@ from calmotion.reduction.elements.assembly import FEModel, assemble
 from calmotion.reduction.elements.embedding import Embedding, embed
 from calmotion.reduction.inertia import inertia_integrals
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
-from calmotion.reduction.reduced_body import Elasticity, Marker, ReducedBody
+from calmotion.reduction.reduced_body import Marker, ReducedBody
 from calmotion.reduction.weak_seats import weak_patch
 
 __all__ = ["AttachmentFrame", "LinearModes", "linear_modes", "reduce_body"]
@@ -63,25 +63,10 @@ def reduce_body(
     assert body.flexible is not None
     material = _material(mesh, body.flexible.material)
     settings = replace(body.flexible, material=material)
-    body = replace(body, flexible=settings)
-    elasticity = None
-    law, simplifications, linear_error = _law(model, linear.support, basis, body, load_envelope, tolerance)
-    if law != "linear" and len(basis.omega_squared):
-        from calmotion.reduction.material_laws.large_deflection import large_deflection
-        from calmotion.reduction.material_laws.locking import locked
+    from calmotion.reduction.material_laws.laws import reduced_by_law
 
-        basis, elasticity = large_deflection(
-            model, linear.support, basis, material, law, load_envelope, tolerance, settings.pairs_share
-        )
-        locking = locked(model, linear.basis, basis, elasticity, load_envelope, linear_error)
-        if locking is not None:
-            left_out += (locking.told(body.path),)
-        if locking is not None and locking.by_linear:
-            basis, elasticity = linear.basis, None
-        else:
-            left_out += simplifications + _omitted_strain(elasticity, body)
-    else:
-        left_out += simplifications
+    by_law = reduced_by_law(model, linear.support, basis, settings, load_envelope, tolerance, body.path)
+    basis = by_law.basis
     r, mesh_error = len(basis.omega_squared), _mesh_error(mesh)
     reduced = ReducedBody(
         invariants=inertia_integrals(model.mesh.nodes, model.mass, basis.modes),
@@ -91,8 +76,8 @@ def reduce_body(
         skin=tuple(linear.embedding(surface).displacements(basis.modes) for surface in surfaces),
         nodes=len(model.mesh.nodes),
         elements=len(model.mesh.tets),
-        elasticity=elasticity,
-        left_out=left_out,
+        elasticity=by_law.elasticity,
+        left_out=left_out + by_law.told,
         mesh_error_m=_mesh_error_at_targets(mesh_error, linear),
         mesh_error=mesh_error,
         element_error=max(1.0 / mesh.quality.stiffness_factor - 1.0, 0.0),
@@ -223,29 +208,6 @@ def linear_modes(
     return LinearModes(model, support, moving, full.radii, basis, load_envelope, _embedded=full._embedded)
 
 
-def _law(
-    model: FEModel, support: Support, basis: Basis, body: Body, load_envelope: LoadEnvelope | None, tolerance: float
-) -> tuple[str, tuple[Simplification, ...], float]:
-    """The law of a body, its simplifications, and the error of the linear law [m], infinite where the shot chose."""
-    settings = body.flexible
-    assert settings is not None
-    law, what = settings.elasticity, f"{body.path}: linear elasticity"
-    if law != "auto":
-        told = Simplification(what, "calm:flexible:elasticity is linear", None, REDUCTION)
-        return law, (told,) if law == "linear" else (), np.inf
-    if load_envelope is None:
-        told = Simplification(what, "its deflection is not known without a motion", None, REDUCTION)
-        return "linear", (told,), np.inf
-    from calmotion.reduction.material_laws.choice import choose_law
-
-    choice = choose_law(model, support, basis, settings.material, load_envelope, tolerance, body.path)
-    if choice.law == "neohookean":
-        return choice.law, (), choice.linear_error_m
-    if choice.law == "stvk":
-        what = f"{body.path}: linear material, with nonlinear strain"
-    return choice.law, (Simplification(what, choice.reason, choice.error_m, REDUCTION),), choice.linear_error_m
-
-
 def _mesh_error(mesh: FEMesh) -> float | None:
     """Relative error of the stiffness by the mesh: twice that of a frequency."""
     error = mesh.quality.frequency_error
@@ -256,7 +218,7 @@ def _mesh_error_at_targets(error: float | None, linear: LinearModes) -> float | 
     """Error of the deflection [m] by a relative error of the stiffness."""
     if error is None or linear.load_envelope is None:
         return None
-    from calmotion.reduction.material_laws.choice import deflection_of
+    from calmotion.reduction.material_laws.deflection import deflection_of
 
     return error * deflection_of(linear.model, linear.basis, linear.load_envelope)
 
@@ -279,16 +241,6 @@ def _omitted_modes(basis: Basis, body: Body, load_envelope: LoadEnvelope | None)
         why = f"maxFrequency of {flexible.max_frequency:.4g} Hz is authored"
     what = f"{body.path}: only {kept} linear mode{'' if kept == 1 else 's'}"
     return (Simplification(what, why, basis.cut_error_m, REDUCTION),)
-
-
-def _omitted_strain(law: Elasticity, body: Body) -> tuple[Simplification, ...]:
-    """The coordinates without quadratic strain, with the estimated error."""
-    if law.strain_projection is None:
-        return ()
-    p, r = law.strain_projection.shape
-    what = f"{body.path}: quadratic strain in {p} of {r} elastic coordinates"
-    why = "the loads of this shot cause almost no rotation in the others"
-    return (Simplification(what, why, law.strain_error_m, REDUCTION),)
 
 
 def _markers(

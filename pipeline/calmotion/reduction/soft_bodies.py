@@ -6,7 +6,7 @@ import numpy as np
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.model import Body, Character
-from calmotion.reduction.material_laws.choice import UNPHYSICAL
+from calmotion.reduction.material_laws.deflection import UNPHYSICAL
 
 _COMPRESSED = 0.5  # of its length, by which a body is compressed under its own weight, beyond any material
 

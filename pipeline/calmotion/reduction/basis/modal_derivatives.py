@@ -76,6 +76,7 @@ class Derivatives:
     """The second order of a body's deflection.
 
     Attributes:
+        count: Number c of modes that are paired.
         fields: theta_ij with x = sum phi_i u_i + sum_ij theta_ij u_i u_j / 2 to second order, i <= j, shape
             [n, 3, c (c + 1) / 2].
         motion: Motion of each patch in the fields (translation, rotation vector), shape [p, 6, c (c + 1) / 2].
@@ -85,6 +86,7 @@ class Derivatives:
         shape_motion: Motion of each patch in this response, shape [p, 6, s].
     """
 
+    count: int
     fields: Array
     motion: Array
     changes: Array
@@ -94,8 +96,9 @@ class Derivatives:
 
 
 def modal_derivatives(
-    model: FEModel, support: Support, basis: Basis, count: int, material: ElasticMaterial, law: str
-) -> Derivatives:
+    model: FEModel, support: Support, basis: Basis, count: int, material: ElasticMaterial, law: str,
+    known: Derivatives | None = None,
+) -> Derivatives:  # fmt: skip
     """Modal derivatives of the first modes of a basis.
 
     Args:
@@ -106,6 +109,7 @@ def modal_derivatives(
         count: Number c of modes that are paired.
         material: Elastic constants.
         law: `stvk` or `neohookean`.
+        known: Those of fewer of its first modes, with the same law.
     """
     nodes = model.mesh.nodes
     n, p = len(nodes), len(support.patches)
@@ -121,30 +125,34 @@ def modal_derivatives(
     for k, change in enumerate(patch_changes):
         changes[k, :, at : at + change.shape[1]] = change
         at += change.shape[1]
-    force = np.zeros((n, 3, pairs + at))
-    imposed = np.zeros((n, 3, pairs + at))
-    for k, (i, j) in enumerate(zip(first, second, strict=True)):
+    new = second >= (0 if known is None else known.count)
+    here = int(new.sum())
+    force, imposed = np.zeros((n, 3, here + at)), np.zeros((n, 3, here + at))
+    for k, (i, j) in enumerate(zip(first[new], second[new], strict=True)):
         interrupts.check()
         force[:, :, k] = rule.second_order_force(gradients[i], gradients[j], lame, mu, law)
     change_sizes = np.einsum("pms,pmq->sq", changes, squares(basis.patch_motion[:, 3:, :count]))
     for k, (patch, arm) in enumerate(zip(support.patches, arms, strict=True)):
-        imposed[patch] = square_fields(arm) @ changes[k] @ np.hstack([change_sizes, np.eye(at)])
-    flat, motion = support.fixed(model).balance(-force.reshape(3 * n, -1), imposed.reshape(3 * n, -1))
-    fields = flat.reshape(n, 3, -1)
-    return Derivatives(
-        fields[:, :, :pairs], motion[:, :, :pairs], changes, change_sizes, fields[:, :, pairs:], motion[:, :, pairs:]
-    )
+        imposed[patch] = square_fields(arm) @ changes[k] @ np.hstack([change_sizes[:, new], np.eye(at)])
+    flat, moved = support.fixed(model).balance(-force.reshape(3 * n, -1), imposed.reshape(3 * n, -1))
+    found = flat.reshape(n, 3, -1)
+    fields, motion = np.empty((n, 3, pairs)), np.empty((p, 6, pairs))
+    fields[:, :, new], motion[:, :, new] = found[:, :, :here], moved[:, :, :here]
+    if known is not None:
+        fields[:, :, ~new], motion[:, :, ~new] = known.fields, known.motion
+    return Derivatives(count, fields, motion, changes, change_sizes, found[:, :, here:], moved[:, :, here:])
 
 
 def extended_basis(
     model: FEModel, support: Support, basis: Basis, count: int, material: ElasticMaterial, law: str,
     negligible: float = NEGLIGIBLE, deflections: Array | None = None, stiff: float = 1.0,
+    known: Derivatives | None = None,
 ) -> Basis:  # fmt: skip
     """A basis and the modal derivatives of its first modes, made mass-orthonormal.
 
     A derivative is weighted by the deflections of its modes under the same load (by 1/omega^2), or, where the bending
-    of other modes moves them farther, by that; directions whose strain energy is negligible with these weights are
-    dropped. Without the second, more modes made a link of 0.29 m with a deflection of 27 mm stiffer, by 1.4%.
+    of other modes or the loads move them farther, by that; directions whose strain energy is negligible with these
+    weights are dropped. Without these, more modes made a link of 0.29 m with a deflection of 27 mm stiffer, by 1.4%.
     The changes of shape of rotating patches are coordinates of their own, which penalty springs couple to the rotations
     (see `patch_rotation`).
 
@@ -154,6 +162,7 @@ def extended_basis(
         negligible: Square root of the negligible share of the largest strain energy among the derivatives.
         deflections: Amplitude of each mode by the loads; None: not known.
         stiff: As of `patch_rotation.springs`.
+        known: As of `modal_derivatives`.
 
     Returns:
         The basis: its stiffness, with that of the springs, is diagonal; its lowest modes are nearly those of `basis`.
@@ -161,11 +170,11 @@ def extended_basis(
     count = min(count, len(basis.omega_squared))
     if count == 0:
         return basis
-    derivatives = modal_derivatives(model, support, basis, count, material, law)
+    derivatives = modal_derivatives(model, support, basis, count, material, law, known)
     n, p = len(model.mesh.nodes), len(support.patches)
     amplitude = static = basis.omega_squared[0] / basis.omega_squared[:count]
     if deflections is not None:
-        amplitude = np.maximum(static, _second_order(model, basis, derivatives, deflections[:count]))
+        amplitude = np.maximum(static, _moved(model, basis, derivatives, deflections[:count]))
     first, second = np.triu_indices(count)
     weight, static_weight = amplitude[first] * amplitude[second], static[first] * static[second]
     change_sizes = derivatives.change_sizes * weight
@@ -216,8 +225,8 @@ def extended_basis(
     )
 
 
-def _second_order(model: FEModel, basis: Basis, derivatives: Derivatives, deflections: Array) -> Array:
-    """How far modes move to second order where they bend together, over the deflection of the first, shape [c].
+def _moved(model: FEModel, basis: Basis, derivatives: Derivatives, deflections: Array) -> Array:
+    """How far modes move by the loads, or to second order where they bend together, over the first one, shape [c].
 
     A bending mode of large deflection moves axial and higher modes far more than the loads do.
 
@@ -230,7 +239,8 @@ def _second_order(model: FEModel, basis: Basis, derivatives: Derivatives, deflec
     first, second = np.triu_indices(count)
     pairs = np.where(first == second, 0.5, 1.0) * deflections[first] * deflections[second]
     moved = np.linalg.norm(share * pairs, axis=1)
-    return np.asarray(np.minimum(moved / max(deflections[0], np.finfo(float).tiny), 1.0))
+    largest = np.maximum(deflections, moved)
+    return np.asarray(np.minimum(largest / max(deflections[0], np.finfo(float).tiny), 1.0))
 
 
 def _without_modes(modes: Array, patch_motion: Array, M: Any, fields: Array, motion: Array) -> tuple[Array, Array]:

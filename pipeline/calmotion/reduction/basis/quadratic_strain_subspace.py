@@ -18,7 +18,6 @@ from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import GradientRule, gradient_gram
 from calmotion.reduction.load_envelope import LoadEnvelope
-from calmotion.reduction.material_laws.choice import amplitudes
 
 _BOUND = 20.0  # the bound over the error at the targets (measured: 20 to 1000)
 _SHARE = 0.25  # of the tolerance that this error may take
@@ -42,8 +41,8 @@ class QuadraticStrainSubspace:
 
 
 def quadratic_strain_subspace(
-    model: FEModel, support: Support, basis: Basis, linear: Basis, load_envelope: LoadEnvelope, youngs_modulus: float,
-    tolerance: float,
+    model: FEModel, support: Support, basis: Basis, linear: Basis, deflection: Array, load_envelope: LoadEnvelope,
+    youngs_modulus: float, tolerance: float,
 ) -> QuadraticStrainSubspace | None:  # fmt: skip
     """The subspace for the loads of a shot.
 
@@ -56,6 +55,7 @@ def quadratic_strain_subspace(
         model, support: Full model and its supports.
         basis: With modal derivatives, r modes.
         linear: The basis without them.
+        deflection: Bound of the amplitude of each of its modes.
         load_envelope: Loads of the shot.
         youngs_modulus: [Pa].
         tolerance: Acceptable error [m].
@@ -65,7 +65,6 @@ def quadratic_strain_subspace(
     """
     assert basis.first_order is not None and basis.second_order is not None
     r, pairs = basis.second_order.shape
-    deflection = amplitudes(model, linear, load_envelope, len(linear.omega_squared))
     first, second = np.triu_indices(int(np.sqrt(2 * pairs)))
     deflected = basis.first_order * deflection
     derivatives = basis.second_order * deflection[first] * deflection[second]

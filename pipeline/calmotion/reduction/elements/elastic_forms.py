@@ -56,6 +56,16 @@ class GradientRule:
         local = modes[self._tets[elements]]  # [m, 10, 3, r]
         return np.asarray(np.einsum("eair,ajeq->reqij", local, self._shape[:, :, elements], optimize=True))
 
+    def internal_force(self, displacement: Array, lame: float, mu: float) -> Array:
+        """Of a St. Venant-Kirchhoff body [N], shape [n, 3], at nodal displacements of that shape [m]."""
+        G = self.gradients(displacement[:, :, None])[0]
+        Gt = np.swapaxes(G, -1, -2)
+        stress = linear_stress(0.5 * (G + Gt + Gt @ G), lame, mu)
+        local = np.einsum("eqij,ajeq,eq->eai", stress + G @ stress, self._shape, self.weights, optimize=True)
+        force = np.zeros((self._nodes, 3))
+        np.add.at(force, self._tets, local)
+        return force
+
     def second_order_force(self, A: Array, B: Array, lame: float, mu: float, material: str) -> Array:
         """Second derivative of the internal force in the directions of two fields [N], shape [n, 3].
 

@@ -7,16 +7,16 @@ from functools import partial
 
 import numpy as np
 
-from calmotion.arrays import Array
 from calmotion.model.character import DEFAULT_TOLERANCE, ElasticMaterial
 from calmotion.reduction.basis.craig_bampton import Basis
 from calmotion.reduction.basis.modal_derivatives import NEGLIGIBLE, Support, extended_basis
 from calmotion.reduction.basis.quadratic_strain_subspace import QuadraticStrainSubspace, quadratic_strain_subspace
+from calmotion.reduction.basis.static_loads import OVERSHOOT
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, strain_gram
 from calmotion.reduction.elements.patch_rotation import spring_rows, springs, stiffer
 from calmotion.reduction.load_envelope import LoadEnvelope
-from calmotion.reduction.material_laws.choice import work_of_loads
+from calmotion.reduction.material_laws.bending import Bending
 from calmotion.reduction.reduced_body import Elasticity
 
 PAIRED_MODES = 16  # largest number of modes with derivatives
@@ -27,6 +27,7 @@ _FINEST = 1e-6  # rounding
 def large_deflection(
     model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, law: str,
     load_envelope: LoadEnvelope | None = None, tolerance: float = DEFAULT_TOLERANCE, pairs_share: float = 1.0,
+    bending: Bending | None = None,
 ) -> tuple[Basis, Elasticity]:  # fmt: skip
     """The basis of a body with modal derivatives, and the elastic law in this basis.
 
@@ -39,24 +40,28 @@ def large_deflection(
         load_envelope: Its loads in this shot, one row for each moving patch; None when they are not known.
         tolerance: Acceptable error [m].
         pairs_share: Share of the tolerance for the subspace of the quadratic strain; 0 keeps all coordinates.
+        bending: The modes to take in place of the basis, with what is known of them.
 
     Returns:
         The extended basis, and the law without damping.
     """
-    deflections = None
-    if load_envelope is not None:
-        basis, deflections = _by_deflection(model, basis, basis.load_envelope or load_envelope)
+    deflections = known = None
+    if bending is not None:
+        basis, deflections = bending.basis, bending.amplitude
+        known = bending.derivatives if law == "stvk" else None
     size = float(np.ptp(model.mesh.nodes, axis=0).max())
     negligible = float(np.clip(np.sqrt(_NEGLIGIBLE_ENERGY * tolerance / size), _FINEST, NEGLIGIBLE))
     stiff = stiffer(tolerance)
-    extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible, deflections, stiff)
+    extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible, deflections, stiff, known)
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
     if law == "stvk":
         law_of = partial(_stvk, model, support, extended, material, stiff)
-        if load_envelope is None or pairs_share <= 0.0:
+        if load_envelope is None or deflections is None or pairs_share <= 0.0:
             return extended, law_of(None)
         loads, allowed = basis.load_envelope or load_envelope, pairs_share * tolerance
-        subspace = quadratic_strain_subspace(model, support, extended, basis, loads, material.youngs_modulus, allowed)
+        subspace = quadratic_strain_subspace(
+            model, support, extended, basis, OVERSHOOT * deflections, loads, material.youngs_modulus, allowed
+        )
         return extended, law_of(subspace)
     from calmotion.reduction.material_laws.cubature import neohookean_cubature
 
@@ -84,21 +89,3 @@ def _stvk(
     if subspace is None:
         return law
     return replace(law, strain_projection=subspace.projection, strain_error_m=subspace.error_m)
-
-
-def _by_deflection(model: FEModel, basis: Basis, load_envelope: LoadEnvelope) -> tuple[Basis, Array]:
-    """The basis, ordered by the deflection of its modes under the loads of the shot, and the amplitude of each.
-
-    In the order of frequencies, residual vectors come last, although a link may deflect in them as far as in the first
-    mode. A mode without derivatives stretches the link as it bends, so its deflection would be too small.
-    """
-    largest = np.abs(basis.modes).max(axis=(0, 1))
-    amplitude = work_of_loads(model, basis.modes, basis.patch_motion, load_envelope) / basis.omega_squared
-    order = np.argsort(-largest * amplitude, kind="stable")
-    ordered = replace(
-        basis,
-        modes=basis.modes[:, :, order],
-        omega_squared=basis.omega_squared[order],
-        patch_motion=basis.patch_motion[:, :, order],
-    )
-    return ordered, amplitude[order]

@@ -1,14 +1,11 @@
-"""Choice of the elastic law of a body: the cheapest one whose estimated error is within the tolerance.
+"""How far the loads of a shot deflect a body, and what that does to a linear one.
 
-Two errors of a linear body are estimated from the loads of the shot, with u_i = (load on mode i) / omega_i^2 the
-quasi-static deflection and theta_ij the modal derivatives:
+Two errors of a linear body are estimated from the loads, with u_i = (load on mode i) / omega_i^2 the quasi-static
+deflection and theta_ij the modal derivatives:
 
 - shortening: the displacement of the tip, or of a target beyond it, is wrong by theta_ij u_i u_j / 2;
 - stiffening or softening: a load f also does work on theta_ij, so the stiffness changes by -f . theta_ij, and the
   deflection by this share of itself.
-
-St. Venant-Kirchhoff omits the nonlinearity of the material, a relative error of the order of the strain. In bending,
-the errors of the two sides cancel, and the rest is of the order of the square of the strain.
 """
 
 from __future__ import annotations
@@ -21,53 +18,49 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model.character import ElasticMaterial
 from calmotion.reduction.basis.craig_bampton import Basis
-from calmotion.reduction.basis.modal_derivatives import Support, modal_derivatives
+from calmotion.reduction.basis.modal_derivatives import Derivatives
 from calmotion.reduction.basis.static_loads import OVERSHOOT
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.load_envelope import LoadEnvelope
 
-_MODES = 4  # the lowest modes, which make nearly all of a deflection
-_LARGE_STRAIN = 0.1  # below, the bound of the loads is too pessimistic to require a nonlinear material
+MODES = 4  # the lowest modes, which make nearly all of a deflection
 UNPHYSICAL = 10.0  # linear deflection over the size of a body that hangs like a rope: beyond any reduced basis
 
 
 @dataclass(frozen=True)
-class LawChoice:
-    """The law of a body.
+class Deflection:
+    """Bounds of what the loads of a shot do to a linear body.
 
     Attributes:
-        law: `linear`, `stvk` or `neohookean`.
-        reason: For the user.
-        error_m: Estimated error of the law at the interfaces of the body [m].
-        linear_error_m: That of the linear law [m].
+        size_m: Displacement of its interfaces [m].
+        moved_m: Of them, or of targets beyond them [m].
+        strain: Root mean square over the body.
+        linear_error_m: Error of the linear law there [m].
     """
 
-    law: str
-    reason: str
-    error_m: float
-    linear_error_m: float = 0.0
+    size_m: float
+    moved_m: float
+    strain: float
+    linear_error_m: float
 
 
-def choose_law(
-    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, load_envelope: LoadEnvelope,
-    tolerance: float, path: str = "",
-) -> LawChoice:  # fmt: skip
-    """The cheapest law whose estimated error is within the tolerance [m].
+def deflection_under(
+    model: FEModel, basis: Basis, second_order: Derivatives, material: ElasticMaterial, load_envelope: LoadEnvelope,
+    path: str = "",
+) -> Deflection:  # fmt: skip
+    """The deflection of a body.
 
     Args:
-        model, support, basis, material: The body; see `modal_derivatives`.
+        model, basis: The body.
+        second_order: Derivatives of its first modes, by St. Venant and Kirchhoff's law; these are counted.
+        material: Elastic constants.
         load_envelope: Its loads in this shot.
-        tolerance: [m].
         path: Prim path of the body, for errors.
 
     Raises:
-        ShotError: The body is too soft for any of the laws.
+        ShotError: The body is too soft for any law.
     """
-    count = min(_MODES, len(basis.omega_squared))
-    if count == 0:
-        return LawChoice("linear", "it has no elastic coordinates", 0.0)
-    second_order = modal_derivatives(model, support, basis, count, material, "stvk")
-    fields, motion = second_order.fields, second_order.motion
+    count, fields, motion = second_order.count, second_order.fields, second_order.motion
     modes = basis.modes[:, :, :count]
     omega_squared = basis.omega_squared[:count]
     deflections = amplitudes(model, basis, load_envelope, count)
@@ -94,15 +87,8 @@ def choose_law(
             f"{UNPHYSICAL:g} times hang like ropes, and cannot be simulated; here a modulus of "
             f"{material.youngs_modulus * deflection / (UNPHYSICAL * size):.2g} Pa is the least.",
         )
-    linear_error = shortening + moved * softening
     strain = float(np.sqrt(deflections @ (omega_squared * deflections) / (material.youngs_modulus * model.mesh.volume)))
-    stvk_error = moved * strain**2
-    reason = f"its deflection is about {_mm(deflection)}; a linear law would have an error of about {_mm(linear_error)}"
-    if linear_error <= tolerance:
-        return LawChoice("linear", reason, linear_error, linear_error)
-    if stvk_error <= tolerance or strain <= _LARGE_STRAIN:
-        return LawChoice("stvk", f"{reason}; its strain is {strain:.1%}", stvk_error, linear_error)
-    return LawChoice("neohookean", f"{reason}; its strain is {strain:.0%}", 0.0, linear_error)
+    return Deflection(deflection, moved, strain, shortening + moved * softening)
 
 
 def amplitudes(model: FEModel, basis: Basis, load_envelope: LoadEnvelope, count: int) -> Array:
@@ -113,7 +99,7 @@ def amplitudes(model: FEModel, basis: Basis, load_envelope: LoadEnvelope, count:
 
 def deflection_of(model: FEModel, basis: Basis, load_envelope: LoadEnvelope) -> float:
     """Bound of the displacement of the interfaces of a linear body, or of targets beyond them, by the loads [m]."""
-    count = min(_MODES, len(basis.omega_squared))
+    count = min(MODES, len(basis.omega_squared))
     deflections = amplitudes(model, basis, load_envelope, count)
     return _largest_displacement(
         basis.modes[:, :, :count], basis.patch_motion[:, :, :count], deflections, load_envelope.lever_arm
@@ -157,7 +143,3 @@ def _largest_displacement(fields: Array, motion: Array, amplitudes: Array, lever
             moved = moved + lever_arm * np.linalg.norm(np.abs(motion[:, 3:]) @ amplitudes, axis=1)
         return float(moved.max())
     return float(np.linalg.norm(np.abs(fields) @ amplitudes, axis=1).max())
-
-
-def _mm(length: float) -> str:
-    return f"{1e3 * length:.3g} mm"
