@@ -26,13 +26,17 @@ _VALUES = (
     "bake",
     "samples_per_second",
 )
-_OF_SEARCHES = ("robust", "scenarios", "avoid_reversals", "goal")
+_OF_SEARCHES = ("robust", "scenarios", "avoid_reversals", "goal", "retime")
 _FLAGS = ("verify", "strict", "splines")
 _LISTS = {"keep": "--keep", "leave_out": "--leave-out", "run": "--run", "set": "--set"}
 
 
-def forwarded_options(command: argparse.ArgumentParser) -> None:
-    """Add the options that are passed on."""
+def forwarded_options(command: argparse.ArgumentParser, tempo: bool = True) -> None:
+    """Add the options that are passed on.
+
+    Args:
+        tempo: Whether each shot may have a tempo of its own.
+    """
     group = command.add_argument_group("each shot", "As of `calmotion optimize`.")
     group.add_argument("--simulate", action="store_true", help="simulate the shots as animated, do not optimise them")
     for name, text in EXTRAS.items():
@@ -52,6 +56,11 @@ def forwarded_options(command: argparse.ArgumentParser) -> None:
         "--goal", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
         help="error at the targets that is accepted after optimising, with a unit (2mm)",
     )  # fmt: skip
+    command.set_defaults(retime=None)
+    if tempo:
+        group.add_argument(
+            "--retime", metavar="slowest=2,fastest=1", nargs="?", const="", help="slower where motors cannot follow"
+        )
     group.add_argument("--bake", nargs="?", const="motors", choices=("motors", "simulated"), help="body transforms")
     group.add_argument("--samples-per-second", metavar="HZ", help="more samples than the frames")
     group.add_argument("--splines", action="store_true", help="curves as splines")
@@ -96,6 +105,8 @@ def _forwarded(args: argparse.Namespace) -> Iterator[str]:
         text = f"{value!r}{_UNITS.get(name, '')}" if isinstance(value, float) else str(value)
         yield f"--{name.replace('_', '-')}={text}"
     yield from (f"--{name}" for name in _FLAGS if getattr(args, name))
+    if args.retime is not None:
+        yield f"--retime={args.retime}" if args.retime else "--retime"
     if args.motors != "authored":
         yield f"--motors={args.motors}"
     for name, option in _LISTS.items():

@@ -11,11 +11,11 @@ GIVEN = (
     "--tolerance", "0.5mm", "--step", "2ms", "--pre-roll", "1s", "--keep", "modes", "--leave-out", "turning",
     "--verify", "--strict", "--robust", "mean", "--scenarios", "5", "--bake", "--splines",
     "--motors", "ideal", "--set", "fe.mesh.element_size=5mm", "--run", "speed_watch.report", "--settings", "s.toml",
-    "--plugins", "more",
+    "--plugins", "more", "--retime", "slowest=1.5,fastest=0.9",
 )  # fmt: skip
 SAME = (
     "tolerance", "step", "pre_roll", "keep", "leave_out", "verify", "strict", "robust", "scenarios", "bake",
-    "splines", "motors", "set", "run",
+    "splines", "motors", "set", "run", "retime",
 )  # fmt: skip
 
 
@@ -38,9 +38,15 @@ def test_simulations_refuse_options_of_searches():
     line = forwarded(args)
     assert command_of(args) == "simulate" and line == ["--integrator=newmark"]
     assert parser.parse_args(["simulate", "shot.usda", *line]).integrator == "newmark"
-    for given in (["--scenarios", "5"], ["--robust"]):
+    for given in (["--scenarios", "5"], ["--robust"], ["--retime"]):
         with pytest.raises(SettingError, match=f"{given[0]} belongs to `calmotion optimize`"):
             forwarded(parser.parse_args([*simulated, *given]))
+
+
+def test_sequences_keep_the_tempo_of_their_clips(capsys):
+    with pytest.raises(SystemExit):
+        build_parser().parse_args(["sequence", "clips.toml", "-o", "out", "--retime"])
+    assert "--retime" in capsys.readouterr().err
 
 
 def test_without_options_nothing_is_passed_on():
