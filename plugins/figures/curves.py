@@ -42,13 +42,14 @@ def plot_errors(character: Character, result: Result) -> Figure:
             errors = simulation.rotation_errors if rotation else simulation.position_errors
             values = np.degrees(errors[rows, k]) if rotation else 1e3 * errors[rows, k]
             unit = "deg" if rotation else "mm"
-            text = f"{name}: largest {values.max():.2f} {unit}, rms {np.sqrt(np.mean(values**2)):.2f} {unit}"
+            text = f"{name}: largest {values.max():.3g} {unit}, rms {np.sqrt(np.mean(values**2)):.3g} {unit}"
             axes.plot(simulation.motion.times[rows], values, line, color=color, linewidth=1.5, label=text)
         if result.goal_m is not None and not rotation:
             axes.axhline(
                 1e3 * result.goal_m, color=LIMIT, linewidth=1.0, linestyle=":", label=f"goal {1e3 * result.goal_m:g} mm"
             )
-        tidy(axes, "rotation error [deg]" if rotation else "position error [mm]", names[character.targets[k].path])
+        title = names[character.targets[k].path] + (", rotation" if rotation else "")
+        tidy(axes, "rotation error [deg]" if rotation else "position error [mm]", title)
         scale_errors(axes, result.after is not None)
         axes.margins(x=0.0)
         axes.legend(fontsize=SMALL, loc="upper right", framealpha=0.85, edgecolor="none")

@@ -18,7 +18,7 @@ class WritePage(Operator):
     uses = (Character, Animation, Result, Plots)
     provides = (HtmlPage,)
     properties = (
-        Property("triangles", int, 60000, minimum=1000, maximum=400000, description="Largest number in the 3D player"),
+        Property("triangles", int, 120000, minimum=1000, maximum=400000, description="Largest number in the 3D player"),
         Property(
             "rate", float, 240.0, unit="Hz", minimum=10.0, maximum=1000.0,
             description="Largest rate of the motion in the 3D player; a long one has fewer samples",

@@ -94,9 +94,10 @@ def test_errors_are_drawn_in_millimetres_and_degrees_from_the_first_frame_on(fig
         assert times[0] == 0.0
         np.testing.assert_allclose(values, 1e3 * run.position_errors[first:, 0])
         np.testing.assert_allclose(lines_of(rotation)[name].get_ydata(), np.degrees(run.rotation_errors[first:, 0]))
-    assert f"largest {1e3 * result.before.position_errors.max():.2f} mm" in lines_of(position)["before"].get_label()
+    assert f"largest {1e3 * result.before.position_errors.max():.3g} mm" in lines_of(position)["before"].get_label()
     assert "[mm]" in position.get_ylabel() and "[deg]" in rotation.get_ylabel()
     assert position.get_title(loc="left") == "/Robot/Tip/Target"
+    assert rotation.get_title(loc="left") == "/Robot/Tip/Target, rotation"
 
 
 def test_spectra_are_drawn_in_millimetres_with_the_modes_marked(figures):
