@@ -135,6 +135,24 @@ def test_a_search_that_gains_nothing_says_so():
     assert found.reason == "no further decrease"
 
 
+class Flat(Problem):
+    """A small part of what its derivative promises is there."""
+
+    def residual(self, x):
+        return 1.0 - 1e-4 * np.tanh(1e4 * x)
+
+    def jacobian(self, x):
+        return np.diag(-1.0 / np.cosh(1e4 * x) ** 2)
+
+
+def test_where_little_is_gained_beyond_a_small_region_limits_still_come_to_act(monkeypatch):
+    asked = []
+    monkeypatch.setattr(Point, "tightened", lambda point: asked.append(point.x))
+    found = minimize(Flat(), Search(np.zeros(1), 1e-9, Recycled.none(1)), np.zeros(1, bool), 1e-3)
+    assert found.reason == "no further decrease" and len(asked) == 1 and np.array_equal(asked[0], found.x)
+    assert found.x[0] > 0.0
+
+
 def test_a_curved_valley_is_followed_to_its_end():
     search = minimize(Rosenbrock(), Search.start(np.array([-1.2, 1.0])), np.zeros(2, bool), 1e-18, max_iterations=60)
     assert np.allclose(search.x, 1.0, atol=1e-6)

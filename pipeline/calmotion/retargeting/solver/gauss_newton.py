@@ -230,6 +230,8 @@ def minimize(
         better = None
         if expected >= gain:
             better = _limited_step(calls, at, limited) if at.limits_act else _step(calls, at, path, radius)
+        if better is not None and widened and at.gain(at.merit - better[0].merit, at.merit) < gain:
+            (at, radius), better = better, None
         if better is None:
             tightened = at.tightened()
             if tightened is None:
@@ -237,12 +239,9 @@ def minimize(
             if onto_limits is not None and not at.limits_act:
                 tightened = _moved(calls, tightened, *onto_limits(tightened))
             better = tightened, np.inf
-        gained = at.gain(at.merit - better[0].merit, at.merit)
         at, radius = better
         if on_iterate is not None:
             on_iterate(here())
-        if widened and gained < gain:
-            return here("no further decrease")
 
 
 def _moved(calls: _Counter, at: Any, problem: LeastSquares, x: Array) -> Any:
