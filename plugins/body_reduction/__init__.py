@@ -59,12 +59,22 @@ class ReduceFlexibleBodies(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.mesh import contact_notes
-        from calmotion.simulation import BodyReduction, mode_tables, reduction_for, weak_seat_notes, with_elasticity
+        from calmotion.simulation import (
+            BodyReduction,
+            estimated_bodies,
+            mode_tables,
+            reduction_for,
+            weak_seat_notes,
+            with_elasticity,
+        )
 
         choices, meshes, animation = context.get(ModelChoices), context.get(FEMeshes), context.get(Animation)
         character, source = simplified_character(context.get(Character), choices), context.get(Source)
         if context.properties.elasticity != "shot":
             character = with_elasticity(character, context.properties.elasticity)
+        if source is not None and source.by_sections:
+            beams, tables = estimated_bodies(character, context.progress)
+            return [ReducedBodies(tuple(beams), tables)]
         for note in contact_notes(character, meshes) if meshes is not None else ():
             context.report("info", note)
         reduction, tolerance = BodyReduction(character, meshes, None), None

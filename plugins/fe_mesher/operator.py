@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from calmotion.errors import ShotError, raise_all
-from calmotion.host import Operator, Property, RunContext
+from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.mesh import TIME_LIMIT
-from calmotion.model import Character, FEMeshes, ModelChoices, no_flexible_bodies
+from calmotion.model import Character, FEMeshes, ModelChoices, Source, no_flexible_bodies
 
 if TYPE_CHECKING:
     from calmotion.mesh import AttachmentFrame, Link
@@ -23,7 +23,7 @@ class TetrahedralizeFlexibleBodies(Operator):
     idname = "fe.mesh"
     label = "Tetrahedralise flexible bodies"
     requires = (Character,)
-    uses = (ModelChoices,)
+    uses = (ModelChoices, Source)
     provides = (FEMeshes,)
     properties = (
         Property(
@@ -47,8 +47,11 @@ class TetrahedralizeFlexibleBodies(Operator):
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
-        """The reason to skip it: nothing is flexible."""
-        return no_flexible_bodies(data)
+        """The reason to skip it: nothing is flexible, or beams are told in place of meshes."""
+        source, nothing = data.get(Source), no_flexible_bodies(data)
+        if nothing is None and source is not None and source.by_sections:
+            return NotAsked("no --meshes is requested")
+        return nothing
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """The meshes, in the order of the bodies."""

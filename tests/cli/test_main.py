@@ -298,7 +298,8 @@ def test_options_reach_the_plugins_in_si_units(run, command):
 
     run(command, "a.usda", "--step", "2ms", "--tolerance", "1mm", "--integrator", "rk4", "--pre-roll", "0.5",
         "--quiet", read=read)  # fmt: skip
-    assert seen == [Source("a.usda", command, RunSettings(0.001, 0.002, 0.5, "rk4"))]
+    meshes = command != "inspect"  # which meshes by --meshes alone
+    assert seen == [Source("a.usda", command, RunSettings(0.001, 0.002, 0.5, "rk4"), meshes=meshes)]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,9 @@ import numpy as np
 from calmotion.arrays import Array, Indices, IntArray
 from calmotion.mesh.parts.makeup import Makeup
 from calmotion.mesh.tetrahedra import tet_volumes
-from calmotion.model.character import MassProperties, SurfaceMesh
+from calmotion.model.character import Body, MassProperties, SurfaceMesh
+
+_HOLLOW = 0.7  # of the mass of a solid of the material, below which a body may be hollow
 
 
 def mass_of_tets(
@@ -67,3 +69,26 @@ def joined_surfaces(surfaces: Sequence[SurfaceMesh]) -> tuple[Array, Indices] | 
             return None
     triangles = np.vstack([surface.triangles + offset for surface, offset in zip(surfaces, offsets, strict=True)])
     return np.vstack([surface.points for surface in surfaces]), triangles
+
+
+def density_note(body: Body, volume: float, same: float) -> tuple[str, ...]:
+    """Message about a stated mass that is not that of the solid and its material; the density follows the mass.
+
+    Args:
+        body: Any.
+        volume: Of its solid [m^3].
+        same: Relative difference that is not told.
+    """
+    if body.mass is None or body.flexible is None:
+        return ()
+    material = body.flexible.material
+    if material.core is not None or material.parts:
+        return ()  # theirs is told with what they are made of
+    ratio = body.mass.mass / (material.density * volume)
+    if abs(ratio - 1.0) <= same:
+        return ()
+    note = (
+        f"the shot states a mass of {body.mass.mass:.3g} kg, {ratio:.2g} times that of its volume and material: "
+        f"its density is {material.density * ratio:.4g} instead of {material.density:.4g} kg/m^3"
+    )
+    return (note + ("; if it is hollow, author calm:flexible:wallThickness" if ratio < _HOLLOW else ""),)

@@ -140,10 +140,17 @@ GOAL_REACHED = "goal reached"  # why a search ended
 _NOTICED_RISE = 0.01  # of the tolerance
 
 
+MESH, EARLIER_MESH, SECTIONS = "mesh", "earlier mesh", "sections"  # sources of frequencies
+
+
 @dataclass(frozen=True, eq=False)
 class ModeTable:
     """Frequencies of a flexible body [Hz], clamped at its parent side, the size of its mesh, and the relative error of
     its stiffness by the mesh (None: not known).
+
+    Attributes:
+        source: What they come from: `MESH`, `EARLIER_MESH` (of a run before) or `SECTIONS`, which is rough.
+        volume: Of the sections [m^3]; None with a mesh.
     """
 
     body: int
@@ -152,6 +159,8 @@ class ModeTable:
     elements: int
     mass: float
     mesh_error: float | None = None
+    source: str = MESH
+    volume: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

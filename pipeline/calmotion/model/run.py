@@ -78,6 +78,7 @@ class Source:
         shaper: Input shaper or filter through which `simulate` passes the motors' tracks first, or None.
         motion: File with a motion that replaces tracks of motors, or None.
         verify: Whether the result is to be compared with a finer run.
+        meshes: Whether an inspection meshes flexible bodies; else their beams are told, which takes seconds.
         measured: Prims at which sensors measured, which are targets as well.
     """
 
@@ -88,11 +89,17 @@ class Source:
     motion: str | None = None
     verify: bool = False
     measured: tuple[str, ...] = ()
+    meshes: bool = True
 
     @property
     def refines(self) -> bool:
         """Whether the reduction of the bodies is refined until the motion keeps the tolerance."""
         return self.command != "inspect"
+
+    @property
+    def by_sections(self) -> bool:
+        """Whether flexible bodies are beams by their sections, and no mesh is made."""
+        return self.command == "inspect" and not self.meshes
 
 
 @dataclass(frozen=True)

@@ -60,21 +60,27 @@ def cached_reduction(key_parts: object, compute: Callable[[], T]) -> T:
     Raises:
         TypeError: A part of the key or of the value has another type.
     """
-    key = cache_key(key_parts)
-    stored = None if _recomputed.get() else stored_arrays(REDUCTIONS, key)
-    if stored is not None:
-        try:
-            value: T = _value_of(stored, key)
-        except (ValueError, KeyError, TypeError, AttributeError):  # of another version of the program
-            pass
-        else:
-            return value
-    value = compute()
+    found: T | None = None if _recomputed.get() else known_reduction(key_parts)
+    if found is not None:
+        return found
+    key, value = cache_key(key_parts), compute()
     arrays: list[Any] = []
     structure = json.dumps({"key": key, "value": _encode(value, arrays)}).encode()
     named = {f"a{k}": array for k, array in enumerate(arrays)}
     store_arrays(REDUCTIONS, key, {"structure": np.frombuffer(structure, dtype=np.uint8)} | named)
     return value
+
+
+def known_reduction(key_parts: object) -> Any:
+    """What is stored under a key, see `cached_reduction`; None where nothing is."""
+    key = cache_key(key_parts)
+    stored = stored_arrays(REDUCTIONS, key)
+    if stored is None:
+        return None
+    try:
+        return _value_of(stored, key)
+    except (ValueError, KeyError, TypeError, AttributeError):  # of another version of the program
+        return None
 
 
 def cache_key(parts: object) -> str:

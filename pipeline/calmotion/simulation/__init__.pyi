@@ -1,6 +1,7 @@
 """Public names of `calmotion.simulation`: each is imported when it is first used."""
 
 from calmotion.simulation.bodies import bodies_in_parallel as bodies_in_parallel
+from calmotion.simulation.bodies import estimated_bodies as estimated_bodies
 from calmotion.simulation.bodies import fem_anchors as fem_anchors
 from calmotion.simulation.bodies import flexible_modes as flexible_modes
 from calmotion.simulation.bodies import mode_tables as mode_tables

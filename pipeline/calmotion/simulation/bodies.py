@@ -12,6 +12,7 @@ from calmotion.errors import ShotError
 from calmotion.model import Body, Character, FEMeshes, ModeTable, Skin
 from calmotion.model.character import ElasticMaterial, with_ideal_motors, with_settings
 from calmotion.model.meshes import FEMesh
+from calmotion.model.result import EARLIER_MESH, SECTIONS
 from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.model.joint_arrays import BodyAnchors
 from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
@@ -82,7 +83,9 @@ def reduce_bodies(
             from calmotion.reduction.reduce import reduce_body
 
             assert models is not None
-            return reduce_body(*parts, full=models.of(own))
+            made = reduce_body(*parts, full=models.of(own))
+            cached_reduction(_meshed_before(own.body, own.attachments, own.root), lambda: replace(made, skin=()))
+            return made
 
         return cached_reduction(parts, reduce)
 
@@ -92,6 +95,56 @@ def reduce_bodies(
         for index, (body, own) in enumerate(zip(character.bodies, anchors, strict=True))
     )  # fmt: skip
     return _damped(character, tree, list(rigid))
+
+
+def estimated_bodies(
+    character: Character, progress: Callable[[float, str], None] | None = None
+) -> tuple[list[ReducedBody], tuple[ModeTable, ...]]:
+    """Every body of a character without meshes: the flexible ones as beams by their sections.
+
+    A body that an earlier run has meshed is as it was then.
+
+    Args:
+        character: The character.
+        progress: Called with a fraction and the body at hand.
+
+    Returns:
+        The bodies, and the frequencies of the flexible ones.
+
+    Raises:
+        ShotError: A flexible body without geometry.
+    """
+    from calmotion.reduction.cache import known_reduction
+    from calmotion.reduction.sections.estimate import estimated_body
+
+    tree = span_tree(character)
+    anchors = body_anchors(character, tree)
+    flexible = [index for index, body in enumerate(character.bodies) if body.simulated_flexible]
+
+    def estimated(index: int) -> tuple[ReducedBody, float | None]:
+        body, own = character.bodies[index], anchors[index]
+        attachments = fem_anchors(character, body, own)
+        known: ReducedBody | None = known_reduction(_meshed_before(body, attachments, own.root))
+        return estimated_body(body, attachments, own.root) if known is None else (known, None)
+
+    found = dict(zip(flexible, bodies_in_parallel(estimated, flexible, character, progress), strict=True))
+    bodies = [
+        found[index][0] if index in found else rigid_body(body, own)
+        for index, (body, own) in enumerate(zip(character.bodies, anchors, strict=True))
+    ]
+    volumes = {index: volume for index, (_, volume) in found.items()}
+    tables = tuple(
+        replace(table, source=EARLIER_MESH if volumes[table.body] is None else SECTIONS, volume=volumes[table.body])
+        for table in mode_tables(bodies)
+    )
+    return _damped(character, tree, bodies), tables
+
+
+def _meshed_before(body: Body, attachments: Sequence[AttachmentFrame], root: int) -> object:
+    """The key of a body that was meshed, whatever its loads and its mesh were."""
+    assert body.flexible is not None
+    settings = replace(body.flexible, modes_share=1.0, pairs_share=1.0)
+    return "meshed before", replace(body, flexible=settings, non_rotating=False), list(attachments), root
 
 
 def bodies_in_parallel(

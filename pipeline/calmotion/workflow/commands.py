@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from calmotion.host import OperatorResult, SettingError, Settings, merge, quantity_of
@@ -158,6 +159,7 @@ def inspect(
     keep: Sequence[str] = (),
     leave_out: Sequence[str] = (),
     strict: bool = False,
+    meshes: bool = False,
     modes: Path | None = None,
     figures: Path | None = None,
     operators: Sequence[str] = (),
@@ -172,7 +174,8 @@ def inspect(
         tolerance, step, integrator, pre_roll, motors, keep, leave_out, operators, settings, progress,
             on_operator: As of `simulate`.
         strict: Check the shot instead, with USD's validators as well, and list all findings; nothing costly runs.
-        modes: Folder for the mode shapes of the flexible bodies.
+        meshes: Mesh the flexible bodies; else their frequencies are rough, from beams and sections.
+        modes: Folder for the mode shapes of the flexible bodies, which are meshed.
         figures: Folder for the figure of the tempo, where limits of motors ask for another one.
 
     Raises:
@@ -182,7 +185,8 @@ def inspect(
     return Inspection(
         carry_out(
             _opened(shot), "check" if strict else "inspect", wanted=kinds, optional=optional, operators=operators,
-            source=_source(tolerance, step, integrator, pre_roll, motors), known=(),
+            source=replace(_source(tolerance, step, integrator, pre_roll, motors), meshes=meshes or modes is not None),
+            known=(),
             outputs=OutputPaths(
                 modes=None if modes is None else os.fspath(modes),
                 figures=None if figures is None else os.fspath(figures),

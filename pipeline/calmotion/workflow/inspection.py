@@ -35,6 +35,7 @@ from calmotion.workflow.report import left_out_row, limit_row, operator_row
 from calmotion.workflow.run import Outcome
 
 SHOWN_MODES = 10
+_SAME_MASS = 0.1  # relative difference to that of rough sections that is not told
 _CONTENTS: tuple[type, ...] = (Character, Animation, Provenance)
 
 
@@ -249,7 +250,22 @@ def _body(body: Body, table: ModeTable | None, mesh: FEMesh | None, flexible: bo
                 for part in material.parts
             ]
     if table:
-        report |= {"frequencies_hz": table.frequencies, "nodes": table.nodes, "elements": table.elements}
+        report |= {
+            "frequencies_hz": table.frequencies,
+            "frequencies_from": table.source,
+            "nodes": table.nodes,
+            "elements": table.elements,
+        }
+    if table and table.volume is not None:
+        from calmotion.mesh.mass import density_note
+
+        report |= {
+            "solid": "sections",
+            "volume_m3": table.volume,
+            "volume_error": None,
+            "frequency_error": None,
+            "solid_notes": list(density_note(body, table.volume, _SAME_MASS)),
+        }
     if mesh:
         quality = mesh.quality
         report |= {

@@ -20,6 +20,7 @@ from calmotion.cli import (
 
 EXAMPLES = (
     ("calmotion inspect shot.usda", "bodies, motors, targets, frequencies"),
+    ("calmotion inspect shot.usda --meshes", "frequencies of meshes, as simulations have them"),
     ("calmotion inspect shot.usda --strict", "check before publishing"),
     ("calmotion inspect shot.usda --modes build/modes", "how the links vibrate"),
 )
@@ -29,8 +30,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     shot_arguments(command)
     command.add_argument(
+        "--meshes", action="store_true",
+        help="mesh the flexible bodies, in minutes; else their frequencies are rough, from beams and sections",
+    )  # fmt: skip
+    command.add_argument(
         "--modes", metavar="DIR",
-        help="folder for the mode shapes of the flexible bodies (.vtu, .png) and their table",
+        help="folder for the mode shapes of the flexible bodies (.vtu, .png) and their table; with --meshes",
     )  # fmt: skip
     command.add_argument(
         "--figures", metavar="DIR",
@@ -65,6 +70,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
         inspection = inspect(
             shot,
             strict=args.strict,
+            meshes=args.meshes,
             modes=args.modes,
             figures=args.figures,
             **simulation_arguments(args),

@@ -16,12 +16,14 @@ from calmotion.cli.reports.verdict import NOTHING_SHAKES
 from calmotion.cli.tables import print_table, say
 from calmotion.model.motor import DRIVE, ON_ERROR, ON_JOINT, PRESCRIBED, SERVO
 from calmotion.model.outputs import ERROR, WARNING
+from calmotion.model.result import EARLIER_MESH, SECTIONS
 from calmotion.support.naming import grouped_notes, listed
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 MODES = 5  # natural frequencies that are told by themselves
+BODY_MODES, ROUGH_MODES = 6, 2  # those of a body, by its mesh and by its sections
 
 
 def print_inspection(report: dict[str, Any], console: Console, verbose: bool = False) -> None:
@@ -69,6 +71,7 @@ def _print_contents(console: Console, report: dict[str, Any], verbose: bool) -> 
     notes = (f"{body['path']}: {note}" for body in report["bodies"] for note in body.get("solid_notes", ()))
     for note in grouped_notes(notes):
         say(console, note)
+    _print_sources(console, report)
     print_table(
         console,
         "Joints",
@@ -91,7 +94,9 @@ def _print_contents(console: Console, report: dict[str, Any], verbose: bool) -> 
     )
     if report["system_frequencies_hz"]:
         modes = list(zip(report["system_frequencies_hz"], report["system_damping_ratios"], strict=True))
-        shown = ", ".join(
+        rough = any(body.get("frequencies_from") == SECTIONS for body in report["bodies"])
+        about = "about " if rough else ""
+        shown = about + ", ".join(
             f"{frequency(hertz)} Hz ({ratio:.2g})" for hertz, ratio in modes[: None if verbose else MODES]
         )
         say(console, f"natural frequencies of the character in its first pose (damping ratios): {shown}, ...")
@@ -124,6 +129,21 @@ def _print_answer(console: Console, report: dict[str, Any]) -> None:
         return
     say(console, _expected(report["expected"]))
     say(console, f"next: calmotion simulate {shlex.quote(report['shot'])} shows how much it shakes")
+
+
+def _print_sources(console: Console, report: dict[str, Any]) -> None:
+    """What frequencies are rough, and what others come from."""
+    sources = [body.get("frequencies_from") for body in report["bodies"]]
+    rough, earlier = sources.count(SECTIONS), sources.count(EARLIER_MESH)
+    if rough:
+        whose = "The frequency" if rough == 1 else f"The frequencies of {rough} bodies"
+        say(
+            console,
+            f"{whose} marked `about` {'is' if rough == 1 else 'are'} rough: from beams and sections, within a factor "
+            "of two for about 9 of 10 links. What follows from them is as rough. --meshes is exact, and takes minutes.",
+        )
+    if earlier:
+        say(console, f"the mesh of an earlier run is that of {earlier} of the flexible bodies")
 
 
 def _expected(row: dict[str, Any]) -> str:
@@ -209,12 +229,16 @@ def _servo_row(motor: dict[str, Any]) -> list[str]:
 
 def _body_row(body: dict[str, Any]) -> list[str]:
     frequencies = [frequency(value) for value in body.get("frequencies_hz", ())]
-    shown = ", ".join(frequencies[:6]) + (", ..." if len(frequencies) > 6 else "")
+    rough = body.get("frequencies_from") == SECTIONS
+    most = ROUGH_MODES if rough else BODY_MODES
+    shown = ", ".join(frequencies[:most]) + (", ..." if len(frequencies) > most else "")
+    if rough:
+        shown = f"about {shown}"
     return [
         body["path"],
         body["kind"] if body["kind"] == body["simulated"] else f"{body['kind']}, simulated as {body['simulated']}",
         "-" if body["mass_kg"] is None else f"{body['mass_kg']:.4g} kg",
-        str(body.get("elements", "-")),
+        str(body.get("elements") or "-"),
         f"{shown} Hz" if shown else "-",
     ]
 

@@ -32,7 +32,7 @@ from calmotion.model.meshes import CutPatch
 _GROWTH = 1.25
 _FEWEST = 6  # nodes of a triangle
 _ON = 1e-7  # of the diagonal: distance of a node from the triangle that it is on
-_LEAST = 0.01  # of the size of a body: radius of a patch, which is then a fiftieth of the body across
+LEAST = 0.01  # of the size of a body: radius of a patch, which is then a fiftieth of the body across
 _SPREAD = 1e-3  # second largest over largest extent below which nodes are on a line; the end of a thin strip is not
 
 
@@ -109,7 +109,7 @@ def interface_patches(
     skin = meshed or mesh
     measured = skin.nodes[skin.surface[:, :3]]
     groups = at_one_place(attachments, nearest_apart(measured, radius))
-    least = min(_LEAST * size, least_radius(measured)) if radius < 0.0 else 0.0
+    least = min(LEAST * size, least_radius(measured)) if radius < 0.0 else 0.0
     one = max(least / ROOM, TIE * size)  # places that are nearer to each other divide what is there
     surface = mesh.surface_nodes
     named = _named_patches(mesh, attachments, groups, body)
@@ -143,7 +143,7 @@ def interface_patches(
             candidates = candidates[within(mesh.nodes[candidates], balls)]
             others = np.linalg.norm(np.delete(centers, k, axis=0) - centers[k], axis=1)
             room = float(others.min(initial=np.inf, where=others > one))
-            place = _Place(centers[k], frames[k].axis, skin, measured, room, least)
+            place = Place(centers[k], frames[k].axis, skin, measured, room, least)
             patch = _patch(mesh, candidates, free, place, attachments[group[0]].path, group, radius, body)
             patch = replace(patch, balls=reached_by(balls, patch.centers, patch.radius))
         taken |= np.isin(surface, patch.nodes)
@@ -182,7 +182,7 @@ def _cut_patch(
     corners = np.arange(3 * len(cut.triangles)).reshape(-1, 3)
     near = NearbyTriangles(cut.triangles.reshape(-1, 3), corners, _ON * size)
     nodes = candidates[np.isfinite(near.closest(mesh.nodes[candidates])[:, 0])]
-    if not _carries(mesh.nodes[nodes], least):
+    if not carries(mesh.nodes[nodes], least):
         return None
     extent = float(np.linalg.norm(mesh.nodes[nodes] - cut.origin, axis=1).max())
     return InterfacePatch(nodes=nodes.astype(np.int32), attachments=tuple(group), radius=extent)
@@ -228,7 +228,7 @@ def _nothing_left(body: str, radius: float, size: float) -> ShotError:
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
+class Place:
     """Where a joint takes hold of a body.
 
     Attributes:
@@ -252,7 +252,7 @@ class _Place:
         closest = closest_on_triangles(self.center, self.triangles)
         gaps = np.linalg.norm(closest - self.center, axis=1)
         face = end_face(self.skin, self.center, self.triangles, closest, gaps, self.room)
-        if _carries(self.skin.nodes[face], self.least):
+        if carries(self.skin.nodes[face], self.least):
             return True, float(np.linalg.norm(self.skin.nodes[face] - self.center, axis=1).max())
         seat = seat_radius(self.center, self.axis, self.triangles)
         if seat is None:
@@ -264,7 +264,7 @@ class _Place:
 
 
 def _patch(
-    mesh: QuadraticMesh, candidates: IntArray, free: IntArray, place: _Place, path: str, group: list[int],
+    mesh: QuadraticMesh, candidates: IntArray, free: IntArray, place: Place, path: str, group: list[int],
     radius: float, body: str,
 ) -> InterfacePatch:  # fmt: skip
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
@@ -284,7 +284,7 @@ def _patch(
         face = np.zeros(0, dtype=np.int32)
         if is_end:
             face = np.intersect1d(end_face(mesh, center, triangles, closest, gaps, place.room), candidates)
-        if _carries(mesh.nodes[face], place.least):
+        if carries(mesh.nodes[face], place.least):
             extent = float(np.linalg.norm(mesh.nodes[face] - center, axis=1).max())
             return InterfacePatch(nodes=face.astype(np.int32), attachments=tuple(group), radius=extent)
     nodes = nodes_of_area(mesh, candidates, center, radius, place.axis, given=not automatic)
@@ -292,10 +292,10 @@ def _patch(
         # elements larger than the radius: the nearest surface triangle is the smallest patch that carries a moment
         touched = np.intersect1d(mesh.surface[gaps <= gap + 1e-9 * size].ravel(), candidates)
         nodes = np.union1d(nodes, touched)
-    while automatic and not _carries(mesh.nodes[nodes], place.least) and radius < size:
+    while automatic and not carries(mesh.nodes[nodes], place.least) and radius < size:
         radius *= _GROWTH
         nodes = nodes_of_area(mesh, candidates, center, radius, place.axis)
-    if automatic and not _carries(mesh.nodes[nodes], place.least):
+    if automatic and not carries(mesh.nodes[nodes], place.least):
         # frames so near to each other that one has hardly any surface
         nodes = _nearest_spanning(mesh, free, center, place.least)
     if not spans_a_plane(mesh.nodes[nodes]):
@@ -314,7 +314,7 @@ def _nearest_spanning(mesh: QuadraticMesh, free: IntArray, center: Array, least:
     """The nearest nodes that carry a moment, of those that no other patch has."""
     order = free[np.argsort(np.linalg.norm(mesh.nodes[free] - center, axis=1), kind="stable")]
     for count in range(_FEWEST, len(order) + 1):
-        if _carries(mesh.nodes[order[:count]], least):
+        if carries(mesh.nodes[order[:count]], least):
             return np.sort(order[:count])
     return order
 
@@ -327,6 +327,6 @@ def spans_a_plane(points: Array) -> bool:
     return bool(extent[1] > _SPREAD * extent[0])
 
 
-def _carries(points: Array, least: float) -> bool:
+def carries(points: Array, least: float) -> bool:
     """Whether points span a plane and are as far from their mean as a patch must be wide, `least` [m]."""
     return spans_a_plane(points) and float(np.linalg.norm(points - points.mean(axis=0), axis=1).max()) >= least

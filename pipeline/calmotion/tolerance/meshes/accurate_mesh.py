@@ -10,6 +10,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.mesh.element_sizes import envelope
+from calmotion.mesh.mass import density_note
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.mesh.tetrahedralize.filling import INTERSECTS, MAX_VOLUME_ERROR, filled
 from calmotion.mesh.tetrahedralize.tetwild import ProcessorTime
@@ -27,7 +28,7 @@ GOAL = 0.01  # error of the first frequencies: a fifth of what is known of a mod
 MAX_NODES = 30_000
 _LONGER = 1.5  # factor of the element size where a surface has many details: they are refined where it matters
 _FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
-_SAME_MASS, _HOLLOW = 0.05, 0.7  # difference that is reported; ratio below which a body may be hollow
+_SAME_MASS = 0.05  # relative difference that is not reported
 
 
 def accurate(
@@ -94,19 +95,7 @@ def volume_note(quality: MeshQuality) -> tuple[str, ...]:
 
 def mass_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
     """Message about a stated mass that is not that of the solid and its material; the density follows the mass."""
-    if body.mass is None or body.flexible is None:
-        return ()
-    material = body.flexible.material
-    if material.core is not None or material.parts:
-        return ()  # see `makeup_note`
-    ratio = body.mass.mass / (material.density * mesh.quality.volume)
-    if abs(ratio - 1.0) <= _SAME_MASS:
-        return ()
-    note = (
-        f"the shot states a mass of {body.mass.mass:.3g} kg, {ratio:.2g} times that of its volume and material: "
-        f"its density is {material.density * ratio:.4g} instead of {material.density:.4g} kg/m^3"
-    )
-    return (note + ("; if it is hollow, author calm:flexible:wallThickness" if ratio < _HOLLOW else ""),)
+    return density_note(body, mesh.quality.volume, _SAME_MASS)
 
 
 def makeup_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
