@@ -78,6 +78,32 @@ def test_the_sentences_of_the_help_are_short():
     assert long == []
 
 
+# Pages for reading are short; references, decisions and the pages for developers are looked up.
+WORDS = 1200
+KINDS = ("Tutorials", "How to", "Concepts", "Reference", "Evidence")
+LONGER = {"concepts/motors.md", "troubleshooting.md", "writing_a_plugin.md", "gallery.md"}
+
+
+def test_the_navigation_has_a_page_of_each_kind_within_two_clicks_and_pages_for_reading_are_short():
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        """Reads the names of extensions, which are Python's, as texts."""
+
+    Loader.add_multi_constructor("tag:yaml.org,2002:python/", lambda loader, suffix, node: suffix)
+    nav = yaml.load((REPOSITORY / "mkdocs.yml").read_text(), Loader=Loader)["nav"]
+    kinds = {title: pages for entry in nav for title, pages in entry.items()}
+    assert list(kinds) == ["Home", *KINDS, "Development"]
+    for kind in KINDS:
+        for entry in kinds[kind]:
+            page = entry if isinstance(entry, str) else next(iter(entry.values()))
+            for name in [page] if isinstance(page, str) else [next(iter(inner.values())) for inner in page]:
+                assert isinstance(name, str), f"{entry}: three clicks"
+                if kind != "Reference" and name not in LONGER:
+                    length = len((REPOSITORY / "docs" / name).read_text().split())
+                    assert length <= WORDS, f"{name} has {length} words: divide it, or move numbers to Evidence"
+
+
 BECOME = r"([\d.]+) mm (?:of error )?become ([\d.]+) mm"
 
 

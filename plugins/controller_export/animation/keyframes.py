@@ -1,4 +1,4 @@
-"""Cubic Bezier keyframes as plain JSON; docs/exporting.md describes the format."""
+"""Cubic Bezier keyframes as plain JSON; docs/reference/controller_formats.md describes the format."""
 
 from __future__ import annotations
 

@@ -139,7 +139,12 @@ class ServoTicks(CommandFormat):
     format = "ticks"
     suffix = ".json"
     properties = (
-        Property("motors", str, "", description="TOML file with a table for each motor; see docs/exporting.md"),
+        Property(
+            "motors",
+            str,
+            "",
+            description="TOML file with a table for each motor; see docs/reference/controller_formats.md",
+        ),
     )
 
     def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
@@ -237,7 +242,7 @@ class BottangoCurves(CommandFormat):
     properties = (
         Property(
             "motors", str, "",
-            description="TOML file with a table for each motor: id, range in degrees or m; see docs/exporting.md",
+            description="TOML file with a table for each motor: id, range in degrees or m (docs/reference/controller_formats)",
         ),
     )  # fmt: skip
 

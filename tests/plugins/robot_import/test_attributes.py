@@ -42,14 +42,14 @@ def read(tmp_path):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_page_shows_the_table(repository, kind):
-    page = repository / "docs" / "importing.md"
+    page = repository / "docs" / "reference" / "robot_attributes.md"
     text = page.read_text()
     begin, end = f"<!-- {kind} -->\n", f"\n<!-- end of {kind} -->"
     made = re.sub(f"(?<={begin}).*?(?={end})", lambda _: markdown(kind), text, flags=re.DOTALL)
     if os.environ.get(WRITES):
         page.write_text(made)
         text = made
-    assert begin in text and made == text, f"docs/importing.md shows an older table: run this test with {WRITES}=1"
+    assert begin in text and made == text, f"{page.name} shows an older table: run this test with {WRITES}=1"
 
 
 @pytest.mark.parametrize("kind", KINDS)
