@@ -242,7 +242,7 @@ class BottangoCurves(CommandFormat):
     properties = (
         Property(
             "motors", str, "",
-            description="TOML file with a table for each motor: id, range in degrees or m (docs/reference/controller_formats)",
+            description="TOML file with a table for each motor: id, range (docs/reference/controller_formats.md)",
         ),
     )  # fmt: skip
 
