@@ -188,10 +188,10 @@ def test_a_resumed_search_counts_all_its_work(arm, animation, bodies, monkeypatc
     result = optimize_to_tolerance(compile_shot(arm, animation, bodies), RunSettings(tolerance=2e-5), quiet)
     assert len(parts) == 2 and result.step_s == parts[1].step_s < parts[0].step_s
     for name in ("forward_simulations", "linearized_sweeps", "iterations", "gradients"):
-        assert getattr(result, name) == sum(getattr(part, name) for part in parts)
+        assert getattr(result.search, name) == sum(getattr(part.search, name) for part in parts)
     work = [step.forward_simulations + step.linearized_sweeps for step in result.search.steps]
-    assert work == sorted(work) and len(work) == sum(len(part.steps) for part in parts)
-    assert parts[1].steps[0].objective < 1.5 * parts[0].objective_after, "it goes on from what was found"
+    assert work == sorted(work) and len(work) == sum(len(part.search.steps) for part in parts)
+    assert parts[1].search.steps[0].objective < 1.5 * parts[0].objective_after, "it goes on from what was found"
 
 
 def test_an_optimisation_without_a_tolerance_reports_the_error_of_its_step(arm, animation, bodies):

@@ -2,8 +2,8 @@
 
 For Calmotion's modules, POSIX's modules, functions, flags and signals are not there. For the dependencies they are,
 which choose by `sys.platform` and are tested on Windows by others. Nobody can make links, and processes are spawned.
-Capitals in names of files make no difference to Python's functions, files that are opened without an encoding have that
-of western Windows, and there is no folder of open files.
+Capitals in names of files make no difference to Python's functions, files that Calmotion opens without an encoding have
+that of western Windows, and there is no folder of open files.
 """
 
 import builtins
@@ -86,10 +86,11 @@ def caseless(function, names=1):
 
 
 def opened_as_on_windows(function):
-    """`open` in the encoding of western Windows where none is named."""
+    """`open`, for Calmotion in the encoding of western Windows where none is named."""
 
     def call(file, mode="r", buffering=-1, encoding=None, *arguments, **options):
-        if encoding in (None, "locale") and "b" not in mode:
+        depth = 2 if sys._getframe(1).f_globals.get("__name__") != "pathlib" else 3
+        if encoding in (None, "locale") and "b" not in mode and (by_calmotion(depth) or by_calmotion(depth + 1)):
             encoding = "cp1252"
         return function(file, mode, buffering, encoding, *arguments, **options)
 
