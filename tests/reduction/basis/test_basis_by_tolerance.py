@@ -13,6 +13,7 @@ from calmotion.reduction.basis.natural_modes import SparseSolver, clamped_modes,
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.elements.embedding import embed
 from calmotion.reduction.load_envelope import LoadEnvelope
+from scipy.linalg import eigh
 from scipy.sparse import bmat, csr_matrix, identity
 
 TIP = np.array([0.6, 0.0, 0.0])
@@ -218,3 +219,18 @@ def test_modes_far_above_a_known_excitation_are_replaced_by_fewer_vectors(body):
     # the first two bending modes still ring: a load at 2 Hz makes them deflect a tenth further than at rest
     f = np.sqrt(slow.omega_squared[:2]) / (2 * np.pi)
     assert np.allclose(f, clamped_modes(body.model, 2, body.root)[0], rtol=1e-4)
+
+
+def test_a_load_that_turns_swings_as_fast_whatever_the_tolerance(body):
+    """What a force alone moves is within the tolerance with one coordinate, and the frequency would be too high."""
+    mass, inertia, none = 1.5, 0.25, np.zeros(3)
+    loads = LoadEnvelope(none, none, none, np.array([[0.0, 0.0, 12.0]]), np.array([[0.0, 3.0, 0.0]]))
+    moved = body.full(np.concatenate([np.zeros(body.T.shape[1] - 6), [0, 0, 12.0, 0, 0, 0]]))[1]
+
+    def lowest(basis):
+        motion = basis.patch_motion[0]
+        M = np.eye(motion.shape[1]) + mass * np.outer(motion[2], motion[2]) + inertia * np.outer(motion[4], motion[4])
+        return float(np.sqrt(eigh(np.diag(basis.omega_squared), M, eigvals_only=True)[0]))
+
+    few = body.basis(load_envelope=loads, tolerance=0.3 * float(np.linalg.norm(moved[:3])))
+    assert lowest(few) == pytest.approx(lowest(body.basis(replace(body.settings, mode_count=12))), rel=0.02)

@@ -74,7 +74,7 @@ def reduced_basis(
     - With `mode_count`: that number of lowest modes in the span of constraint modes and fixed-interface modes.
     - With a load envelope and a tolerance: the modes up to `max_frequency`, or else those in the excited band and those
       whose dynamic response moves the outputs by more than the tolerance; then residual vectors until the missing
-      static displacement is below the tolerance.
+      static displacement is below the tolerance, and each load finds nearly all of its energy.
     - Otherwise: all constraint modes, fixed-interface modes up to `max_frequency` or a usual number of them, and the
       residual vectors with more than 0.1% of the work of a uniform linear or angular acceleration.
 
