@@ -13,6 +13,7 @@ from calmotion.workflow.commands import optimize
 from calmotion.workflow.shot import Shot
 from calmotion.workflow.watch import Watch
 from pxr import Sdf
+from steppers import giving, write_stepper
 
 SPEED = 120.0  # of both motors [deg/s]; the shoulder needs 126, the elbow 189
 OPTIONS = {"step": "4ms", "tolerance": "5mm", "retime": {"slowest": 3.0}}
@@ -68,6 +69,26 @@ def test_motors_that_give_are_retimed_by_their_commands(tmp_path):
     report = result.report()
     assert report["retime"]["added_s"] >= report["retime"]["lower_bound_s"] > 0.1
     assert not any(row["exceeded"] for row in report["limits"]) and result.max_error < 5e-3
+
+
+def test_feet_come_and_go_at_the_tempo_of_the_performance(tmp_path):
+    """A step with hips that may turn 20 degrees a second, where some turn a quarter faster."""
+
+    def slow_hips(stage):
+        giving(stage)
+        for prim in stage.Traverse():
+            if prim.GetTypeName() == "PhysicsRevoluteJoint":
+                prim.AddAppliedSchema("CalmMotorAPI")
+                shots.set_float(stage, str(prim.GetPath()), "calm:motor:maxVelocity", 20.0)
+
+    result = cm.optimize(
+        write_stepper(tmp_path / "stepper.usda", slow_hips), step=1 / 96, tolerance="1mm", retime={"slowest": 3.0}
+    )  # fmt: skip
+    report = result.report()
+    assert 0.0 < report["retime"]["lower_bound_s"] < report["retime"]["added_s"] < 0.1
+    assert result.max_error < 1e-3 and not any(row["exceeded"] for row in report["limits"])
+    landed = [row["landing_speed_m_s"] for row in report["contacts"] if row["landing_speed_m_s"] is not None]
+    assert len(landed) == 1 and landed[0] < 0.1 and all(row["unlike_ground"] == [] for row in report["contacts"])
 
 
 def test_a_batch_retimes_each_of_its_shots(tmp_path, calmotion):
