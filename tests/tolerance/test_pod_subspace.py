@@ -7,6 +7,8 @@ import pytest
 from calmotion.errors import ShotError
 from calmotion.model import Track
 from calmotion.model.budget import SUBSPACE
+from calmotion.model.retiming.performance import retimed
+from calmotion.model.retiming.tempo import TimeMap
 from calmotion.model.run import RunSettings
 from calmotion.simulation.bodies import with_elasticity
 from calmotion.simulation.body_reduction import reduced_shot
@@ -93,6 +95,19 @@ def test_a_pod_subspace_is_extended_by_curves_that_deflect_bodies_differently(no
     for tracks in (swing, lift):
         assert off(nonlinear, found.shot, tracks, STEP) <= ALLOWED
     assert found.is_accurate_for(found.complete_run(lift, STEP)) and 0.0 < found.error_m <= ALLOWED
+
+
+def test_subspaces_are_projected_anew_for_another_tempo_of_another_length(nonlinear, animation, known):
+    """What is known at the first tempo has other instants, and is no motion to compare with."""
+    end = float(animation.frame_times[-1])
+    times, frames = np.linspace(0.0, end, 8), len(animation.frame_times)
+    slower = retimed(
+        animation, TimeMap(times, times * (frames + 1) / (frames - 1)), np.arange(frames + 2) * end / (frames - 1)
+    )
+    tight = 1e-9
+    found = held(nonlinear, known).of_shot(dataclasses.replace(nonlinear, animation=slower), lambda item: tight)
+    assert not found.is_accurate_for(found.complete_run(slower.current, STEP))
+    assert found.error_m <= tight
 
 
 def trials(monkeypatch, fails=lambda shot, divides: False):

@@ -143,6 +143,8 @@ class ProjectedShot:
         """Whether it is allowed, and the largest distance of a target from any known simulation, up to one too many."""
         largest = 0.0
         for item in self._known:
+            if item.animation.tempo is not self._complete.animation.tempo:
+                continue  # what is known at another tempo gives directions, but is another motion
             off = self._off(shot, item, divides)
             largest = max(largest, off)
             if not np.isfinite(off) or (off > self._allowed(item) and self._options.directions != OFF):
