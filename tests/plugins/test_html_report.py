@@ -16,6 +16,7 @@ from calmotion.errors import ShotError
 from calmotion.model import HtmlPage, OutputPaths, PageContent, Section, TextTable
 from calmotion.testing import host_with
 from calmotion.views import sample_motion
+from calmotion.workflow import sha256_of
 from calmotion_plugins.html_report import charts, packing, page, scene
 from chromium import CHROMIUM, Chromium
 from matplotlib.figure import Figure
@@ -209,8 +210,11 @@ def test_the_command_writes_a_page_with_the_words_of_its_report(calmotion, tmp_p
     text = file.read_text(encoding="utf-8")
     assert f"<p>{done.stdout.splitlines()[0]}</p>" in text
     assert "SHA-256" in text and "Simplifications" in text
-    report = json.loads(calmotion("simulate", shot, "--html", file, "--json").stdout)
+    manifest = tmp_path / "manifest.json"
+    report = json.loads(calmotion("simulate", shot, "--html", file, "--manifest", manifest, "--json").stdout)
     assert report["html"] == str(file)
+    page_row = {"path": "page.html", "role": "page", "sha256": sha256_of(file)}
+    assert page_row in json.loads(manifest.read_text())["outputs"]
     done = calmotion("simulate", shot, "--html", shot)
     assert done.returncode == 2 and "never overwritten" in done.stderr
 

@@ -40,7 +40,6 @@ def manifest_of(result: SimulationResult, folder: str | os.PathLike[str]) -> dic
     """
     from calmotion.model import Provenance
     from calmotion.model.run import Source
-    from calmotion.workflow.json_values import plain
 
     outcome = result.outcome
     source, provenance = outcome.require(Source), outcome.require(Provenance)
@@ -50,12 +49,7 @@ def manifest_of(result: SimulationResult, folder: str | os.PathLike[str]) -> dic
         "command": source.command,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "shot": _named(provenance.shot, folder),
-        "request": {
-            **{name: value for name, value in asdict(source.settings).items() if value is not None},
-            "shaper": source.shaper,
-            "verify": source.verify,
-            "operators": plain(outcome.settings),
-        },
+        "request": _request(result),
         "inputs": [_row(path, folder, role, digest) for path, role, digest in _inputs(result)],
         "outputs": [_row(path, folder, role, None) for path, role in _outputs(result)],
         "versions": {"python": platform.python_version(), "platform": platform.platform(), **_versions()},
@@ -80,7 +74,21 @@ def origin_of(files: Mapping[str, str]) -> dict[str, Any]:
 def origin_of_run(result: SimulationResult) -> dict[str, Any]:
     """The same of a run, whose layers were hashed when they were read."""
     rows = [_row(path, os.getcwd(), role, digest) for path, role, digest in _inputs(result)]
-    return origin_of({}) | {"inputs": rows, "settings": manifest_of(result, os.getcwd())["request"]}
+    return origin_of({}) | {"inputs": rows, "settings": _request(result)}
+
+
+def _request(result: SimulationResult) -> dict[str, Any]:
+    """What the user asked for."""
+    from calmotion.model.run import Source
+    from calmotion.workflow.json_values import plain
+
+    source = result.outcome.require(Source)
+    return {
+        **{name: value for name, value in asdict(source.settings).items() if value is not None},
+        "shaper": source.shaper,
+        "verify": source.verify,
+        "operators": plain(result.outcome.settings),
+    }
 
 
 def write_manifest(result: SimulationResult, path: str | os.PathLike[str]) -> str:
@@ -201,6 +209,7 @@ def _inputs(result: SimulationResult) -> Iterator[tuple[str, str, str | None]]:
 
 def _outputs(result: SimulationResult) -> Iterator[tuple[str, str]]:
     from calmotion.model.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
+    from calmotion.model.run import OutputPaths
 
     get = result.outcome.run.get
     if (layer := get(WrittenLayer)) is not None:
@@ -212,6 +221,9 @@ def _outputs(result: SimulationResult) -> Iterator[tuple[str, str]]:
     if (figures := get(Figures)) is not None:
         for path in figures.paths:
             yield path, "figure"
+    paths = get(OutputPaths)  # the page is written after the run
+    if paths is not None and paths.html and os.path.isfile(paths.html):
+        yield paths.html, "page"
 
 
 def _versions() -> dict[str, str]:
