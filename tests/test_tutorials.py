@@ -225,11 +225,9 @@ def test_a_phone_shows_the_modulus_of_an_arm(tmp_path):
     (work / "robot.usda").write_text(robot)
     (work / "shot.usda").write_text(shot)
     phone = re.search(r"<<'END'\n(.*?)END\n", script("how_to/phone"), re.DOTALL)[1]
-    real = phone.replace('"PhysicsMassAPI"]', '"PhysicsMassAPI", "CalmTargetAPI"]').replace("def Xform", "def Xform", 1)
-    real = (
-        real[: real.rindex("}")]
-        + 'over "ABS" { float physics:youngsModulus = 1.6e9\n float calm:damping:ratio = 0.04 } }'
-    )
+    real = phone.replace('"PhysicsMassAPI"]', '"PhysicsMassAPI", "CalmTargetAPI"]')
+    softer = 'over "ABS"\n{\nfloat physics:youngsModulus = 1.6e9\nfloat calm:damping:ratio = 0.04\n}\n}\n'
+    real = real[: real.rindex("}")] + softer
     (work / "real.usda").write_text(real)
     result = cm.simulate(work / "real.usda", step="0.5ms", tolerance="0.2mm")
     path = "/Robot/Phone"
