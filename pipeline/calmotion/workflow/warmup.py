@@ -89,7 +89,7 @@ def first_run(tell: Callable[[str], None]) -> Iterator[None]:
         yield
         return
     plain = is_plain()
-    tell(f"kernels are compiled, once after an installation, which takes about {'3 min' if plain else '30 s'}")
+    tell(f"kernels are compiled, once after an installation, which takes about {'4 min' if plain else '30 s'}")
     if plain or len(processors()) < 2:
         yield
         return
