@@ -18,4 +18,5 @@ from calmotion.reduction.scaled_stiffness import with_graded_stiffness as with_g
 from calmotion.reduction.scaled_stiffness import with_mode_stiffness as with_mode_stiffness
 from calmotion.reduction.scaled_stiffness import with_scaled_density as with_scaled_density
 from calmotion.reduction.scaled_stiffness import with_scaled_stiffness as with_scaled_stiffness
+from calmotion.reduction.sections.estimate import estimated_body as estimated_body
 from calmotion.reduction.soft_bodies import refuse_soft_bodies as refuse_soft_bodies

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from calmotion import ShotError
-from calmotion.model import FEMesh
+from calmotion.model import Body, FEMesh
 from calmotion.support import Fault
 
 from ..common.timing import processor_time
@@ -36,6 +36,7 @@ class LinkRow:
         volume_error: Of the tetrahedra against the solid [%].
         seconds: Processor time of solid, mesh, refinement and estimated error [s].
         f1, f2, f3: First frequencies, held by the joint towards the world, in polyamide [Hz].
+        by_sections: First frequency by beams and sections, as `calmotion inspect` tells it [Hz].
         estimate: Error of the frequencies that is estimated [%].
         note: Why it was refused, or why another source than the visual surface was taken.
     """
@@ -57,6 +58,7 @@ class LinkRow:
     f1: float = np.nan
     f2: float = np.nan
     f3: float = np.nan
+    by_sections: float = np.nan
     estimate: float = np.nan
     note: str = ""
 
@@ -115,7 +117,7 @@ def survey_link(link: Link, robot: str, time_limit: float, geometry_only: bool =
             with recomputed():
                 mesh = mesh_of(0, body, geometry, options, frames, attachments_of(link))
             row = replace(row, seconds=processor_time() - begin)
-            row = _with_mesh(row, mesh, link)
+            row = _with_sections(_with_mesh(row, mesh, link), body, link)
     except ShotError as problem:
         row = replace(row, note=str(problem), nodes=0)
     return row if row.nodes else replace(row, seconds=processor_time() - begin)
@@ -162,3 +164,13 @@ def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
         f1=float(f1), f2=float(f2), f3=float(f3), estimate=np.nan if error is None else 100.0 * error,
         note="; ".join(filter(None, (row.note, *late))),
     )  # fmt: skip
+
+
+def _with_sections(row: LinkRow, body: Body, link: Link) -> LinkRow:
+    """The row with the frequency that takes no mesh; a link that no joint holds has none."""
+    from calmotion.reduction import estimated_body
+
+    if link.carrier is None:
+        return row
+    frequencies = estimated_body(body, attachments_of(link), 0)[0].frequencies
+    return replace(row, by_sections=float(frequencies[0]) if len(frequencies) else np.nan)

@@ -9,6 +9,7 @@ import numpy as np
 from ..common.tables import markdown
 from .survey import COPY, LIMIT, LinkRow
 
+_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 _HONEST = 20.0  # estimate from which a link counts as coarse [%]
 
 
@@ -39,6 +40,15 @@ def summary(rows: Sequence[LinkRow], geometry_only: bool = False) -> str:
         lines.append(
             f"{len(copies)} are copies or mirror images of another link and are meshed with it: their rows have its "
             f"time. If they count as links that take none, {fast} took no more ({100.0 * fast / len(made):.3g}%)\n"
+        )
+    ratios = np.array([row.by_sections / row.f1 for row in made])
+    ratios = ratios[np.isfinite(ratios)]
+    if len(ratios):
+        within = [100.0 * float(np.mean(np.abs(np.log(ratios)) <= np.log(factor))) for factor in (2.0, 1.5)]
+        spread = ", ".join(f"{ratio:.2f}" for ratio in np.quantile(ratios, _QUANTILES))
+        lines.append(
+            f"first frequencies by sections over those of the meshes: {within[0]:.3g}% of {len(ratios)} links within a "
+            f"factor of 2, {within[1]:.3g}% within 1.5; at 5, 25, 50, 75 and 95% {spread}\n"
         )
     lines += [f"{row.robot} {row.link}: {row.note}\n" for row in links if row not in made]
     return "".join(lines)
@@ -71,14 +81,26 @@ def _robots(links: Sequence[LinkRow]) -> str:
 
 def _links(links: Sequence[LinkRow]) -> str:
     """The row of each link, in few columns."""
-    heads = ["robot", "link", "source", "cm^3", "kg", "nodes", "s", "f1, f2, f3 Hz", "estimate %", "what to know"]
+    heads = [
+        "robot",
+        "link",
+        "source",
+        "cm^3",
+        "kg",
+        "nodes",
+        "s",
+        "f1, f2, f3 Hz",
+        "by sections Hz",
+        "estimate %",
+        "what to know",
+    ]
     table = []
     for row in links:
         frequencies = ", ".join(_cell(f) for f in (row.f1, row.f2, row.f3)) if row.flexible else "-"
         table.append(
             [
                 row.robot, row.link, row.source, _cell(row.volume), _cell(row.mass), _cell(row.nodes),
-                _cell(row.seconds), frequencies, _cell(row.estimate), _cell(_told(row)),
+                _cell(row.seconds), frequencies, _cell(row.by_sections), _cell(row.estimate), _cell(_told(row)),
             ]
         )  # fmt: skip
     return markdown(heads, table)

@@ -33,6 +33,7 @@ def test_the_survey_has_a_row_for_each_link_and_says_what_became_of_it(shot, tmp
     beam = 3.516 / (2.0 * np.pi) * np.sqrt(1.8e9 * WIDTH**2 / 12.0 / 1200.0) / LENGTH**2
     assert float(row["f1"]) == pytest.approx(beam, rel=0.03)
     assert int(row["nodes"]) > 100 and float(row["seconds"]) > 0.0 and float(row["estimate"]) < 5.0
+    assert 0.5 < float(row["by_sections"]) / float(row["f1"]) < 2.0
     printed = capsys.readouterr().out
     assert "1 of 1 links are flexible (100%)" in printed and "| fore | visual surface |" in printed
 
