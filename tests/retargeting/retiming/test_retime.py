@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.model.curves import commanded_curves, held_curve
+from calmotion.model.limits.use import LimitUse
 from calmotion.model.retiming.tempo import TempoSettings
 from calmotion.model.run import RunSettings
-from calmotion.retargeting.retiming.retime import optimize_with_tempo
+from calmotion.retargeting.retiming.retime import optimize_with_tempo, told_between
 from calmotion.retargeting.retiming.rigid_robot import tempo_input
 from calmotion.retargeting.retiming.settings import pinned_times, refuse_tempo
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
@@ -86,6 +87,14 @@ def test_slower_motors_perform_the_animation_later_and_within_their_limits(arm, 
     assert exceeded(shot, found, quantity) <= 1.001
     assert largest(found) < max(1e-3, 1.2 * at_full_tempo)
     assert found.after.motion.times[-1] == pytest.approx(found.retimed.animation.frame_times[-1])
+
+
+def test_what_curves_exceed_between_instants_is_told():
+    rows = ((0, "velocity", -2.0, -2.0), (1, "velocity", 2.0, 2.0), (0, "position", 1.0, 0.5))
+    uses = [LimitUse(m, name, limit, 1.0, after, 0.5, after / limit - 1.0) for m, name, limit, after in rows]
+    first, second, third = told_between(uses, {"velocity": np.array([1.01, 1.0005])})
+    assert first.after == pytest.approx(-2.02) and first.excess == pytest.approx(0.01)
+    assert second is uses[1] and third is uses[2]
 
 
 def test_what_cannot_be_retimed_is_refused(arm, animation):

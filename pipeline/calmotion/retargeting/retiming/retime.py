@@ -6,6 +6,7 @@ The tempo follows anew with room for what the offsets add, and these are moved t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Result, Track
 from calmotion.model.curves import Sample, commanded_curves
+from calmotion.model.limits.use import LimitUse
 from calmotion.model.retiming.performance import retimed, with_contacts_at
 from calmotion.model.retiming.retimed import Retimed
 from calmotion.model.retiming.tempo import TimeMap
@@ -141,6 +143,22 @@ def _search_within_limits(performance: _Performance, searches: _Searches) -> Non
             break
         shares = {name: share / np.maximum(1.0, used[name]) for name, share in shares.items()}
         shot = shot.with_tracks(found_tracks(done, shot.animation))
+    searches.done = replace(searches.done, limits=told_between(searches.done.limits, used))
+
+
+def told_between(limits: Sequence[LimitUse], used: dict[str, Array]) -> tuple[LimitUse, ...]:
+    """The use of limits as the curves have it between the instants of a search, where they exceed one there.
+
+    Args:
+        used: Largest shares of the limits that curves reach anywhere, by quantity, shape [M] each.
+    """
+    told = []
+    for use in limits:
+        share = float(used[use.quantity][use.motor]) if use.quantity in used else 0.0
+        beyond = share - 1.0 > max(NOTICED, use.excess)
+        value = float(np.copysign(share * use.limit, use.after))
+        told.append(replace(use, after=value, excess=share - 1.0) if beyond else use)
+    return tuple(told)
 
 
 def _excess(used: dict[str, Array]) -> float:
