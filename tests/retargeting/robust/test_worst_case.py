@@ -92,7 +92,7 @@ def test_curves_are_simulated_as_they_are(started, worst):
     assert sum(scenario.weight for scenario in worst.scenarios) == pytest.approx(1.0)
     as_they_are = dataclasses.replace(OPTIONS, max_iterations=0)
     still = optimize_shot(shot, as_they_are, ignore_progress, None, worst.scenarios)
-    assert still.iterations == 0 and still.stopped == "converged"
+    assert still.search.iterations == 0 and still.search.stopped == "converged"
     for track, own in zip(found_tracks(still, started[0].animation), worst.tracks, strict=True):
         assert np.allclose(track.values, own.values, atol=1e-9)
 
