@@ -11,6 +11,7 @@ from calmotion.reduction.basis.craig_bampton import reduced_basis
 from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.load_envelope import LoadEnvelope
+from calmotion.reduction.material_laws.bending import searle_number
 from calmotion.reduction.material_laws.laws import reduced_by_law
 from full_order import FullOrder
 from law_call import call_neohookean, call_stvk
@@ -148,7 +149,7 @@ def test_a_strip_deflects_like_its_mesh(thin, far, law):
     found, moved, expected = deflected(thin, force, law)
     assert np.linalg.norm(expected) > 0.85 * far * LENGTH
     assert np.allclose(moved, expected, rtol=0, atol=0.01 * np.linalg.norm(expected))
-    assert len(found.basis.omega_squared) < 40
+    assert len(found.basis.omega_squared) < 64
 
 
 def test_a_steel_strip_swings_as_a_beam_does(tmp_path):
@@ -170,3 +171,12 @@ def test_a_steel_strip_swings_as_a_beam_does(tmp_path):
     largest = np.linalg.norm(tip - [LENGTH, 0.0], axis=1).max()
     assert largest > 0.25 * LENGTH
     assert report["targets"][0]["max_error_m"] == pytest.approx(largest, rel=0.005)
+
+
+def test_the_searle_number_tells_strips_that_flatten_from_arms_that_do_not():
+    """w^2 / (R t), whatever way the body lies."""
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    corners = np.array([[x, y, z] for x in (0.0, 0.3) for y in (0.0, 0.06) for z in (0.0, 0.002)])
+    radius = 0.3**2 / (2.0 * 0.05)
+    assert searle_number(corners @ turn, 0.05) == pytest.approx(0.06**2 / (radius * 0.002))
+    assert searle_number(corners * [1.0, 1.0, 30.0], 0.05) < 0.1

@@ -17,6 +17,7 @@ from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, 
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.deflection import MODES, deflection_of, work_of_loads
 
+_FLATTENS = 1.0  # Searle number from which bending flattens a section
 _ALLOWED = 0.5  # of the tolerance, for what is missing at third order
 
 
@@ -54,7 +55,8 @@ class Bending:
         """With the modes that the bending of the first calls up, within a part of the tolerance [m]."""
         assert self.derivatives is not None
         deflection = deflection_of(model, self.basis, load_envelope)
-        if deflection <= 0.0:
+        bends = OVERSHOOT * float(self.amplitude[0] * np.abs(self.basis.modes[:, :, 0]).max())
+        if deflection <= 0.0 or searle_number(model.mesh.nodes, bends) < _FLATTENS:
             return self
         found = third_order(
             model, support, self.basis, self.derivatives, OVERSHOOT * float(self.amplitude[0]),
@@ -66,6 +68,20 @@ class Bending:
         by_loads = _by_loads(model, found.basis, load_envelope)
         basis, amplitude = _ordered(found.basis, np.maximum(by_loads, found.amplitude / OVERSHOOT))
         return Bending(basis, amplitude, None, found.missing * deflection)
+
+
+def searle_number(nodes: Array, deflection: float) -> float:
+    """w^2 / (R t) of a body as a strip of length l, width w and thickness t, bent to radius R = l^2 / (2 deflection).
+
+    Far below 1 a section keeps its anticlastic curvature, far above it becomes flat (Searle 1908; Ashwell 1950).
+
+    Args:
+        nodes: [m], shape [n, 3].
+        deflection: Of its end [m].
+    """
+    axes = np.linalg.svd(nodes - nodes.mean(axis=0), full_matrices=False)[2]
+    thickness, width, length = np.sort(np.ptp(nodes @ axes.T, axis=0))
+    return float(2.0 * deflection * width**2 / (length**2 * max(thickness, np.finfo(float).tiny)))
 
 
 def _by_loads(model: FEModel, basis: Basis, load_envelope: LoadEnvelope) -> Array:
