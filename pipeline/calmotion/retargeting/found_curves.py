@@ -10,8 +10,9 @@ from calmotion.arrays import Array
 from calmotion.model import MotorCurve, Result
 from calmotion.retargeting.problem.adaptive_knots import useful_knots
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.retargeting.simplification.pruning import UNCHANGED
 from calmotion.support import interrupts
+
+UNCHANGED = 1e-5  # largest offset that counts as zero [rad]
 
 
 def found_curves(problem: RetargetProblem, motors: int, x: Array) -> tuple[tuple[MotorCurve, ...], Array]:

@@ -140,7 +140,7 @@ def _print_sources(console: Console, report: dict[str, Any]) -> None:
         say(
             console,
             f"{whose} marked `about` {'is' if rough == 1 else 'are'} rough: from beams and sections, within a factor "
-            "of two for about 9 of 10 links. What follows from them is as rough. --meshes is exact, and takes minutes.",
+            "of two for about 9 of 10 links. What follows from them is as rough. --meshes aims at 1%, in minutes.",
         )
     if earlier:
         say(console, f"the mesh of an earlier run is that of {earlier} of the flexible bodies")

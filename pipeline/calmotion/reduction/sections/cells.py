@@ -11,16 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray, Indices
+from calmotion.mesh.grids.winding import projected_area, ray_crossing
 from calmotion.mesh.parts.part_places import holders
 from calmotion.model.character import FlexibleSettings
 from calmotion.support.compilation import kernel
 
 _CELLS, _ACROSS = 200_000, 16  # of the box, and at least of its thinnest side
-_FEW, _MANY, _MOST = (
-    30_000,
-    60_000,
-    800_000,
-)  # filled cells, outside of which the box has more (at most so many) or less
+_LEAST_FILLED, _MOST_FILLED = 30_000, 60_000  # cells; with fewer or more, the box is cut anew
+_LARGEST_BOX = 800_000  # cells
 _LOOSE = 0.005  # of the cells: smaller loose parts are left out, as by the mesher
 _ASIDE = (0.0031830989, 0.0036787944)  # of a cell: rays do not run along edges of CAD surfaces
 _LEAST = 0.2  # share of a cell from which it belongs to the body
@@ -89,9 +87,9 @@ def cells_of(points: Array, triangles: Indices, settings: FlexibleSettings) -> C
         found = int(solid.sum())
         if found == 0:
             return None
-        if _FEW <= found <= _MANY or (found < _FEW and count >= _MOST):
+        if _LEAST_FILLED <= found <= _MOST_FILLED or (found < _LEAST_FILLED and count >= _LARGEST_BOX):
             break
-        count = min(int(count * np.sqrt(_FEW * _MANY) / found), _MOST)
+        count = min(int(count * np.sqrt(_LEAST_FILLED * _MOST_FILLED) / found), _LARGEST_BOX)
     low, solid = first, _without_loose(solid)
     within = _solid_neighbours(solid)
     grid = np.argwhere(solid)
@@ -159,7 +157,7 @@ def _cross(corners: Array, aside_y: float, aside_z: float, changes: Array) -> No
     """Add what each crossing of a ray along x with a triangle changes of the share of the cells behind it."""
     for t in range(len(corners)):
         x = corners[t]
-        area = (x[1, 1] - x[0, 1]) * (x[2, 2] - x[0, 2]) - (x[1, 2] - x[0, 2]) * (x[2, 1] - x[0, 1])
+        area = projected_area(x)
         if area == 0.0:
             continue
         y0, y1 = min(x[0, 1], x[1, 1], x[2, 1]), max(x[0, 1], x[1, 1], x[2, 1])
@@ -168,11 +166,9 @@ def _cross(corners: Array, aside_y: float, aside_z: float, changes: Array) -> No
             y = j + 0.5 + aside_y
             for k in range(max(int(z0 - 1.0), 0), min(int(z1) + 1, changes.shape[2])):
                 z = k + 0.5 + aside_z
-                u = ((x[1, 1] - y) * (x[2, 2] - z) - (x[1, 2] - z) * (x[2, 1] - y)) / area
-                v = ((x[2, 1] - y) * (x[0, 2] - z) - (x[2, 2] - z) * (x[0, 1] - y)) / area
-                if u < 0.0 or v < 0.0 or u + v > 1.0:
+                crossing = ray_crossing(x, area, y, z)
+                if np.isnan(crossing):
                     continue
-                crossing = u * x[0, 0] + v * x[1, 0] + (1.0 - u - v) * x[2, 0]
                 i = min(max(int(crossing), 0), changes.shape[0] - 2)
                 sign = -1.0 if area > 0.0 else 1.0
                 changes[i, j, k] += sign * (i + 1.0 - crossing)

@@ -6,7 +6,6 @@ import numpy as np
 
 from calmotion.arrays import Array, BoolArray
 
-UNCHANGED = 1e-5  # largest offset that counts as zero [rad]
 BLOCK = 8  # neighbouring coefficients of a motor that vanish together; four already make a curve vanish
 
 
