@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 GUIDE = Path(__file__).resolve().parents[1] / "docs" / "writing_a_plugin.md"
+INTERFACE = GUIDE.parent / "reference" / "plugins.md"
 
 
 def commands() -> str:
@@ -21,7 +22,7 @@ def commands() -> str:
 def test_the_guide_names_what_there_is(calmotion):
     from calmotion.host import Operator, RunContext
 
-    text = GUIDE.read_text()
+    text = INTERFACE.read_text()
     for name in ("idname", "label", "requires", "uses", "provides", "properties", "poll", "execute"):
         assert f"`{name}" in text and hasattr(Operator, name)
     for name in ("get", "progress", "report"):
@@ -35,7 +36,7 @@ def test_the_guide_names_what_there_is(calmotion):
 def test_the_command_of_the_guide_runs(calmotion, make_plugin, monkeypatch):
     import calmotion.cli as shared
 
-    page = GUIDE.read_text().split("### A command of the command line")[1].split("\n### ")[0]
+    page = INTERFACE.read_text().split("## A command of the command line")[1].split("\n## ")[0]
     names = re.findall(r"`(\w+)", page.split("| --- | --- |")[1].split("\n\n")[0])
     assert len(names) > 15 and set(names) - {"arguments", "console", "report"} <= set(shared.__all__) | {"show"}
     entry, source = (re.search(rf"```{language}\n(.*?)```", page, re.DOTALL)[1] for language in ("toml", "python"))

@@ -169,7 +169,7 @@ def test_a_sketch_of_an_arduino_plays_what_is_exported(tmp_path):
         pytest.skip("no C++ compiler")
     printed = follow("how_to/arduino", tmp_path)
     work = tmp_path / "work" / "calmotion_demo"
-    losses = [float(loss) for loss in re.findall(r"playing them costs up to ([\d.]+) mm", printed)]
+    losses = [float(loss) for loss in re.findall(r"Playing the commands costs up to ([\d.]+) mm", printed)]
     assert losses == pytest.approx([4.0, 2.2], abs=0.1), "as on the page"
     for name, text in SKETCHES.items():
         (work / name).parent.mkdir(exist_ok=True)

@@ -51,17 +51,21 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     command.add_argument(
         "--tolerance", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
-        help="acceptable loss at the targets, with a unit (1mm; default: the tolerance of the shot)",
+        help="accuracy of the simulation at the targets, with a unit (1mm; default: the tolerance of the shot)",
     )  # fmt: skip
     command.add_argument(
-        "--no-search", action="store_true", help="do not look for the lowest rate that keeps the tolerance"
+        "--allowed-loss", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
+        help="error that playing the commands may add at the targets, with a unit (2mm; default: the tolerance)",
+    )  # fmt: skip
+    command.add_argument(
+        "--no-search", action="store_true", help="do not look for the lowest rate that keeps the allowed loss"
     )
     command.add_argument(
         "--motion", metavar="FILE",
         help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
     )  # fmt: skip
     command.add_argument(
-        "--strict", action="store_true", help="exit with status 1 if the commands do not keep the tolerance"
+        "--strict", action="store_true", help="exit with status 1 if the commands lose more than is allowed"
     )
 
 
@@ -84,20 +88,20 @@ def run(args: argparse.Namespace, output: Output) -> int:
     with progress_display(args) as display:
         made = export(
             shot, args.output, to=args.to, rate=args.rate, start_delay=args.start_delay, tolerance=args.tolerance,
-            search=not args.no_search, operators=args.run, settings=assignments(args), progress=display,
+            allowed_loss=args.allowed_loss, search=not args.no_search, operators=args.run, settings=assignments(args), progress=display,
             on_operator=display.done,
         )  # fmt: skip
     conclude(made.report(), (), output, None if args.quiet else _print)
-    return FAILED if args.strict and not made.tolerance_kept else 0
+    return FAILED if args.strict and not made.loss_kept else 0
 
 
 def _print(report: dict[str, Any], console: Console) -> None:
 
-    tolerance, kept, lowest = length(report["tolerance_m"]), report["tolerance_kept"], report["lowest_rate_hz"]
+    allowed, kept, lowest = length(report["allowed_loss_m"]), report["loss_kept"], report["lowest_rate_hz"]
     say(
         console,
-        f"The commands {'keep' if kept else 'do not keep'} the tolerance of {tolerance}: playing them costs up to "
-        f"{length(report['max_loss_m'])}.",
+        f"Playing the commands costs up to {length(report['max_loss_m'])} at the targets, "
+        f"{'within' if kept else 'more than'} the allowed {allowed}.",
     )
     if report["searched"] and lowest:
         say(console, f"The lowest rate that keeps it: {lowest} Hz.")

@@ -42,7 +42,7 @@ from .lowest_rate import lowest_rate
 from .playback import Loss, Playback
 
 HIGHEST = 1000  # rate that is tried [Hz]; a higher one where a higher one is given
-CONVERGED = 0.05  # change of the loss with half the step, over the larger of it and a tenth of the tolerance
+CONVERGED = 0.05  # change of the loss with half the step, over the larger of it and a tenth of the allowed loss
 HALVINGS = 3  # of that step
 _READ = (Character, Animation, Provenance)
 
@@ -62,8 +62,9 @@ class Export:
         rate_loss: Of the same without rounding and delay.
         rounded_loss: Of the same without delay.
         fastest: Largest speed of each target [m/s]: what a second of delay costs at most.
-        lowest_rate: Lowest whole rate that keeps the tolerance [Hz]; None where none does, or it was not looked for.
+        lowest_rate: Lowest whole rate that keeps the allowed loss [Hz]; None where none does, or it was not looked for.
         tolerance: Accuracy of the simulation at the targets [m].
+        allowed_loss: Loss that is accepted at the targets [m].
         step: Of the simulations [s].
         simulations: Number of simulations.
         motors: Prim paths of the motors and the names of their joints in the file.
@@ -84,6 +85,7 @@ class Export:
     fastest: Array
     lowest_rate: int | None
     tolerance: float
+    allowed_loss: float
     step: float
     simulations: int
     motors: dict[str, str]
@@ -92,9 +94,9 @@ class Export:
     notes: tuple[str, ...]
 
     @property
-    def tolerance_kept(self) -> bool:
-        """Whether what is played keeps the tolerance."""
-        return self.loss.largest <= self.tolerance
+    def loss_kept(self) -> bool:
+        """Whether the loss of what is played is accepted."""
+        return self.loss.largest <= self.allowed_loss
 
     @cached_property
     def loss_m(self) -> dict[str, float]:
@@ -132,7 +134,9 @@ class Export:
                 "targets": rows,
                 "max_loss_m": self.loss.largest,
                 "tolerance_m": self.tolerance,
-                "tolerance_kept": self.tolerance_kept,
+                "allowed_loss_m": self.allowed_loss,
+                "loss_kept": self.loss_kept,
+                "tolerance_kept": self.loss_kept,  # the name of older versions
                 "lowest_rate_hz": self.lowest_rate,
                 "searched": self.searched,
                 "step_s": self.step,
@@ -153,6 +157,7 @@ def export(
     rate: float = 100.0,
     start_delay: float | str = 0.0,
     tolerance: float | str | None = None,
+    allowed_loss: float | str | None = None,
     search: bool = True,
     operators: Sequence[str] = (),
     settings: Given = None,
@@ -171,8 +176,9 @@ def export(
         to: Name of the format; `formats` lists them.
         rate: Commands a second [Hz].
         start_delay: How late the player starts, [s] or text with a unit (`"5ms"`).
-        tolerance: Acceptable loss at the targets, [m] or text with a unit; None: the shot's own.
-        search: Look for the lowest rate that keeps the tolerance as well.
+        tolerance: Accuracy of the simulation at the targets, [m] or text with a unit; None: the shot's own.
+        allowed_loss: Loss that is accepted at the targets, [m] or text with a unit; None: the tolerance.
+        search: Look for the lowest rate that keeps the allowed loss as well.
         operators: Idnames of operators of plugins to run as well, with a shot.
         settings: Settings of operators.
         progress, on_operator, cancel: As of `simulate`.
@@ -182,7 +188,7 @@ def export(
         SettingError: An argument does not fit.
     """
     begin = time.perf_counter()
-    given = given_export(to, rate, start_delay, tolerance)
+    given = given_export(to, rate, start_delay, tolerance, allowed_loss)
     chosen, hooks = read_settings(settings), Hooks(progress, on_operator, cancel)
     if isinstance(shot, SimulationResult):
         opened, result, outcome = shot.shot, shot.result, shot.outcome
@@ -225,7 +231,7 @@ def write_curves(
         RunError: It cannot be written.
         SettingError: There is no such format, it has no such rate, or the file is read as the shot.
     """
-    refuse_beyond_format(format_named(result.shot.host, to).highest_rate, given_export(to, rate, 0.0, None))
+    refuse_beyond_format(format_named(result.shot.host, to).highest_rate, given_export(to, rate))
     request = ExportRequest(to, rate, no_input(result.outcome, file))
     curves = curves_of(result.outcome, result.result)
     return write_commands(result.outcome, curves, request, read_settings(settings)).files[0]
@@ -251,7 +257,7 @@ class _Exporter:
         self._outcome, self._given, self._settings, self._hooks = outcome, given, settings, hooks
         self._curves = curves_of(outcome, result)
         self._playback: Playback
-        self._tolerance, self._finer = 0.0, 1.0
+        self._allowed, self._finer = 0.0, 1.0
 
     def written(self, rate: float, file: str) -> WrittenCommands:
         """Commands at a rate [Hz], written to a file."""
@@ -265,7 +271,8 @@ class _Exporter:
         options = source.settings if source is not None else RunSettings()
         compiled: CompiledShot = compiled_in(outcome.run.get)
         self._playback = Playback(compiled, options, self._curves)
-        self._tolerance = tolerance_of(compiled.character, given.tolerance or options.tolerance)
+        tolerance = tolerance_of(compiled.character, given.tolerance or options.tolerance)
+        self._allowed = tolerance if given.allowed_loss is None else given.allowed_loss
         targets = tuple(target.path for target in compiled.character.targets)
         self._tell(0.1, "playing the commands")
         step, rounded = self._converged(written.read, given.rate)
@@ -275,8 +282,8 @@ class _Exporter:
         names = {motor.path: name for motor, name in zip(self._curves.motors, self._curves.names, strict=True)}
         return Export(
             given.format, written.files, given.rate, given.delay, written, targets, loss, exact, rounded,
-            self._playback.fastest(step), lowest, self._tolerance, step, self._playback.simulations, names, search,
-            0.0, written.notes,
+            self._playback.fastest(step), lowest, tolerance, self._allowed, step, self._playback.simulations, names,
+            search, 0.0, written.notes,
         )  # fmt: skip
 
     def _loss(self, commands: Commands, step: float, delay: float = 0.0) -> Loss:
@@ -292,7 +299,7 @@ class _Exporter:
         loss = self._loss(commands, step)
         for _ in range(HALVINGS):
             finer = self._loss(commands, 0.5 * step)
-            scale = max(finer.largest, 0.1 * self._tolerance)
+            scale = max(finer.largest, 0.1 * self._allowed)
             change = float(np.max(np.abs(finer.distances - loss.distances), initial=0.0))
             if change <= CONVERGED * scale:
                 break
@@ -301,7 +308,7 @@ class _Exporter:
         return step, loss
 
     def _lowest(self, loss: Loss) -> int | None:
-        """The lowest rate that keeps the tolerance, from files that are written for the purpose and removed."""
+        """The lowest rate that keeps the allowed loss, from files that are written for the purpose and removed."""
         given, tried = self._given, 0
         known = {int(given.rate): loss.largest} if float(given.rate).is_integer() else {}
         with temporary_folder() as folder:
@@ -314,7 +321,7 @@ class _Exporter:
                 step = self._playback.step_for(1.0 / rate) / self._finer
                 return self._loss(written.read, step, given.delay).largest
 
-            return lowest_rate(at, self._tolerance, known, self._highest)
+            return lowest_rate(at, self._allowed, known, self._highest)
 
     def _tell(self, fraction: float, message: str) -> None:
         if self._hooks.progress:

@@ -1,4 +1,4 @@
-"""What the user of an export gave: format, rate, delay and tolerance, refused where no controller or shot has them."""
+"""What the user of an export gave: format, rate, delay and lengths, refused where no controller or shot has them."""
 
 from __future__ import annotations
 
@@ -15,22 +15,30 @@ from .commands import HIGHEST_RATE, LOWEST_RATE
 
 @dataclass(frozen=True)
 class GivenExport:
-    """What the user gave: format, rate [Hz], delay [s], tolerance [m]."""
+    """What the user gave: format, rate [Hz], delay [s], tolerance of the simulation [m], loss that is accepted [m]."""
 
     format: str
     rate: float
     delay: float
     tolerance: float | None
+    allowed_loss: float | None
 
 
-def given_export(to: str, rate: float, start_delay: float | str, tolerance: float | str | None) -> GivenExport:
+def given_export(
+    to: str,
+    rate: float,
+    start_delay: float | str = 0.0,
+    tolerance: float | str | None = None,
+    allowed_loss: float | str | None = None,
+) -> GivenExport:
     """The arguments of an export in SI units.
 
     Args:
         to: Name of the format.
         rate: Commands a second [Hz].
         start_delay: [s], or text with a unit.
-        tolerance: [m], or text with a unit; None: the shot's own.
+        tolerance: Of the simulation [m], or text with a unit; None: the shot's own.
+        allowed_loss: [m], or text with a unit; None: the tolerance.
 
     Raises:
         SettingError: One does not fit.
@@ -45,7 +53,12 @@ def given_export(to: str, rate: float, start_delay: float | str, tolerance: floa
         raise SettingError(
             "the start delay must not be negative", path="--start-delay", found=start_delay, remedy="Use 5ms."
         )
-    return GivenExport(to, float(rate), delay, quantity_of(tolerance, "m", "tolerance"))
+    lengths = quantity_of(tolerance, "m", "tolerance"), quantity_of(allowed_loss, "m", "allowed_loss")
+    if lengths[1] is not None and not lengths[1] > 0.0:
+        raise SettingError(
+            "the allowed loss must be positive", path="--allowed-loss", found=allowed_loss, remedy="Use 1mm."
+        )
+    return GivenExport(to, float(rate), delay, *lengths)
 
 
 def refuse_beyond_format(highest: float, given: GivenExport) -> None:

@@ -1,4 +1,4 @@
-"""What `calmotion export` prints: whether the tolerance is kept, the file, what to do next, and then the numbers."""
+"""What `calmotion export` prints: whether the loss is allowed, the file, what to do next, and then the numbers."""
 
 import io
 import json
@@ -15,7 +15,7 @@ TARGET = {
 }  # fmt: skip
 REPORT = {
     "targets": [TARGET], "interpolation": "cubic", "commands": 11, "rate_hz": 10.0, "motors": ["/Arm/Elbow"],
-    "simulations": 3, "step_s": 1e-3, "tolerance_m": 1e-3, "max_loss_m": 2e-3, "searched": True, "notes": ["a note"],
+    "simulations": 3, "step_s": 1e-3, "allowed_loss_m": 1e-3, "max_loss_m": 2e-3, "searched": True, "notes": ["a note"],
     "files": ["out.csv"],
 }  # fmt: skip
 
@@ -30,10 +30,10 @@ REPORT = {
 )  # fmt: skip
 def test_the_answer_is_first_and_the_next_step_before_the_numbers(kept, lowest, then):
     stream = io.StringIO()
-    _print(REPORT | {"tolerance_kept": kept, "lowest_rate_hz": lowest}, console_on(stream))
+    _print(REPORT | {"loss_kept": kept, "lowest_rate_hz": lowest}, console_on(stream))
     lines = stream.getvalue().splitlines()
-    keep = "keep" if kept else "do not keep"
-    assert lines[0] == f"The commands {keep} the tolerance of 1 mm: playing them costs up to 2 mm."
+    within = "within" if kept else "more than"
+    assert lines[0] == f"Playing the commands costs up to 2 mm at the targets, {within} the allowed 1 mm."
     assert "wrote out.csv" in lines
     (following,) = [k for k, line in enumerate(lines) if line.startswith("next: ")]
     assert then in lines[following] and following < lines.index(

@@ -35,13 +35,14 @@ def test_the_loss_of_lines_is_the_distance_from_the_curve(shot_file, tmp_path):
     off = np.abs(np.interp(times, sent, curve(sent)) - curve(times)).max()
     # the tip is a tenth of a metre from the hinge
     assert made.loss_m[TIP] == pytest.approx(0.1 * off, rel=0.03)
-    assert made.rate == 30 and made.tolerance_kept == (made.loss_m[TIP] <= made.tolerance)
+    assert made.rate == 30 and made.loss_kept == (made.loss_m[TIP] <= made.allowed_loss)
 
 
-def test_the_lowest_rate_keeps_the_tolerance_and_the_next_lower_does_not(shot_file, tmp_path):
-    made = export(shot_file, tmp_path / "a.csv", to="csv", rate=30, tolerance="0.1mm")
+@pytest.mark.parametrize("lengths", [{"tolerance": "0.1mm"}, {"tolerance": "2mm", "allowed_loss": "0.1mm"}])
+def test_the_lowest_rate_keeps_the_allowed_loss_and_the_next_lower_does_not(shot_file, tmp_path, lengths):
+    made = export(shot_file, tmp_path / "a.csv", to="csv", rate=30, **lengths)
     losses = [
-        export(shot_file, tmp_path / "b.csv", to="csv", rate=rate, search=False, tolerance="0.1mm").loss_m[TIP]
+        export(shot_file, tmp_path / "b.csv", to="csv", rate=rate, search=False, **lengths).loss_m[TIP]
         for rate in (made.lowest_rate - 1, made.lowest_rate)
     ]
     assert losses[1] <= 1e-4 < losses[0]
@@ -57,7 +58,7 @@ def test_rounding_and_a_late_start_have_columns_of_their_own(shot_file, tmp_path
     assert row["rounding_loss_m"] == pytest.approx(0.1 * np.radians(0.5), rel=0.3)
     assert row["start_loss_m"] == pytest.approx(0.005 * row["delay_cost_m_per_s"], rel=0.5)
     assert made.lowest_rate is None, "no rate makes up for coarse ticks"
-    assert row["loss_m"] > made.tolerance and not made.tolerance_kept
+    assert row["loss_m"] > made.allowed_loss and not made.loss_kept
 
 
 HEAD = """#usda 1.0
@@ -102,7 +103,7 @@ def test_the_command_prints_what_the_interface_reports(shot_file, tmp_path, calm
     assert report["files"] == ["shot.yaml"] and (tmp_path / "shot.yaml").is_file()
     assert report["loss_m"].keys() == {TIP} and report["lowest_rate_hz"] >= 1 and report["tolerance_kept"] is True
     table = calmotion("export", shot_file, "--to", "csv", "--rate", "4", "-o", "b.csv", "--strict")
-    assert table.returncode == 1 and "do not keep the tolerance" in table.stdout and "lowest rate" in table.stdout
+    assert table.returncode == 1 and "more than the allowed" in table.stdout and "lowest rate" in table.stdout
     assert calmotion("export", shot_file, "--to", "csv", "--quiet").stdout == ""
 
 

@@ -14,6 +14,11 @@ def test_a_rate_that_no_controller_has_is_refused(rate):
         given_export("csv", rate, 0.0, None)
 
 
+def test_an_allowed_loss_of_nothing_is_refused():
+    with pytest.raises(SettingError, match="the allowed loss must be positive"):
+        given_export("csv", 100, allowed_loss="0mm")
+
+
 def test_texts_are_in_their_units():
     given = given_export("csv", 100, "5ms", "1mm")
     assert (given.rate, given.delay, given.tolerance) == (100.0, 0.005, 0.001)
