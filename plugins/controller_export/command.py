@@ -88,8 +88,8 @@ def run(args: argparse.Namespace, output: Output) -> int:
     with progress_display(args) as display:
         made = export(
             shot, args.output, to=args.to, rate=args.rate, start_delay=args.start_delay, tolerance=args.tolerance,
-            allowed_loss=args.allowed_loss, search=not args.no_search, operators=args.run, settings=assignments(args), progress=display,
-            on_operator=display.done,
+            allowed_loss=args.allowed_loss, search=not args.no_search, operators=args.run, settings=assignments(args),
+            progress=display, on_operator=display.done,
         )  # fmt: skip
     conclude(made.report(), (), output, None if args.quiet else _print)
     return FAILED if args.strict and not made.loss_kept else 0
