@@ -24,7 +24,7 @@ WHAT = {
     "live": ("motors.live", "streams that are calmed while they are played, and input shapers"),
     "speed": ("speed.stages", "where the time of a run goes"),
     "robots": ("speed.robots", "processor time by stage and memory of robots with two flexible links"),
-    "scaling": ("speed.scaling", "growth of the run time; Exudyn, MuJoCo"),
+    "scaling": ("speed.scaling", "growth of the run time; Exudyn"),
 }
 BENCHMARKS = {name: module for name, (module, _) in WHAT.items()}
 

@@ -1,6 +1,6 @@
 """How honest calibrations are: random arms with known parameters, recorded with noise and calibrated.
 
-`calmotion bench calibration [--trials N] [--first K] [--finer-mesh] [--csv FILE [--resume]]` draws arms of one or two
+`calmotion bench calibration [--count N] [--first K] [--finer-mesh] [--csv FILE [--resume]]` draws arms of one or two
 flexible links with a load, half of them with a compliant motor. The parameters of the real arm differ from the model
 by a standard deviation of their priors. It is simulated by another integrator (Newmark's method, steps of 1/7680 s,
 extrapolated; the generalized-alpha method where that diverges) and, with `--finer-mesh`, with another mesh and twice
@@ -8,32 +8,28 @@ the modes. A marker, an accelerometer and the encoders record it, each with its 
 outliers. The table has, for each kind of parameter, how often the 95% interval covers the truth, the median and the
 largest error, the median standard deviation, and in how many trials it was identifiable, and how often it was
 recovered to `GOALS` where its 95% interval is that narrow. Trial number K is the same on every machine. `--resume`
-goes on with the trials that the CSV file does not have: 100 trials may take several days.
+goes on with the trials that the CSV file does not have: 100 trials may take several days. The command fails where
+fewer than 85% of the intervals cover the truth.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
-from calmotion import ShotError
 from calmotion.model import RunSettings
 from calmotion_plugins.calibration import HIGHER_MODES, CalibrationSettings, calibrate_shot
 
-from ..common.parsers import bench_parser, output_options
-from ..common.tables import finish, resumed_rows, say, write_rows
+from ..common.reporting import bench_parser, finish, numbered, numbered_options
 from ..scenes.recorded_arm import recorded_arm
 
 WITHIN = 1.96  # standard deviations of a 95% interval
 GRADED = 5e-4  # prior of `higher_modes`: what the mesh of `recorded_arm` has of it, 2e-4 to 6e-4 over 5 bending modes
 GOALS = {"modulus": 0.01, "damping": 0.1}  # relative errors of what is recovered well; 5% of others, 1 ms of delays
 OTHERS, DELAYS = 0.05, 1e-3
-HEADS = (
-    "parameter", "number", "in the 95% interval", "median error", "largest", "median standard deviation",
-    "identifiable", "recovered to, where told",
-)  # fmt: skip
+HEADS = "parameter, number, in the 95% interval, median error, largest, median standard deviation".split(", ")
+HEADS += ["identifiable", "recovered to, where told"]
 
 
 @dataclass(frozen=True)
@@ -42,7 +38,6 @@ class Recovered:
 
     Attributes:
         trial: Its number.
-        finer_mesh: Whether the real arm had a finer mesh than the model.
         kind: Of the parameter.
         error: Estimate minus truth.
         deviation: Standard deviation of the estimate.
@@ -54,7 +49,6 @@ class Recovered:
     """
 
     trial: int
-    finer_mesh: bool
     kind: str
     error: float
     deviation: float
@@ -87,7 +81,7 @@ def tried(number: int, finer: bool = False) -> list[Recovered]:
             error, deviation = item.value - truth, item.standard_deviation
             pull = error / deviation
         known = item.identifiable, found.converged, found.simulations, found.wall_s
-        rows.append(Recovered(number, finer, item.kind, float(error), float(deviation), float(pull), *known))
+        rows.append(Recovered(number, item.kind, float(error), float(deviation), float(pull), *known))
     return rows
 
 
@@ -109,7 +103,7 @@ def table_of(rows: Sequence[Recovered]) -> list[list[str]]:
                 _shown(kind, float(np.median([row.deviation for row in own]))),
                 str(sum(row.identifiable for row in own)),
                 f"{_shown(kind, goal_of(kind))}: {sum(abs(row.error) <= goal_of(kind) for row in told)} of {len(told)}",
-            ]  # fmt: skip
+            ]
         )
     return out
 
@@ -123,50 +117,12 @@ def _shown(kind: str, value: float) -> str:
     return f"{1e3 * value:.2g} ms" if kind == "delay" else f"{100.0 * value:.2g}%"
 
 
-def _resumed(parser: argparse.ArgumentParser, options: argparse.Namespace) -> list[Recovered]:
-    """The trials of the file that is to be resumed.
-
-    Raises:
-        ShotError: They are of another real arm, or the file is no such table.
-    """
-    rows: list[Recovered] = resumed_rows(parser, options, Recovered)
-    if any(row.finer_mesh != options.finer_mesh for row in rows):
-        raise ShotError(
-            "the table has trials " + ("without" if options.finer_mesh else "with") + " a finer mesh of the real arm",
-            path=options.csv, attribute="--finer-mesh", found=options.finer_mesh,
-            remedy="Leave --finer-mesh as it was, or name another file with --csv",
-        )  # fmt: skip
-    return rows
-
-
 def main(arguments: list[str] | None = None) -> int:
     """The command: exit status 1 where fewer than 85% of the intervals cover the truth."""
     parser = bench_parser("calibration", __doc__)
-    parser.add_argument("--trials", type=int, default=20, help="number of trials (default: 20)")
-    parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first trial (default: 0)")
     parser.add_argument("--finer-mesh", action="store_true", help="the real arm has a finer mesh and more modes")
-    parser.add_argument("--resume", action="store_true", help="keep the trials that the file of --csv has")
-    output_options(parser, csv="a row for each parameter of each trial", markdown=True)
+    numbered_options(parser, 20)
     options = parser.parse_args(arguments)
-    rows = _resumed(parser, options)
-    known = {row.trial for row in rows}
-    for number in range(options.first, options.first + options.trials):
-        if number in known:
-            continue
-        try:
-            own = tried(number, options.finer_mesh)
-        except ShotError as error:
-            say(f"trial {number} is refused: {error.problem}")
-            continue
-        rows = sorted([*rows, *own], key=lambda row: row.trial)
-        say(
-            f"trial {number}, {own[0].wall_s:.1f} s: "
-            + ", ".join(f"{row.kind} {100.0 * row.error:+.2g}% ({row.pull:+.1f} sd)" for row in own)
-        )
-        if options.csv:  # the next trial may take long
-            write_rows(options.csv, Recovered, rows)
-    if not rows:
-        return 1
-    title, found = "Parameters of random arms, recovered from recordings", {"rows": [asdict(row) for row in rows]}
-    finish(options, title, HEADS, table_of(rows), found)
-    return int(np.mean([abs(row.pull) <= WITHIN for row in rows]) < 0.85)
+    rows = numbered(options, Recovered, "trial", lambda k: tried(k, options.finer_mesh))
+    finish(options, "Parameters of random arms, recovered from recordings", rows, (HEADS, table_of(rows)))
+    return int(not rows or np.mean([abs(row.pull) <= WITHIN for row in rows]) < 0.85)

@@ -1,6 +1,6 @@
 """What shakes: known faults of random arms, found from noisy recordings.
 
-`calmotion bench diagnose [--recordings N] [--first SEED] [--csv FILE]` draws arms with one or two faults at three
+`calmotion bench diagnose [--count N] [--first SEED] [--csv FILE]` draws arms with one or two faults at three
 strengths, or none. MuJoCo, where it is installed, and our own simulator with another mesh, step and integrator record
 each by turns: encoders of 12 bits and an accelerometer at the hand. The table counts which cause `diagnose` names first
 for each fault. Seeds below 100000 were used while the explanations were written; the table begins above.
@@ -17,8 +17,7 @@ import numpy as np
 from calmotion.recordings import SensorRecording
 from calmotion_plugins.diagnosis import diagnosis_of, situation_of
 
-from ..common.parsers import bench_parser, output_options
-from ..common.tables import finish, say, write_rows
+from ..common.reporting import bench_parser, finish, numbered, numbered_options
 from ..scenes.faulty_arm import FAULTS, FaultyArm, faulty_arm
 from ..scenes.faulty_mujoco import recorded_in_mujoco
 from ..scenes.faulty_own import POSSIBLE, recorded_by_us
@@ -83,9 +82,16 @@ def answered(seed: int) -> Answer:
     spent = time.process_time() - begin
     names, faults = [cause.cause for cause in causes], tuple(arm.faults) or (NONE,)
     return Answer(
-        seed, simulator, "+".join(faults), STRENGTHS[strength] if arm.faults else "-", names[0],
-        names[1] if len(names) > 1 else "", causes[0].confidence, names[0] in faults, spent,
-    )  # fmt: skip
+        seed=seed,
+        simulator=simulator,
+        faults="+".join(faults),
+        strength=STRENGTHS[strength] if arm.faults else "-",
+        first=names[0],
+        second=names[1] if len(names) > 1 else "",
+        confidence=causes[0].confidence,
+        right=names[0] in faults,
+        processor_s=spent,
+    )
 
 
 def confusion(answers: list[Answer]) -> list[list[str]]:
@@ -120,21 +126,10 @@ def summary(answers: list[Answer]) -> list[str]:
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("diagnose", __doc__)
-    parser.add_argument("--recordings", type=int, default=RECORDINGS, metavar="N", help="how many (default: 120)")
-    parser.add_argument("--first", type=int, default=FIRST, metavar="SEED", help="first seed (default: 100000)")
-    output_options(parser, csv="a row for each recording", markdown=True)
+    numbered_options(parser, RECORDINGS, FIRST)
     options = parser.parse_args(arguments)
-    answers: list[Answer] = []
-    for seed in range(options.first, options.first + options.recordings):
-        answers.append(answered(seed))
-        a = answers[-1]
-        mark = "right" if a.right else "wrong"
-        say(f"{a.seed} {a.simulator} {a.faults} {a.strength}: {a.first} ({a.confidence:.2f}), {a.second}: {mark}")
-        if options.csv:
-            write_rows(options.csv, Answer, answers)
+    answers = numbered(options, Answer, "seed", lambda seed: [answered(seed)])
     told = summary(answers)
-    found = {"answers": [vars(a) for a in answers], "summary": told}
-    finish(options, "Named first", ("fault", "recordings", "right", *NAMED), confusion(answers), found)
-    for line in told:
-        say(line)
+    table = ("fault", "recordings", "right", *NAMED), confusion(answers)
+    finish(options, "Named first", answers, table, told, summary=told)
     return 0

@@ -7,17 +7,16 @@ moves no target by more than a tenth of the estimate, and a step that is extrapo
 measured too, by coarser regular meshes and by the last refinement of its reduction. Shot number K is the same on every
 machine; `--resume` goes on with the shots that the CSV file does not have. The table counts the shots by their error
 over their estimate: below one the estimate is on the safe side. A reference that is known to no better than half of the
-error and half of the estimate decides nothing, and its shot is counted apart. Shots that may be on the other side of
-0.05 or 1, as their reference is known no better, are counted on both.
+error and half of the estimate decides nothing, and its shot is counted apart. The command fails where an error exceeds
+one and a half times its estimate.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
-from calmotion import ShotError
 from calmotion.arrays import Array
 from calmotion.mesh import AttachmentFrame, quadratic_nodes
 from calmotion.model import Animation, Character, FEMesh, FEMeshes, MeshQuality, RunSettings
@@ -37,11 +36,10 @@ from calmotion.tolerance import (
     simulate_to_tolerance,
 )
 
-from ..common.parsers import bench_parser, output_options
-from ..common.tables import finish, resumed_rows, say, write_rows
+from ..common.reporting import bench_parser, finish, numbered, numbered_options
 
-HONEST, LIMIT = (0.05, 1.0), 1.5  # where errors over estimates are to be, and what none may exceed
-EDGES = (0.0, HONEST[0], 0.1, 0.2, 0.5, HONEST[1], LIMIT, np.inf)  # of the classes of error over estimate
+LIMIT = 1.5  # errors over estimates that none may exceed
+EDGES = (0.0, 0.05, 0.1, 0.2, 0.5, 1.0, LIMIT, np.inf)  # of the classes of error over estimate
 MESH_ACCURACY, MAX_NODES = 0.01, 15_000  # of the first meshes, as of the mesher
 MESHES = ((3, 2), (4, 3))  # of references: cells along a link over those of the first mesh, and across; the last counts
 DECIDES = 0.5  # largest error of a reference over the larger of error and estimate
@@ -108,12 +106,6 @@ class Judged:
     def decides(self) -> bool:
         """Whether the reference is known well enough for the ratio to tell something."""
         return self.reference_m <= DECIDES * max(self.error_m, self.estimated_m)
-
-    @property
-    def may_be_honest(self) -> bool:
-        """Whether the error may be from 0.05 to 1 of the estimate (`HONEST`), as far as the reference is known."""
-        least, most = self.error_m - self.reference_m, self.error_m + self.reference_m
-        return most >= HONEST[0] * self.estimated_m and least <= HONEST[1] * self.estimated_m
 
 
 def drawn(number: int) -> Drawn:
@@ -221,53 +213,23 @@ def _nodes(meshes: FEMeshes) -> int:
 
 def counts(rows: Sequence[Judged]) -> list[list[str]]:
     """Rows of the table: class, number of shots, share of those that decide."""
-    deciding = [row for row in rows if row.decides]
-    ratios = [row.ratio for row in deciding]
-    found = [*np.histogram(ratios, EDGES)[0], len(rows) - len(ratios)]
-    classes = list(zip(EDGES[:-2], EDGES[1:-1], strict=True))
-    names = [*(f"{low:g} to {high:g}" for low, high in classes), f"above {LIMIT:g}", "undecided"]
-    shares = [*(f"{100.0 * n / max(len(ratios), 1):.0f}%" for n in found[:-1]), "-"]
-    honest = f"{HONEST[0]:g} to {HONEST[1]:g}"
-    kept = sum(HONEST[0] <= ratio <= HONEST[1] for ratio in ratios)
-    possible = sum(row.may_be_honest for row in deciding)
-    whole = [
-        [name, str(n), f"{100.0 * n / max(len(ratios), 1):.1f}%"]
-        for name, n in ((honest, kept), (f"{honest}, as far as the reference is known", possible))
+    ratios = [row.ratio for row in rows if row.decides]
+    names = [f"{low:g} to {high:g}" for low, high in zip(EDGES[:-2], EDGES[1:-1], strict=True)] + [f"above {LIMIT:g}"]
+    share = 100.0 / max(len(ratios), 1)
+    table = [[name, str(n), f"{share * n:.0f}%"] for name, n in zip(names, np.histogram(ratios, EDGES)[0], strict=True)]
+    return [
+        *table,
+        ["undecided", str(len(rows) - len(ratios)), "-"],
+        ["largest", f"{max(ratios, default=0.0):.2f}", "-"],
     ]
-    largest = ["largest", f"{max(ratios, default=0.0):.2f}", "-"]
-    return [[name, str(n), share] for name, n, share in zip(names, found, shares, strict=True)] + [*whole, largest]
-
-
-HEADS = ("error over estimate", "shots", "share")
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The command: exit status 1 when an error exceeds one and a half times its estimate."""
     parser = bench_parser("estimates", __doc__)
-    parser.add_argument("--count", type=int, default=200, help="number of shots (default: 200)")
-    parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first shot (default: 0)")
-    parser.add_argument("--resume", action="store_true", help="keep the shots that the file of --csv has")
-    output_options(parser, csv="a row for each shot", markdown=True)
+    numbered_options(parser, 200)
     options = parser.parse_args(arguments)
-    rows: list[Judged] = resumed_rows(parser, options, Judged)
-    known = {row.shot for row in rows}
-    for number in range(options.first, options.first + options.count):
-        if number in known:
-            continue
-        try:
-            row = judged(number)
-        except ShotError as problem:
-            say(f"shot {number} is refused: {problem.problem}")
-            continue
-        rows = sorted([*rows, row], key=lambda row: row.shot)
-        say(
-            f"shot {number}, {1e3 * row.tolerance_m:.2g} mm: {1e3 * row.error_m:.2g} mm off, "
-            f"{1e3 * row.estimated_m:.2g} mm estimated"
-        )
-        if options.csv:
-            write_rows(options.csv, Judged, rows)
-    if not rows:
-        return 1
-    found = {"rows": [asdict(row) | {"ratio": row.ratio, "decides": row.decides} for row in rows]}
-    finish(options, "Random shots by error over estimate", HEADS, counts(rows), found)
-    return int(any(row.decides and row.ratio > LIMIT for row in rows))
+    rows = numbered(options, Judged, "shot", lambda k: [judged(k)])
+    heads = ("error over estimate", "shots", "share")
+    finish(options, "Random shots by error over estimate", rows, (heads, counts(rows)))
+    return int(not rows or any(row.decides and row.ratio > LIMIT for row in rows))

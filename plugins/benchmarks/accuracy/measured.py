@@ -41,11 +41,9 @@ from calmotion_plugins.calibration import (
 )
 from scipy.interpolate import CubicSpline
 
-from ..common.parsers import bench_parser, output_options
-from ..common.tables import finish, say, write_rows
+from ..common.reporting import bench_parser, finish, keep, say
 from . import cantilever, two_mode_beam
 
-HEADS = ("fitted", "error of the others", "as they are", "estimates")
 CLOCK = 0.02  # standard deviation of the clocks, which begin with the commands [s]
 STEP = 4e-3  # of the predictions [s]
 WITHIN = 1.96
@@ -117,7 +115,7 @@ def _left(signals: Signals, channel: Channel, place: Any, gain: float | None) ->
     return float((off - free @ np.linalg.lstsq(free, off, rcond=None)[0]).std() / values.std())
 
 
-def beam_rows(folder: Path, machine: Machine, fits: Sequence[tuple[str, ...]]) -> list[list[str]]:
+def beam_rows(folder: Path, machine: Machine, fits: Sequence[tuple[str, ...]]) -> list[Predicted]:
     """What an independent two-mode beam predicts of the recordings of strips; none for another machine."""
     file = folder / "beam.toml"
     if not file.is_file():
@@ -135,7 +133,7 @@ def beam_rows(folder: Path, machine: Machine, fits: Sequence[tuple[str, ...]]) -
         found = two_mode_beam.fitted(strip, [readings[name] for name in own])
         left = [two_mode_beam.predicted(found, reading) for name, reading in readings.items() if name not in own]
         told = f"{found.frequencies[0]:.3g} Hz, damping {found.damping:.3g}, {found.modulus:.3g} of the modulus"
-        rows.append([f"beam: {', '.join(own)}", f"{np.mean(left):.4f}", "", told])
+        rows.append(Predicted(f"beam: {', '.join(own)}", float(np.mean(left)), np.nan, told))
     return rows
 
 
@@ -184,16 +182,22 @@ def covered(fits: dict[tuple[str, ...], Calibration]) -> dict[str, tuple[int, in
     return found
 
 
+@dataclass(frozen=True)
+class Frequency:
+    """One of the published cantilever, computed and measured [Hz], and their difference."""
+
+    computed_hz: float
+    measured_hz: float
+    difference_percent: float
+
+
 def _cantilever(options: argparse.Namespace) -> None:
     """The published cantilever."""
     found, modulus = cantilever.cantilever()
-    cells = [
-        [f"{f:.4g}", f"{m:.4g}", f"{100.0 * (f / m - 1.0):+.2f}%"]
-        for f, m in zip(found, cantilever.MEASURED, strict=True)
+    rows = [
+        Frequency(float(f), m, 100.0 * (float(f) / m - 1.0)) for f, m in zip(found, cantilever.MEASURED, strict=True)
     ]
-    told = {"frequencies_hz": found.tolist(), "measured_hz": cantilever.MEASURED, "modulus_pa": modulus}
-    heads = ("computed [Hz]", "measured [Hz]", "difference")
-    finish(options, f"A steel cantilever, modulus {1e-9 * modulus:.4g} GPa", heads, cells, told)
+    finish(options, f"A steel cantilever, modulus {1e-9 * modulus:.4g} GPa", rows, modulus_pa=modulus)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -202,7 +206,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("folder", metavar="FOLDER", nargs="?", help="shots and recordings of one machine")
     parser.add_argument("--fit", type=int, default=2, metavar="N", help="shots that are fitted together (default: 2)")
     parser.add_argument("--most", type=int, metavar="N", help="fits, spread over all of them (default: all)")
-    output_options(parser, csv="a row for each fit", markdown=True)
     options = parser.parse_args(arguments)
     if options.folder is None:
         _cantilever(options)
@@ -213,8 +216,7 @@ def main(arguments: list[str] | None = None) -> int:
     settings = CalibrationSettings(priors={"clock_offset": CLOCK})
     rows, fits = [], {}
     for own in choices(names, options.fit, options.most):
-        fit = calibrate_shots([machine.takes[name] for name in own], settings, RunSettings())
-        fits[own] = fit
+        fit = fits[own] = calibrate_shots([machine.takes[name] for name in own], settings, RunSettings())
         others = [name for name in names if name not in own]
         told = ", ".join(
             f"{item.name.partition(' ')[0]} {item.value:.3g} ± {item.standard_deviation:.2g}"
@@ -224,19 +226,14 @@ def main(arguments: list[str] | None = None) -> int:
         error = float(np.mean([machine.error(name, fit.estimates) for name in others]))
         rows.append(Predicted(", ".join(own), error, float(np.mean([nominal[name] for name in others])), told))
         say(f"{rows[-1].fitted}: {error:.4f} (as they are {rows[-1].nominal:.4f}); {told}")
-        if options.csv:
-            write_rows(options.csv, Predicted, rows)
-    inside = covered(fits)
-    beams = beam_rows(Path(options.folder), machine, list(fits))
-    errors = [row.error for row in rows]
-    cells = [[row.fitted, f"{row.error:.4f}", f"{row.nominal:.4f}", row.estimates] for row in rows]
-    cells.append(["median", f"{np.median(errors):.4f}", f"{np.mean(list(nominal.values())):.4f}", ""])
-    cells.append(["largest", f"{max(errors):.4f}", f"{max(nominal.values()):.4f}", ""])
-    cells += beams
-    cells += [[f"in the 95% interval: {name}", f"{a} of {n}", "", ""] for name, (a, n) in inside.items()]
-    found = {
-        "fits": [vars(row) for row in rows], "median_error": float(np.median(errors)), "largest_error": max(errors),
-        "as_they_are": nominal, "in_the_95_percent_interval": inside,
-    }  # fmt: skip
-    finish(options, "Predictions of a real machine", HEADS, cells, found)
+        keep(options, Predicted, rows)
+    errors, inside = [row.error for row in rows], covered(fits)
+    as_they_are = list(nominal.values())
+    rows += [
+        Predicted("median", float(np.median(errors)), float(np.mean(as_they_are)), ""),
+        Predicted("largest", max(errors), max(as_they_are), ""),
+        *beam_rows(Path(options.folder), machine, list(fits)),
+    ]
+    lines = [f"in the 95% interval, {name}: {a} of {n}" for name, (a, n) in inside.items()]
+    finish(options, "Predictions of a real machine", rows, lines=lines, in_the_95_percent_interval=inside)
     return 0

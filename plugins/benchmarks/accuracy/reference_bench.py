@@ -17,8 +17,8 @@ from calmotion.multibody import ReducedBody
 from calmotion.simulation import MAX_STEP, BodyReduction, CompiledShot, compile_shot, reduction_for
 from calmotion.tolerance import ProjectedShot, ReferenceRun, StepRun, distance, mesh_error, reference_run, simulate_at
 
+from ..common.reporting import say
 from ..common.shots import Unreduced
-from ..common.tables import say
 from ..common.timing import median_time
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)

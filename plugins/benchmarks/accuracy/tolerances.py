@@ -3,15 +3,14 @@
 `calmotion bench tolerances [SHOT ...] [--csv FILE]` simulates each shot as animated with each tolerance, with the
 choices of the program, and measures the result against a simulation without simplifications, with a much smaller step,
 many more coordinates, and meshes of eight times the nodes. With `--optimize` it optimises each shot, and simulates the
-optimised curves again. The error is the largest distance of any target, at any frame, between the two. `--resume` keeps
-the rows that the CSV file has; meshes and reductions of references stay in the cache.
+optimised curves again. The error is the largest distance of any target, at any frame, between the two. Meshes and
+reductions of references stay in the cache. The command fails where a tolerance is not kept.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 from calmotion.cli import quantity
 from calmotion.model import Result, RunSettings
@@ -27,16 +26,14 @@ from calmotion.tolerance import (
     simulate_to_tolerance,
 )
 
-from ..common.parsers import bench_parser, output_options, shots_argument
+from ..common.reporting import bench_parser, cells_of, finish, keep, say
 from ..common.shots import SAMPLES, Unreduced, load_unreduced
-from ..common.tables import finish, resumed_rows, say, write_rows
 from ..common.timing import machine
 from .reference_bench import FINEST, TIMES, Bench, Reference
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
-# tolerance of the reference's reduction over the tightest that is measured; where it has finer meshes, these are known
-# far worse, and most of their time is that of the reduction
-FINER, FINER_MESHED = 1e-2, 1e-1
+# tolerance of the reference's reduction over the tightest that is measured: its finer meshes are known far worse
+FINER = 1e-1
 
 
 @dataclass(frozen=True)
@@ -131,64 +128,23 @@ class Tolerances:
         return result, sum(u.shape[1] for u in result.before.motion.elastic), more
 
 
-def told(row: Kept) -> str:
-    """One line of it."""
-    return (
-        f"{row.shot}, {1e3 * row.tolerance_m:g} mm: {1e3 * row.error_m:.2g} mm off, in {row.wall_s:.0f} s, "
-        f"{row.run_s:.1f} s of them the {'search' if row.command == 'optimize' else 'simulation'}"
-    )
-
-
-HEADS = (
-    "shot", "tolerance", "error", "estimate", "reference to", "step", "coordinates", "run", "in all", "shake before",
-    "after",
-)  # fmt: skip
-
-
-def cells(rows: Sequence[Kept]) -> list[list[str]]:
-    """The table for a person, without its heads."""
-    from calmotion.cli import length
-
-    return [
-        [
-            row.shot, length(row.tolerance_m), length(row.error_m), length(row.estimated_m), length(row.reference_m),
-            f"{1e3 * row.step_s:.3g} ms", str(row.coordinates), f"{row.run_s:.2f} s", f"{row.wall_s:.1f} s",
-            length(row.shake_before_m), length(row.shake_after_m) if row.command == "optimize" else "-",
-        ]
-        for row in rows
-    ]  # fmt: skip
-
-
 def main(arguments: list[str] | None = None) -> int:
     """The command: exit status 1 when a tolerance is not kept."""
-    parser = bench_parser("tolerances", __doc__)
-    shots_argument(parser, SAMPLES)
+    parser = bench_parser("tolerances", __doc__, SAMPLES)
     parser.add_argument(
         "--tolerances", metavar="LENGTH", nargs="+", type=quantity("m", positive=True), default=list(TOLERANCES)
     )
-    output_options(parser, csv="a table", markdown=True)
-    parser.add_argument(
-        "--nodes", type=float, default=TIMES, metavar="N",
-        help=f"nodes of the reference's meshes over those of the shot's (default: {TIMES:g})",
-    )  # fmt: skip
     parser.add_argument("--optimize", action="store_true", help="optimise the shots, which takes much longer")
-    parser.add_argument("--resume", action="store_true", help="keep the rows that the file of --csv has")
     options = parser.parse_args(arguments)
-    known: list[Kept] = resumed_rows(parser, options, Kept)
     rows: list[Kept] = []
-    share = FINER_MESHED if options.nodes > 1.0 else FINER
     command = "optimize" if options.optimize else "simulate"
     for path in options.shots:
-        shot = Tolerances(load_unreduced(path), share * min(options.tolerances), options.nodes)
-        before = {row.tolerance_m: row for row in known if (row.shot, row.command) == (shot.shot.name, command)}
-        if not before.keys() >= set(options.tolerances):
-            shot.warm(max(options.tolerances), command)
+        shot = Tolerances(load_unreduced(path), FINER * min(options.tolerances))
+        shot.warm(max(options.tolerances), command)
         for tolerance in options.tolerances:
-            rows.append(before.get(tolerance) or shot.kept(tolerance, command))
-            say(told(rows[-1]))  # the next may take long
-            if options.csv:
-                write_rows(options.csv, Kept, [*rows, *(row for row in known if row not in rows)])
-    title = {"simulate": "Simulated", "optimize": "Optimised"}[command]
-    found = {"machine": machine(), "rows": [asdict(row) | {"kept": row.kept} for row in rows]}
-    finish(options, f"{title} to a tolerance, against a far finer simulation", HEADS, cells(rows), found)
+            rows.append(shot.kept(tolerance, command))
+            say(" ".join(cells_of(rows[-1])))
+            keep(options, Kept, rows)
+    title = "Optimised" if options.optimize else "Simulated"
+    finish(options, f"{title} to a tolerance, against a far finer simulation", rows, machine=machine())
     return int(not all(row.kept for row in rows))

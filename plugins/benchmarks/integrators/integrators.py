@@ -1,6 +1,6 @@
 """Comparison of the integrators: orders, and a stiff nonlinear scene.
 
-`calmotion bench integrators [--json]` measures
+`calmotion bench integrators` measures
 
 - errors of positions and velocities against the step, on a flexible arm with a driven joint, against RK4 at a
   fine step;
@@ -10,18 +10,16 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from calmotion.model import Animation, Character, FEMeshes
 from calmotion.testing import beam_arm, quintic, shot_of
 
-from ..common.parsers import bench_parser, output_options
-from ..common.tables import show
+from ..common.reporting import bench_parser, cells_of, finish, heads_of, keep, show
 
 WORKING_STEP = 1.0 / 240.0
 SHORT = 0.1  # run time [s]
@@ -42,7 +40,7 @@ class Measured:
 
     integrator: str
     step_s: float
-    position_error: float
+    position_error_m: float
     velocity_error: float
     wall_s: float
 
@@ -124,14 +122,17 @@ def orders(scene: Scene, steps: dict[str, tuple[int, ...]] = STEPS, finest: int 
             V, exact = run.trajectory.states.V[::count], reference.trajectory.states.V[::finest]
             found.append(
                 Measured(
-                    integrator, frame / count, float(np.linalg.norm(off, axis=2).max()),
-                    float(np.abs(V - exact)[1:].max()), wall,
+                    integrator=integrator,
+                    step_s=frame / count,
+                    position_error_m=float(np.linalg.norm(off, axis=2).max()),
+                    velocity_error=float(np.abs(V - exact)[1:].max()),
+                    wall_s=wall,
                 )
-            )  # fmt: skip
+            )
     return found
 
 
-def order_of(rows: Sequence[Measured], integrator: str, error: str = "position_error") -> float:
+def order_of(rows: Sequence[Measured], integrator: str, error: str = "position_error_m") -> float:
     """Order of an integrator: the largest slope between neighbouring steps.
 
     Coarse steps do not resolve everything yet, and errors of fine ones reach that of the reference.
@@ -163,30 +164,17 @@ def fates(scene: Scene, parts: Sequence[int] = RK4_PARTS) -> list[Fate]:
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("integrators", __doc__)
-    output_options(parser)
     options = parser.parse_args(arguments)
     measured, outcomes = orders(arm_scene()), fates(stiff_scene())
-    if options.json:
-        print(json.dumps({"orders": [asdict(row) for row in measured], "stiff": [asdict(fate) for fate in outcomes]}))
-    else:
-        print_tables(measured, outcomes)
-    return 0
-
-
-def print_tables(measured: list[Measured], outcomes: list[Fate]) -> None:
-    """The tables for a person."""
-    rows = [
-        [
-            row.integrator, f"{1e3 * row.step_s:.3g}", f"{row.position_error:.1e}", f"{row.velocity_error:.1e}",
-            f"{row.wall_s:.3f}",
-        ]
-        for row in measured
-    ]  # fmt: skip
-    show("Errors of a flexible arm", ["integrator", "step [ms]", "position [m]", "velocity", "time [s]"], rows)
-    rows = [
-        [one, *(f"{order_of(measured, one, error):.2f}" for error in ("position_error", "velocity_error"))]
-        for one in dict.fromkeys(row.integrator for row in measured)
+    keep(options, Measured, measured)
+    errors = {"position": "position_error_m", "velocity": "velocity_error"}
+    names = dict.fromkeys(row.integrator for row in measured)
+    found = {one: {name: order_of(measured, one, error) for name, error in errors.items()} for one in names}
+    lines = [
+        f"order of {one}: position {own['position']:.2f}, velocity {own['velocity']:.2f}" for one, own in found.items()
     ]
-    show("Orders", ["integrator", "position", "velocity"], rows)
-    rows = [[f.integrator, f"{f.step_s:.2g}", f.outcome, f"{f.ends_s:.4g}", f"{f.wall_s:.2f}"] for f in outcomes]
-    show("Two thin steel links", ["integrator", "step [s]", "outcome", "at [s]", "time [s]"], rows)
+    stiff = [vars(fate) for fate in outcomes]
+    finish(options, "Errors of a flexible arm", measured, lines=lines, orders=found, stiff=stiff)
+    if not options.json:
+        show("Two thin steel links", heads_of(Fate), [cells_of(fate) for fate in outcomes])
+    return 0

@@ -15,7 +15,6 @@ from ..common.timing import processor_time
 from ..scenes.links import Link, attachments_of, frames_of
 
 LIMIT = 20.0  # processor time of a link that is wanted [s]
-COPY = "the same as"  # begins the note of a link that is meshed with another one
 
 
 @dataclass(frozen=True)
@@ -26,18 +25,15 @@ class LinkRow:
         robot, link: Names.
         source: What its solid was made of; `refused`, `fault` or `none` (no geometry) where there is none.
         triangles: Of its visual surfaces.
-        volume: Of its solid [cm^3].
-        of_hull: Volume over that of the convex hull of the visual surfaces.
-        mass: That the robot states [kg].
-        density: The mass over the volume [kg/m^3].
+        volume_cm3: Of its solid.
+        mass_kg: That the robot states.
         joints, off: Its joints, and those whose frames do not touch its solid.
-        farthest: Of these from the solid [mm].
         nodes: Of the ten-node tetrahedra.
-        volume_error: Of the tetrahedra against the solid [%].
-        seconds: Processor time of solid, mesh, refinement and estimated error [s].
-        f1, f2, f3: First frequencies, held by the joint towards the world, in polyamide [Hz].
-        by_sections: First frequency by beams and sections, as `calmotion inspect` tells it [Hz].
-        estimate: Error of the frequencies that is estimated [%].
+        volume_error_percent: Of the tetrahedra against the solid.
+        processor_s: Time of solid, mesh, refinement and estimated error.
+        f1_hz, f2_hz, f3_hz: First frequencies, held by the joint towards the world, in polyamide.
+        by_sections_hz: First frequency by beams and sections, as `calmotion inspect` tells it.
+        estimate_percent: Error of the frequencies that is estimated.
         note: Why it was refused, or why another source than the visual surface was taken.
     """
 
@@ -45,21 +41,18 @@ class LinkRow:
     link: str
     source: str = "refused"
     triangles: int = 0
-    volume: float = np.nan
-    of_hull: float = np.nan
-    mass: float = np.nan
-    density: float = np.nan
+    volume_cm3: float = np.nan
+    mass_kg: float = np.nan
     joints: int = 0
     off: int = 0
-    farthest: float = np.nan
     nodes: int = 0
-    volume_error: float = np.nan
-    seconds: float = np.nan
-    f1: float = np.nan
-    f2: float = np.nan
-    f3: float = np.nan
-    by_sections: float = np.nan
-    estimate: float = np.nan
+    volume_error_percent: float = np.nan
+    processor_s: float = np.nan
+    f1_hz: float = np.nan
+    f2_hz: float = np.nan
+    f3_hz: float = np.nan
+    by_sections_hz: float = np.nan
+    estimate_percent: float = np.nan
     note: str = ""
 
     @property
@@ -71,7 +64,8 @@ class LinkRow:
     def outcome(self) -> str:
         """What became of it, in few words."""
         if self.flexible:
-            return f"{self.source}, {self.nodes} nodes, {self.seconds:.3g} s, estimate {self.estimate:.2g}%"
+            told = f"{self.processor_s:.3g} s, estimate {self.estimate_percent:.2g}%"
+            return f"{self.source}, {self.nodes} nodes, {told}"
         return self.source if not self.note else f"{self.source}: {self.note}"
 
 
@@ -79,12 +73,6 @@ def faulty_row(link: Link, robot: str, fault: Fault) -> LinkRow:
     """The row of a link whose process failed."""
     note = f"{fault.reason}. Give a TetMesh, or a simpler mesh file, for this link, and report the fault"
     return LinkRow(robot=robot, link=link.name, source="fault", note=note)
-
-
-def same_row(row: LinkRow, link: Link, robot: str) -> LinkRow:
-    """The row of a link that is the same as that of another row."""
-    note = f"{COPY} {row.link}" if row.robot == robot else f"{COPY} {row.link} of {row.robot}"
-    return replace(row, robot=robot, link=link.name, note="; ".join(filter(None, (note, row.note))))
 
 
 def survey_link(link: Link, robot: str, time_limit: float, geometry_only: bool = False) -> LinkRow:
@@ -103,44 +91,44 @@ def survey_link(link: Link, robot: str, time_limit: float, geometry_only: bool =
     frames = frames_of(link)
     visual = [surface for surface in body.surfaces if surface.visible and len(surface.triangles)]
     row = LinkRow(
-        robot=robot, link=link.name, triangles=sum(len(surface.triangles) for surface in visual), joints=len(frames),
-        mass=np.nan if link.mass is None else link.mass.mass,
-    )  # fmt: skip
+        robot=robot,
+        link=link.name,
+        triangles=sum(len(surface.triangles) for surface in visual),
+        joints=len(frames),
+        mass_kg=np.nan if link.mass is None else link.mass.mass,
+    )
     if not body.surfaces and body.tets is None and not frames:
         return replace(row, source="none", note="no geometry and no joints")
     begin = processor_time()
     try:
         options = MeshOptions(time_limit=time_limit, cache=False)
         geometry = geometry_of(0, body, options, frames)
-        row = _with_solid(row, geometry, visual, frames)
+        row = _with_solid(row, geometry, frames)
         if not geometry_only:
             with recomputed():
                 mesh = mesh_of(0, body, geometry, options, frames, attachments_of(link))
-            row = replace(row, seconds=processor_time() - begin)
+            row = replace(row, processor_s=processor_time() - begin)
             row = _with_sections(_with_mesh(row, mesh, link), body, link)
     except ShotError as problem:
         row = replace(row, note=str(problem), nodes=0)
-    return row if row.nodes else replace(row, seconds=processor_time() - begin)
+    return row if row.nodes else replace(row, processor_s=processor_time() - begin)
 
 
-def _with_solid(row: LinkRow, geometry: Any, visual: Sequence[Any], frames: Sequence[Any]) -> LinkRow:
+def _with_solid(row: LinkRow, geometry: Any, frames: Sequence[Any]) -> LinkRow:
     from calmotion.mesh import boundary_triangles, contact_place
-    from scipy.spatial import ConvexHull
 
     solid = getattr(geometry, "solid", None)
     points = geometry.points if solid is None else solid.points
     triangles = boundary_triangles(geometry.tets) if solid is None else solid.triangles
     volume = geometry.quality.volume if solid is None else solid.volume
-    hull = np.nan
-    if visual:
-        hull = float(ConvexHull(np.vstack([s.points[s.triangles.ravel()] for s in visual])).volume)
     places = [contact_place(frame.position, frame.axis, points[triangles], points) for frame in frames]
-    off = [place.distance for place in places if place is not None]
     return replace(
-        row, source="tetrahedra" if solid is None else solid.source, volume=1e6 * volume, of_hull=volume / hull,
-        density=row.mass / volume, off=len(off), farthest=1e3 * max(off, default=np.nan),
+        row,
+        source="tetrahedra" if solid is None else solid.source,
+        volume_cm3=1e6 * volume,
+        off=sum(place is not None for place in places),
         note="" if solid is None or solid.source == "visual surface" else solid.repairs[0],
-    )  # fmt: skip
+    )
 
 
 def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
@@ -160,10 +148,16 @@ def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
         note for note in mesh.quality.repairs if "too long" in note or "would exceed" in note or "on a grid" in note
     ]
     return replace(
-        row, source=mesh.quality.source, nodes=len(model.mesh.nodes), volume_error=100.0 * mesh.quality.volume_error,
-        f1=float(f1), f2=float(f2), f3=float(f3), estimate=np.nan if error is None else 100.0 * error,
+        row,
+        source=mesh.quality.source,
+        nodes=len(model.mesh.nodes),
+        volume_error_percent=100.0 * mesh.quality.volume_error,
+        f1_hz=float(f1),
+        f2_hz=float(f2),
+        f3_hz=float(f3),
+        estimate_percent=np.nan if error is None else 100.0 * error,
         note="; ".join(filter(None, (row.note, *late))),
-    )  # fmt: skip
+    )
 
 
 def _with_sections(row: LinkRow, body: Body, link: Link) -> LinkRow:
@@ -173,4 +167,4 @@ def _with_sections(row: LinkRow, body: Body, link: Link) -> LinkRow:
     if link.carrier is None:
         return row
     frequencies = estimated_body(body, attachments_of(link), 0)[0].frequencies
-    return replace(row, by_sections=float(frequencies[0]) if len(frequencies) else np.nan)
+    return replace(row, by_sections_hz=float(frequencies[0]) if len(frequencies) else np.nan)

@@ -15,10 +15,8 @@ python samples/real/compose.py samples/real/iiwa_reach.usda KUKA.usda build/iiwa
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -30,7 +28,7 @@ from calmotion.retargeting import optimize_shot
 from calmotion.simulation import CompiledShot, compile_shot, simulate_shot
 from calmotion.tolerance import with_friction_band, with_gains_used
 
-from ..common.parsers import bench_parser, output_options
+from ..common.reporting import bench_parser, finish, keep
 from .lumped_robot import MUJOCO_STEP, simulate_lumped
 from .original import simulate_original
 
@@ -119,25 +117,23 @@ def beginning(animation: Animation, seconds: float) -> Animation:
 
 
 def compare(
-    name: str, shot: CompiledShot, mjcf: str | None = None, step: float = _STEP, mujoco_step: float = MUJOCO_STEP,
-    pre_roll: float | None = None,
-) -> Row:  # fmt: skip
+    name: str, shot: CompiledShot, mjcf: str | None = None, step: float = _STEP, mujoco_step: float = MUJOCO_STEP
+) -> Row:
     """Both commands on the motors of a shot, in both programs.
 
     Args:
         mjcf: The robot's own file, for MuJoCo; None: a lumped model.
         step, mujoco_step: Of Calmotion and of MuJoCo [s].
-        pre_roll: See `RunSettings`.
 
     Raises:
         ShotError: The robot cannot be simulated, or has no place in the lumped model.
     """
-    options = RunSettings(step=step, tolerance=1e-5, pre_roll=pre_roll)
+    options = RunSettings(step=step, tolerance=1e-5)
     result = optimize_shot(shot, options, lambda fraction, message: None)
     assert result.after is not None
     told = [_told(shot, run, options) for run in (result.before, result.after)]
     ours = [_largest(result, positions) for positions in told]
-    open_mm = with_friction_band(shot, result, options).friction_band_m
+    band = with_friction_band(shot, result, options).friction_band_m
     play = simulate_lumped if mjcf is None else partial(simulate_original, mjcf)
     played = [
         play(shot.character, run.motion.times, run.motion.motor_values, mujoco_step)
@@ -146,10 +142,18 @@ def compare(
     theirs = [_largest(result, motion.target_positions) for motion in played]
     apart = _apart(told[1], played[1].target_positions)
     return Row(
-        name, len(shot.character.motors), 1e3 * ours[0], 1e3 * ours[1], ours[1] / ours[0], 1e3 * theirs[0],
-        1e3 * theirs[1], theirs[1] / theirs[0], ours[0] / theirs[0], apart,
-        0.0 if open_mm is None else 1e3 * float(open_mm.max(initial=0.0)),
-    )  # fmt: skip
+        shot=name,
+        motors=len(shot.character.motors),
+        ideal_mm=1e3 * ours[0],
+        optimised_mm=1e3 * ours[1],
+        share=ours[1] / ours[0],
+        mujoco_ideal_mm=1e3 * theirs[0],
+        mujoco_optimised_mm=1e3 * theirs[1],
+        mujoco_share=theirs[1] / theirs[0],
+        told=ours[0] / theirs[0],
+        apart=apart,
+        friction_mm=0.0 if band is None else 1e3 * float(band.max(initial=0.0)),
+    )
 
 
 def _told(shot: CompiledShot, run: Simulation, options: RunSettings) -> Array:
@@ -182,58 +186,16 @@ def _apart(ours: Array, theirs: Array) -> float:
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("motor-commands", __doc__)
-    parser.add_argument(
-        "shots", metavar="SHOT", nargs="+", help="USD file of a robot in a tree whose motors have gains"
-    )
-    parser.add_argument(
-        "--mjcf",
-        metavar="FILE",
-        nargs="+",
-        help="own file of each SHOT's robot, in which MuJoCo plays the commands",
-    )
+    parser.add_argument("shots", metavar="SHOT", nargs="+", help="USD file of a robot whose motors have gains")
+    parser.add_argument("--mjcf", metavar="FILE", nargs="+", help="own file of each SHOT's robot, for MuJoCo")
     parser.add_argument("--seconds", metavar="S", type=float, help="take only the beginning of each shot")
-    parser.add_argument(
-        "--pre-roll", metavar="S", type=float, help="length of the pre-roll of a shot that starts in motion"
-    )
-    output_options(parser)
     options = parser.parse_args(arguments)
     files = options.mjcf or [None] * len(options.shots)
     if len(files) != len(options.shots):
         parser.error(f"--mjcf names {len(files)} files for {len(options.shots)} shots")
-    rows = [
-        compare(Path(path).stem, giving_shot(path, options.seconds), file, pre_roll=options.pre_roll)
-        for path, file in zip(options.shots, files, strict=True)
-    ]
-    if options.json:
-        print(json.dumps([asdict(row) for row in rows]))
-    else:
-        _print(rows)
+    rows = []
+    for path, file in zip(options.shots, files, strict=True):
+        rows.append(compare(Path(path).stem, giving_shot(path, options.seconds), file))
+        keep(options, Row, rows)
+    finish(options, "Largest error of commands", rows)
     return int(not all(row.kept for row in rows))
-
-
-def _print(rows: Sequence[Row]) -> None:
-    from calmotion.cli import console_on, print_table
-
-    heads = [
-        "robot",
-        "motors",
-        "for ideal motors",
-        "with their model",
-        "share",
-        "in MuJoCo",
-        "",
-        "share",
-        "told",
-        "apart",
-        "friction",
-    ]
-    shown = [
-        [
-            row.shot, str(row.motors), f"{row.ideal_mm:.2f} mm", f"{row.optimised_mm:.3f} mm", f"{row.share:.4f}",
-            f"{row.mujoco_ideal_mm:.2f} mm", f"{row.mujoco_optimised_mm:.3f} mm", f"{row.mujoco_share:.4f}",
-            f"{row.told:.3f}", f"{row.apart:.1e}",
-            f"{row.friction_mm:.2f} mm",
-        ]
-        for row in rows
-    ]  # fmt: skip
-    print_table(console_on(sys.stdout), "Largest error of commands", heads, shown)

@@ -9,10 +9,8 @@ be. Ticks are timed on this machine as it is.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 from calmotion.arrays import Array
@@ -20,9 +18,8 @@ from calmotion.model import RunSettings
 from calmotion.simulation import CompiledShot, Curves, modes_of, prepare, shaped
 from calmotion_plugins.live import LiveSettings, Trial
 
-from ..common.parsers import bench_parser, output_options, shots_argument
-from ..common.shots import SAMPLES, load
-from ..common.tables import show
+from ..common.reporting import bench_parser, on_shots
+from ..common.shots import SAMPLES
 
 RATE = 250.0  # of the stream [Hz]
 SHARES = (0.1, 0.2, 0.4, 0.8)  # of the longest period, as look-ahead
@@ -78,37 +75,7 @@ def _row(
     return Row(shot, method, frequencies, late, rms, 1e3 * float(distances.max()), 1e3 * median, 1e3 * p99)
 
 
-HEADS = ("method", "frequencies", "delay", "rms error", "largest error", "tick", "99% of ticks")
-
-
-def cells(rows: list[Row]) -> list[list[str]]:
-    """The table for a person, without its heads."""
-    return [
-        [
-            row.method,
-            f"{row.frequencies:g}",
-            f"{1e3 * row.delay_s:.0f} ms",
-            f"{row.rms_mm:.2f} mm",
-            f"{row.largest_mm:.2f} mm",
-            f"{row.tick_ms:.2f} ms" if row.tick_ms else "",
-            f"{row.tick_99_ms:.2f} ms" if row.tick_99_ms else "",
-        ]
-        for row in rows
-    ]
-
-
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = bench_parser("live", __doc__)
-    shots_argument(parser, SAMPLES)
-    output_options(parser)
-    options = parser.parse_args(arguments)
-    found: list[Row] = []
-    for path in options.shots:
-        own = list(compare(Path(path).stem, load(path)))
-        found += own
-        if not options.json:
-            show(own[0].shot, HEADS, cells(own))
-    if options.json:
-        print(json.dumps([asdict(row) for row in found]))
-    return 0
+    options = bench_parser("live", __doc__, SAMPLES).parse_args(arguments)
+    return on_shots(options, "Streams and shapers", Row, compare)

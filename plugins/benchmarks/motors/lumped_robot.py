@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import ON_ERROR, PRESCRIBED, WORLD, Character, Frame, Joint, Motor
+from calmotion.model import ON_ERROR, PRESCRIBED, WORLD, Character, Frame, Motor
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
@@ -55,15 +55,10 @@ def lumped_mjcf(character: Character, step: float = MUJOCO_STEP) -> str:
     world = xml.SubElement(root, "worldbody")
     elements: dict[int, xml.Element] = {WORLD: world}
     motor_of = {motor.joint: (k, motor) for k, motor in enumerate(character.motors)}
-    waiting = list(range(len(character.joints)))
-    while waiting:
-        ready = [k for k in waiting if character.joints[k].body0 in elements]
-        if not ready:
-            raise _unfit("a body that no joint connects with the world", character.path)
-        for k in ready:
-            joint = character.joints[k]
-            elements[joint.body1] = _body(elements[joint.body0], character, k, motor_of.get(k))
-        waiting = [k for k in waiting if k not in ready]
+    for _ in character.joints:  # another level of the tree each time
+        for k, joint in enumerate(character.joints):
+            if joint.body0 in elements and joint.body1 not in elements:
+                elements[joint.body1] = _body(elements[joint.body0], character, k, motor_of.get(k))
     actuators = xml.SubElement(root, "actuator")
     for k, motor in enumerate(character.motors):
         damping = {} if motor.damping_on == ON_ERROR else _damping(motor)
@@ -163,28 +158,23 @@ def _body(parent: xml.Element, character: Character, number: int, driven: tuple[
 
 
 def _refuse(character: Character) -> None:
-    for joint in character.joints:
-        if joint.closes_chain or joint.redundant:
-            raise _unfit("a joint that closes a chain", joint.path)
-    reached: list[Joint] = []
-    for joint in character.joints:
-        if any(other.body1 == joint.body1 for other in reached):
-            raise _unfit("a body with two joints towards the world", joint.path)
-        reached.append(joint)
-    for body in character.bodies:
-        if body.mass is None or body.flexible is not None:
-            raise _unfit("a flexible link or a body without mass", body.path)
-    for motor in character.motors:
-        if motor.model == PRESCRIBED or motor.follows is not None or np.isfinite(motor.rotor.gear_stiffness):
-            raise _unfit("a motor that is ideal, geared to another, or has a compliant gear", motor.path)
-
-
-def _unfit(what: str, path: str) -> ShotError:
-    return ShotError(
-        f"{what} has no place in the lumped model",
-        path=path,
-        remedy="Compare a robot of rigid bodies in a tree, whose motors have gains",
-    )
+    """Take only rigid bodies in a tree, whose motors have gains and stiff gears of their own."""
+    carried = [joint.body1 for joint in character.joints]
+    unfit = [
+        joint.path for k, joint in enumerate(character.joints) if joint.closes_chain or carried.index(joint.body1) < k
+    ]
+    unfit += [body.path for body in character.bodies if body.mass is None or body.flexible is not None]
+    unfit += [
+        motor.path
+        for motor in character.motors
+        if motor.model == PRESCRIBED or motor.follows is not None or np.isfinite(motor.rotor.gear_stiffness)
+    ]
+    if unfit:
+        raise ShotError(
+            "has no place in the lumped model",
+            path=unfit[0],
+            remedy="Compare a robot of rigid bodies in a tree, whose motors have gains",
+        )
 
 
 def mujoco_module() -> Any:

@@ -22,7 +22,7 @@ _REST = 1e-6  # [rad/s or m/s]
 
 def simulate_original(
     path: str, character: Character, times: Array, commands: Array, step: float = MUJOCO_STEP
-) -> PlayedMotion:  # fmt: skip
+) -> PlayedMotion:
     """The robot of an MJCF file on commands, from the rest in which its actuators hold it at their first ones.
 
     MuJoCo's integrators have errors of first order in their step (a KUKA by steps of 2 ms is 1.3 mm off): motions by
@@ -46,25 +46,23 @@ def simulate_original(
     inner = max(1, int(np.ceil(float(times[1] - times[0]) / min(step, model.opt.timestep) - 1e-9)))
     joints = [_found(model.joint, path, motor.prim_path, "joint") for motor in character.motors]
     actuators = [_actuator(mujoco, model, int(joint.id), path) for joint in joints]
-    bodies = [
-        _found(model.body, path, character.bodies[target.body].path, "body").id for target in character.targets
-    ]  # fmt: skip
+    bodies = [_found(model.body, path, character.bodies[target.body].path, "body").id for target in character.targets]
     places = [int(joint.qposadr[0]) for joint in joints]
-    ends = list(zip(bodies, character.targets, strict=True))
-
-    def played(inner: int) -> PlayedMotion:
-        return _played(mujoco, model, (places, actuators, ends), times, commands, inner)
-
-    coarse, fine = played(inner), played(2 * inner)
+    found = places, actuators, list(zip(bodies, character.targets, strict=True))
+    coarse, fine = (_played(mujoco, model, found, times, commands, parts) for parts in (inner, 2 * inner))
     return PlayedMotion(
         2.0 * fine.motor_values - coarse.motor_values, 2.0 * fine.target_positions - coarse.target_positions
     )
 
 
 def _played(
-    mujoco: Any, model: Any, found: tuple[list[int], list[int], list[tuple[int, Target]]], times: Array,
-    commands: Array, inner: int,
-) -> PlayedMotion:  # fmt: skip
+    mujoco: Any,
+    model: Any,
+    found: tuple[list[int], list[int], list[tuple[int, Target]]],
+    times: Array,
+    commands: Array,
+    inner: int,
+) -> PlayedMotion:
     """The motion by so many steps between two times; the places of the joints, their actuators, and bodies' targets."""
     places, actuators, ends = found
     model.opt.timestep = float(times[1] - times[0]) / inner

@@ -10,11 +10,10 @@ was not at full tempo.
 
 from __future__ import annotations
 
-import json
-import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,7 @@ from calmotion.retargeting import find_tempo, optimize_with_tempo, tempo_input
 from calmotion.simulation import CompiledShot, simulate_shot
 from calmotion.tolerance import found_tracks
 
-from ..common.parsers import bench_parser, output_options, shots_argument
+from ..common.reporting import bench_parser, finish, keep, say
 from ..common.shots import SAMPLES, load
 
 QUANTITIES = ("velocity", "effort")
@@ -122,10 +121,8 @@ def measure(name: str, shot: CompiledShot, quantity: str, share: float, full: tu
     found = find_tempo(given, TempoSettings(slowest=SLOWEST), shot.character.path)
     added = 0.0 if found.map is None else found.map.added
     toppra = toppra_added(limited) if quantity == "velocity" else np.nan
-    row = Row(
-        name, quantity, share, found.report.lower_bound, toppra, added, found.report.uniform_added,
-        tolerance_mm=1e3 * tolerance_of(shot.character, None),
-    )  # fmt: skip
+    bounds = found.report.lower_bound, toppra, added, found.report.uniform_added
+    row = Row(name, quantity, share, *bounds, tolerance_mm=1e3 * tolerance_of(shot.character, None))
     if full is None:
         return row
     begin = time.process_time()
@@ -136,11 +133,15 @@ def measure(name: str, shot: CompiledShot, quantity: str, share: float, full: tu
     assert result.after is not None and result.retimed is not None
     tempo = result.retimed.animation.tempo
     return replace(
-        row, added_s=0.0 if tempo is None else tempo.added, full_tempo_mm=1e3 * full[0],
+        row,
+        added_s=0.0 if tempo is None else tempo.added,
+        full_tempo_mm=1e3 * full[0],
         before_mm=1e3 * _largest(result.before.position_errors[result.before.motion.judged]),
         after_mm=1e3 * _largest(result.after.position_errors[result.after.motion.judged]),
-        excess=excess_of(limited, result, quantity), full_tempo_cpu_s=full[1], cpu_s=spent,
-    )  # fmt: skip
+        excess=excess_of(limited, result, quantity),
+        full_tempo_cpu_s=full[1],
+        cpu_s=spent,
+    )
 
 
 def excess_of(limited: CompiledShot, result: Result, quantity: str) -> float:
@@ -153,9 +154,8 @@ def excess_of(limited: CompiledShot, result: Result, quantity: str) -> float:
         reached = np.abs(np.diff(values, axis=0)).max(axis=0) / (times[1] - times[0])
         return float(np.max(reached / [motor.max_velocity for motor in motors])) - 1.0
     finer = RunSettings(step=0.25 * result.step_s, pre_roll=result.pre_roll_s, integrator="newmark")
-    run = simulate_shot(
-        performance.with_tracks(found_tracks(result, animation)), finer, lambda fraction, message: None
-    ).before.motion  # fmt: skip
+    played = performance.with_tracks(found_tracks(result, animation))
+    run = simulate_shot(played, finer, lambda fraction, message: None).before.motion
     efforts = np.abs(run.motor_efforts[run.judged]).max(axis=0)
     return float(np.max(efforts / [motor.max_torque for motor in motors])) - 1.0
 
@@ -197,41 +197,21 @@ def _at_full_tempo(shot: CompiledShot) -> tuple[float, float]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command."""
-    parser = bench_parser("tempo", __doc__)
-    shots_argument(parser, SAMPLES)
+    parser = bench_parser("tempo", __doc__, SAMPLES)
     parser.add_argument("--shares", metavar="SHARE", type=float, nargs="+", default=SHARES)
     parser.add_argument("--limits", metavar="QUANTITY", nargs="+", choices=QUANTITIES, default=QUANTITIES)
     parser.add_argument("--tempo-only", action="store_true", help="find the tempo of the rigid robot, and no curves")
-    output_options(parser)
     options = parser.parse_args(arguments)
     rows, failed = [], False
     for path in options.shots:
-        shot = load(path)
+        name, shot = Path(path).stem, load(path)
         full = None if options.tempo_only else _at_full_tempo(shot)
-        for quantity in options.limits:
-            for share in options.shares:
-                try:
-                    rows.append(measure(Path(path).stem, shot, quantity, share, full))
-                except ShotError as error:
-                    failed = True
-                    print(f"{Path(path).stem}, {quantity} {share:g}: {error}", file=sys.stderr)
-    if options.json:
-        print(json.dumps([asdict(row) for row in rows]))
-    else:
-        _print(rows)
+        for quantity, share in product(options.limits, options.shares):
+            try:
+                rows.append(measure(name, shot, quantity, share, full))
+            except ShotError as error:
+                failed = True
+                say(f"{name}, {quantity} {share:g}: {error}")
+            keep(options, Row, rows)
+    finish(options, "Added time, and largest errors", rows)
     return int(failed or not all(row.kept for row in rows))
-
-
-def _print(rows: Sequence[Row]) -> None:
-    from calmotion.cli import console_on, print_table
-
-    heads = ["shot", "limit", "bound", "TOPP-RA", "added", "uniform", "full tempo", "retimed", "found", "excess", "CPU"]
-    shown = [
-        [
-            row.shot, f"{row.quantity} {row.share:.0%}", f"{row.lower_bound_s:.3f} s", f"{row.toppra_s:.3f} s",
-            f"{row.added_s:.3f} s", f"{row.uniform_s:.2f} s", f"{row.full_tempo_mm:.2f} mm", f"{row.before_mm:.1f} mm",
-            f"{row.after_mm:.2f} mm", f"{row.excess:.1e}", f"{row.full_tempo_cpu_s:.0f}, {row.cpu_s:.0f} s",
-        ]
-        for row in rows
-    ]  # fmt: skip
-    print_table(console_on(sys.stdout), "Added time, and largest errors", heads, shown)

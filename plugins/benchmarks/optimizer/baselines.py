@@ -7,9 +7,7 @@ animation and, since shapers delay the motion, against the animation with the de
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 from calmotion.arrays import Array
@@ -17,9 +15,8 @@ from calmotion.model import SHAPERS, RunSettings
 from calmotion.retargeting import RetargetProblem, damping_homotopy, minimize
 from calmotion.simulation import CompiledShot, Curves, Simulator, best_delay, delay, modes_of, prepare, shaped
 
-from ..common.parsers import bench_parser, output_options, shots_argument
-from ..common.shots import SAMPLES, load
-from ..common.tables import show
+from ..common.reporting import bench_parser, on_shots
+from ..common.shots import SAMPLES
 from .optimizer import make_problem
 
 
@@ -72,39 +69,18 @@ def _row(shot: str, method: str, late: float, problem: RetargetProblem, curves: 
     best, delayed = best_delay(positions, intended, grid.judged, grid.h)
     change = np.abs(curves.angles - problem.curves.angles)[judged].max()
     return Row(
-        shot, method, late, 1e3 * float(now.max()), 1e3 * float(np.sqrt(np.mean(now**2, axis=0)).max()),
-        best, 1e3 * float(delayed.max()), float(np.degrees(change)),
-    )  # fmt: skip
-
-
-HEADS = (
-    "method", "delay", "largest error", "rms error", "least error, animation delayed", "by", "curves change by",
-)  # fmt: skip
-
-
-def cells(rows: list[Row]) -> list[list[str]]:
-    """The table for a person, without its heads."""
-    return [
-        [
-            row.method, f"{1e3 * row.delay_s:.0f} ms", f"{row.largest_mm:.2f} mm", f"{row.rms_mm:.2f} mm",
-            f"{row.delayed_largest_mm:.2f} mm", f"{1e3 * row.best_delay_s:.0f} ms", f"{row.change_deg:.1f}°",
-        ]
-        for row in rows
-    ]  # fmt: skip
+        shot=shot,
+        method=method,
+        delay_s=late,
+        largest_mm=1e3 * float(now.max()),
+        rms_mm=1e3 * float(np.sqrt(np.mean(now**2, axis=0)).max()),
+        best_delay_s=best,
+        delayed_largest_mm=1e3 * float(delayed.max()),
+        change_deg=float(np.degrees(change)),
+    )
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = bench_parser("baselines", __doc__)
-    shots_argument(parser, SAMPLES)
-    output_options(parser)
-    options = parser.parse_args(arguments)
-    found: list[Row] = []
-    for path in options.shots:
-        own = compare(Path(path).stem, load(path))
-        found += own
-        if not options.json:
-            show(own[0].shot, HEADS, cells(own))
-    if options.json:
-        print(json.dumps([asdict(row) for row in found]))
-    return 0
+    options = bench_parser("baselines", __doc__, SAMPLES).parse_args(arguments)
+    return on_shots(options, "Shapers, a filter and optimised curves", Row, compare)

@@ -8,12 +8,10 @@ continuous objective).
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle
-from pathlib import Path
 
 import numpy as np
 from calmotion.arrays import Array
@@ -21,9 +19,8 @@ from calmotion.model import RunSettings
 from calmotion.retargeting import Evaluation, RetargetProblem
 from calmotion.simulation import CompiledShot, prepare
 
-from ..common.parsers import bench_parser, output_options, shots_argument
-from ..common.shots import SAMPLES, load
-from ..common.tables import show
+from ..common.reporting import bench_parser, on_shots
+from ..common.shots import SAMPLES
 from ..common.timing import median_time
 from .optimizer import make_problem
 
@@ -33,7 +30,6 @@ COARSEST = 1.0 / 240.0
 DIRECTIONS = 3
 SIZE = 5e-4  # of an unknown in a difference [rad]
 REPEATS = 3
-HEADS = ("adjoint", "step", "simulation", "gradient", "error, same step", "floor", "error, finest step")
 
 
 @dataclass(frozen=True)
@@ -108,29 +104,7 @@ def _differences(problem: RetargetProblem, directions: Array) -> tuple[Array, fl
     return values, float(np.max(np.abs(values - other)) / np.max(np.abs(values)))
 
 
-def cells(rows: list[GradientError]) -> list[list[str]]:
-    """The table for a person, without its heads."""
-    return [
-        [
-            row.adjoint, f"1/{1.0 / row.step_s:.0f} s", f"{row.forward_s:.3f} s", f"{row.gradient_s:.3f} s",
-            f"{row.same_step:.1e}", f"{row.floor:.1e}", f"{row.fine:.1e}",
-        ]
-        for row in rows
-    ]  # fmt: skip
-
-
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = bench_parser("gradients", __doc__)
-    shots_argument(parser, SAMPLES[:1])
-    output_options(parser)
-    options = parser.parse_args(arguments)
-    measured: list[GradientError] = []
-    for path in options.shots:
-        own = errors(Path(path).stem, load(path))
-        measured += own
-        if not options.json:
-            show(f"{own[0].shot}: gradients against central differences", HEADS, cells(own))
-    if options.json:
-        print(json.dumps({"gradients": [asdict(row) for row in measured]}))
-    return 0
+    options = bench_parser("gradients", __doc__, SAMPLES[:1]).parse_args(arguments)
+    return on_shots(options, "Gradients against central differences", GradientError, errors)

@@ -7,11 +7,9 @@ same shot in the same run.
 
 from __future__ import annotations
 
-import json
 import time
 from contextlib import suppress
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 from calmotion.arrays import Array
@@ -39,9 +37,8 @@ from calmotion.simulation import (
 )
 from scipy.optimize import minimize as quasi_newton
 
-from ..common.parsers import bench_parser, output_options, shots_argument
-from ..common.shots import SAMPLES, load
-from ..common.tables import show
+from ..common.reporting import bench_parser, on_shots
+from ..common.shots import SAMPLES
 from ..common.timing import median_time
 
 CLOSE = 1.01  # objectives within this factor of the converged one count as reached
@@ -113,17 +110,23 @@ def compare(name: str, shot: CompiledShot, lbfgs: int) -> list[Convergence]:
         at = problem.at(x)
         objective = at.merit
         return Convergence(
-            name, method, forward, objective, converged, before, _largest(at), evaluations, products,
-            reached, None if reached is None else reached / forward,
-        )  # fmt: skip
+            shot=name,
+            method=method,
+            forward_s=forward,
+            objective=objective,
+            converged=converged,
+            largest_before_mm=before,
+            largest_after_mm=_largest(at),
+            evaluations=evaluations,
+            products=products,
+            seconds=reached,
+            simulations=None if reached is None else reached / forward,
+        )
 
     found, trace = _gauss_newton(make_problem(shot, prepared, SPACING), prepared, 5e-6)
     rows = [row("Gauss-Newton", trace, found.x, found.evaluations, found.products)]
     best, trace = _lbfgs(make_problem(shot, prepared, SPACING), lbfgs, CLOSE * converged)
     rows.append(row("L-BFGS", trace, best, len(trace), 0))
-    if rows[1].seconds is None:
-        # the time it was given, as a bound from below
-        rows.append(row("L-BFGS, time spent", [(trace[-1][0], 0.0)], best, len(trace), 0))
     return rows
 
 
@@ -187,34 +190,9 @@ def _lbfgs(problem: RetargetProblem, most: int, enough: float) -> tuple[Array, l
     return best, trace
 
 
-HEADS = ("method", "largest error", "objective / converged", "simulations", "products", "cost to 1% [simulations]")
-
-
-def cells(rows: list[Convergence]) -> list[list[str]]:
-    """The table for a person, without its heads."""
-    return [
-        [
-            row.method, f"{row.largest_before_mm:.1f} -> {row.largest_after_mm:.2f} mm",
-            f"{row.objective / row.converged:.4g}", str(row.evaluations), str(row.products),
-            "-" if row.simulations is None else f"{row.simulations:.1f}",
-        ]
-        for row in rows
-    ]  # fmt: skip
-
-
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = bench_parser("optimizer", __doc__)
-    shots_argument(parser, SAMPLES[:1])
-    output_options(parser)
+    parser = bench_parser("optimizer", __doc__, SAMPLES[:1])
     parser.add_argument("--lbfgs", type=int, default=400, help="most evaluations of L-BFGS")
     options = parser.parse_args(arguments)
-    converged: list[Convergence] = []
-    for path in options.shots:
-        own = compare(Path(path).stem, load(path), options.lbfgs)
-        converged += own
-        if not options.json:
-            show(f"{own[0].shot}: convergence", HEADS, cells(own))
-    if options.json:
-        print(json.dumps({"convergence": [asdict(row) for row in converged]}))
-    return 0
+    return on_shots(options, "Convergence", Convergence, lambda name, shot: compare(name, shot, options.lbfgs))

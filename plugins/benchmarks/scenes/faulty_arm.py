@@ -103,13 +103,12 @@ class FaultyArm:
         area = DENSITY * self.thickness**2
         return area * self.upper, area * self.fore
 
-    def shot(self, cells: int = 12, across: int = 2, real: bool = False, base: float = 0.0) -> CompiledShot:
+    def shot(self, cells: int = 12, across: int = 2, real: bool = False) -> CompiledShot:
         """The arm in our engine.
 
         Args:
             cells, across: Elements along and across the fore link.
             real: With the real modulus and gains that act, else as the model knows it.
-            base: Frequency of rocking about both level axes [Hz]; 0: none.
         """
         modulus = self.modulus * (1.0 if real else self.misjudged**2)
         material = ElasticMaterial("/Arm/Plastic", modulus, POISSON, DENSITY, self.DAMPING)
@@ -146,7 +145,6 @@ class FaultyArm:
         target = Target("/Arm/Load", 3, _at(0.0))
         down = np.array([0.0, 0.0, -9.81])
         character = Character("/Arm", tuple(bodies), tuple(joints), tuple(motors), (target,), down)
-        del base
         points, tets = beam_mesh(self.fore, t, cells, across)
         meshes = FEMeshes((FEMesh(2, points, tets, MeshQuality(0.0, 0.0, 0.0)),))
         frames = _frames(self.times)

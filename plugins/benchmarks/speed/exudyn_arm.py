@@ -7,7 +7,6 @@ mesh, one thread. Each is measured against itself with a fine step, so that only
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,11 +24,11 @@ LEVELS = (1e-4, 1e-5)  # errors of the tip [m] at which run times are compared
 
 @dataclass(frozen=True)
 class Run:
-    """One simulation: steps, largest error of the tip at the samples [m], and run time [s]."""
+    """One simulation: steps, largest error of the tip at the samples, and run time [s]."""
 
     code: str
     steps: int
-    error: float
+    error_m: float
     wall_s: float
 
 
@@ -42,8 +41,6 @@ def quarter_turn(t: float) -> float:
 class Exudyn(Arm):
     """The arm in Exudyn, in the motion of the comparison."""
 
-    steps, fine = STEPS, FINE
-
     def run(self, steps: int) -> tuple[Array, float]:
         """Tip at the samples [m], shape [s, 3], and the run time [s]."""
         done = self.performed(steps, quarter_turn, DURATION, SAMPLES)
@@ -53,13 +50,16 @@ class Exudyn(Arm):
 class Ours:
     """The arm here, by one integrator."""
 
-    steps, fine = STEPS, FINE
-
     def __init__(self, integrator: str):
         character, meshes = beam_arm(
-            length=Arm.LENGTH, thickness=Arm.THICKNESS, payload=Arm.PAYLOAD, modes=6 + Arm.FIXED_MODES,
-            elasticity="linear", gravity=0.0, cells=Arm.CELLS,
-        )  # fmt: skip
+            length=Arm.LENGTH,
+            thickness=Arm.THICKNESS,
+            payload=Arm.PAYLOAD,
+            modes=6 + Arm.FIXED_MODES,
+            elasticity="linear",
+            gravity=0.0,
+            cells=Arm.CELLS,
+        )
         settings = character.bodies[0].flexible
         assert settings is not None
         link = replace(character.bodies[0], flexible=replace(settings, material=Arm.MATERIAL))
@@ -75,13 +75,14 @@ class Ours:
         return run.target_positions[:: steps // SAMPLES, 0][1:], run.trajectory.wall_s
 
 
-def compare(peers: Mapping[str, Any], repeats: int = 3) -> list[Run]:
-    """Work and precision of other codes, by name, and of ours; nothing without others."""
+def compare(repeats: int = 3) -> list[Run]:
+    """Work and precision of Exudyn and of ours."""
+    codes: dict[str, Any] = {"exudyn": Exudyn()}
+    codes |= {f"ours, {name}": Ours(name) for name in ("bdf2", "generalized-alpha")}
     results = []
-    ours = {f"ours, {name}": Ours(name) for name in ("bdf2", "generalized-alpha")} if peers else {}
-    for name, code in {**peers, **ours}.items():
-        exact, _ = code.run(code.fine)
-        for steps in code.steps:
+    for name, code in codes.items():
+        exact, _ = code.run(FINE)
+        for steps in STEPS:
             runs = [code.run(steps) for _ in range(repeats)]
             error = float(np.linalg.norm(runs[0][0] - exact, axis=1).max())
             results.append(Run(name, steps, error, float(np.median([wall for _, wall in runs]))))
@@ -90,7 +91,7 @@ def compare(peers: Mapping[str, Any], repeats: int = 3) -> list[Run]:
 
 def time_at(runs: list[Run], code: str, error: float) -> float:
     """Run time of a code at an error [s], by interpolation (or continuation) of logarithms."""
-    selected = sorted((run for run in runs if run.code == code), key=lambda run: run.error)
-    errors, walls = np.log([run.error for run in selected]), np.log([run.wall_s for run in selected])
+    selected = sorted((run for run in runs if run.code == code), key=lambda run: run.error_m)
+    errors, walls = np.log([run.error_m for run in selected]), np.log([run.wall_s for run in selected])
     slope = np.polyfit(errors, walls, 1)
     return float(np.exp(np.polyval(slope, np.log(error))))

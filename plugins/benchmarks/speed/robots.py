@@ -14,24 +14,21 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from calmotion import ShotError
 
-from ..common.parsers import bench_parser, output_options
-from ..common.tables import finish, say, write_rows
+from ..common.reporting import bench_parser, finish, keep, say
+from ..scenes.links import POLYAMIDE, Link, read_links
+from .stages import OPERATORS
 
 SECONDS, RATE = 2.0, 60.0  # length of the motion [s], and its frames [1/s]
 TURN = 40.0  # of a joint, where its limits allow it [deg]
 LINKS = 2
-POLYAMIDE = 1.8e9, 0.35, 1200.0  # Young's modulus [Pa], Poisson's ratio, density [kg/m^3], for stages in metres
-STAGES = {
-    "usd.read": "read", "accuracy.analyse": "analyse", "fe.mesh": "mesh", "fem.reduce": "reduce",
-    "accuracy.refine": "refine", "retarget.optimize": "search",
-}  # fmt: skip
+STAGES = ("read", "analyse", "mesh", "reduce", "refine", "search")
 
 
 @dataclass(frozen=True)
@@ -41,25 +38,25 @@ class RobotRow:
     Attributes:
         robot: Name of its file.
         links: Its flexible links.
-        read, analyse, mesh, reduce, refine, search: Processor time of each stage [s].
-        total: Of all [s].
-        memory: At most [GB].
-        before, after: Largest error as animated, and optimised [mm].
+        read_s, analyse_s, mesh_s, reduce_s, refine_s, search_s: Processor time of each stage.
+        total_s: Of all.
+        memory_gb: At most.
+        before_mm, after_mm: Largest error as animated, and optimised.
         verdict: Whether the simulation keeps its tolerance, or what went wrong.
     """
 
     robot: str
     links: str
-    read: float = np.nan
-    analyse: float = np.nan
-    mesh: float = np.nan
-    reduce: float = np.nan
-    refine: float = np.nan
-    search: float = np.nan
-    total: float = np.nan
-    memory: float = np.nan
-    before: float = np.nan
-    after: float = np.nan
+    read_s: float = np.nan
+    analyse_s: float = np.nan
+    mesh_s: float = np.nan
+    reduce_s: float = np.nan
+    refine_s: float = np.nan
+    search_s: float = np.nan
+    total_s: float = np.nan
+    memory_gb: float = np.nan
+    before_mm: float = np.nan
+    after_mm: float = np.nan
     verdict: str = ""
 
 
@@ -71,6 +68,8 @@ def measure(file: str, links: int, patience: float) -> RobotRow:
         links: How many of its links become flexible.
         patience: After which it is ended [s].
     """
+    from calmotion.support import kernel_folder
+
     name = Path(file).stem
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -79,12 +78,12 @@ def measure(file: str, links: int, patience: float) -> RobotRow:
             return RobotRow(name, "", verdict=str(problem))
         told = ", ".join(path.rpartition("/")[2] for path in chosen)
         command = [sys.executable, "-m", "calmotion", "optimize", f"{folder}/shot.usda", "-o", f"{folder}/calm.usda"]
-        environment = dict(os.environ, CALMOTION_CACHE=f"{folder}/cache", NUMBA_CACHE_DIR=_kernels())
+        environment = dict(os.environ, CALMOTION_CACHE=f"{folder}/cache", NUMBA_CACHE_DIR=str(kernel_folder()))
         try:
-            done = subprocess.run([*command, "--json"], capture_output=True, text=True, env=environment,
-                                  check=False, timeout=patience)  # fmt: skip
-            found = json.loads(done.stdout)
-            return _row(name, told, found)
+            done = subprocess.run(
+                [*command, "--json"], capture_output=True, text=True, env=environment, check=False, timeout=patience
+            )
+            return _row(name, told, json.loads(done.stdout))
         except subprocess.TimeoutExpired:
             return RobotRow(name, told, verdict=f"not ended after {patience:g} s")
         except (json.JSONDecodeError, KeyError):
@@ -93,21 +92,20 @@ def measure(file: str, links: int, patience: float) -> RobotRow:
 
 
 def _row(name: str, links: str, found: dict[str, Any]) -> RobotRow:
-    used = {STAGES.get(row["operator"], ""): row["processor_s"] for row in found["operators"]}
-    total = sum(row["processor_s"] for row in found["operators"])
-    verdict = "kept" if found["tolerance_kept"] else f"not kept: {found['tolerance_missed_by']}"
+    used = dict.fromkeys(STAGES, 0.0)
+    for row in found["operators"]:
+        stage = OPERATORS.get(row["operator"], "other")
+        used[stage] = used.get(stage, 0.0) + row["processor_s"]
     return RobotRow(
-        name, links, **{stage: used.get(stage, 0.0) for stage in STAGES.values()}, total=total,
-        memory=found["peak_memory_gb"] or np.nan, before=1e3 * found["max_error_before_m"],
-        after=1e3 * found["max_error_after_m"], verdict=verdict,
-    )  # fmt: skip
-
-
-def _kernels() -> str:
-    """Folder of compiled kernels that all robots share."""
-    from calmotion.support import kernel_folder
-
-    return str(kernel_folder())
+        name,
+        links,
+        **{f"{stage}_s": used[stage] for stage in STAGES},
+        total_s=sum(used.values()),
+        memory_gb=found["peak_memory_gb"] or np.nan,
+        before_mm=1e3 * found["max_error_before_m"],
+        after_mm=1e3 * found["max_error_after_m"],
+        verdict="kept" if found["tolerance_kept"] else f"not kept: {found['tolerance_missed_by']}",
+    )
 
 
 def compose(file: str, out: Path, links: int) -> list[str]:
@@ -127,8 +125,9 @@ def compose(file: str, out: Path, links: int) -> list[str]:
     from pxr import Sdf, Usd, UsdGeom, UsdPhysics
 
     joints = list(_driven(robot))
-    sized = sorted({(round(_length(robot, body), 6), body) for _, body in joints if _length(robot, body)}, reverse=True)
-    chosen = [body for _, body in sized[:links]]
+    solid = {link.body.path: _length(link) for link in read_links(file) if link.body.surfaces}
+    carried = sorted({body for _, body in joints} & solid.keys(), key=lambda body: (solid[body], body), reverse=True)
+    chosen = carried[:links]
     if not chosen:
         raise ShotError("no driven joint carries a link with a surface", path=file, remedy="Name another robot")
     layer = Sdf.Layer.CreateNew(str(out))
@@ -157,7 +156,8 @@ def _make_flexible(stage: Any, bodies: Sequence[str]) -> None:
     material = UsdShade.Material.Define(stage, stage.GetDefaultPrim().GetPath().AppendChild("BenchPolyamide"))
     prim = material.GetPrim()
     prim.AddAppliedSchema("PhysicsVolumeDeformableMaterialAPI")
-    for name, value in zip(("youngsModulus", "poissonsRatio", "density"), POLYAMIDE, strict=True):
+    material_of = {"youngsModulus": POLYAMIDE.youngs_modulus, "poissonsRatio": POLYAMIDE.poissons_ratio}
+    for name, value in (material_of | {"density": POLYAMIDE.density}).items():
         prim.CreateAttribute(f"physics:{name}", Sdf.ValueTypeNames.Float).Set(value)
     for body in bodies:
         link = stage.GetPrimAtPath(body)
@@ -205,19 +205,10 @@ def _farthest(stage: Any, bodies: Sequence[str]) -> str:
     return max(bodies, key=depth)
 
 
-def _length(stage: Any, body: str) -> float:
-    """Longest side of the surfaces of a body alone, without the bodies below it, in stage units."""
-    from pxr import Usd, UsdGeom, UsdPhysics
-
-    prim, cache = stage.GetPrimAtPath(body), UsdGeom.BBoxCache(0.0, ["default", "render"])
-    longest, walk = 0.0, iter(Usd.PrimRange(prim, Usd.TraverseInstanceProxies()))
-    for own in walk:
-        if own != prim and own.HasAPI(UsdPhysics.RigidBodyAPI):
-            walk.PruneChildren()
-        elif own.IsA(UsdGeom.Mesh):
-            size = cache.ComputeUntransformedBound(own).GetRange().GetSize()
-            longest = max(longest, *size)
-    return longest
+def _length(link: Link) -> float:
+    """Longest side of the surfaces of a body, to a micrometre [m]."""
+    points = np.concatenate([surface.points for surface in link.body.surfaces])
+    return round(float(np.ptp(points, axis=0).max()), 6)
 
 
 def _animate(prim: Any) -> None:
@@ -244,19 +235,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("files", metavar="FILE", nargs="+", help="USD file of a robot")
     parser.add_argument("--links", type=int, default=LINKS, help=f"links that become flexible (default: {LINKS})")
     parser.add_argument("--patience", type=float, default=1800.0, help="after which a robot is ended [s]")
-    output_options(parser, csv="the rows", markdown=True)
     options = parser.parse_args(arguments)
     rows = []
     for file in options.files:
         rows.append(measure(file, options.links, options.patience))
-        say(f"{rows[-1].robot}: {rows[-1].total:.1f} s, {rows[-1].verdict}")
-        if options.csv:
-            write_rows(options.csv, RobotRow, rows)
-    heads = [field.name for field in fields(RobotRow)]
-    table = [[_cell(getattr(row, head)) for head in heads] for row in rows]
-    finish(options, "Robots, processor time in seconds", heads, table, [asdict(row) for row in rows], texts=2)
+        say(f"{rows[-1].robot}: {rows[-1].total_s:.1f} s, {rows[-1].verdict}")
+        keep(options, RobotRow, rows)
+    finish(options, "Robots, processor time", rows)
     return 0
-
-
-def _cell(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -1,12 +1,12 @@
-"""Growth of the run time with bodies, duration and modes, and comparison with Exudyn and MuJoCo.
+"""Growth of the run time with bodies, duration and modes, and comparison with Exudyn.
 
-`calmotion bench scaling [--quick] [--json]` measures, in one run and with one thread,
+`calmotion bench scaling [--quick]` measures, in one run and with one thread,
 
 - time per step of chains of 4 to 128 flexible links, of 1,000 to 100,000 steps, and of 4 to 64 modes in a link, with
   the exponents of their growth;
 - a step of a tree of 14 flexible bodies of 10 modes;
-- where they are installed (the optional extra `bench`), the swung arm against Exudyn's reduced flexible bodies and
-  against a chain of as many rigid segments in MuJoCo, at equal error.
+- where it is installed (the optional extra `bench`), the swung arm against Exudyn's reduced flexible bodies, at equal
+  error.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 from calmotion.arrays import Array
@@ -34,11 +33,10 @@ from calmotion.multibody import (
 )
 from calmotion.testing import branched_links, link_chain
 
-from ..common.parsers import bench_parser, output_options
-from ..common.tables import show
+from ..common.reporting import bench_parser, cells_of, heads_of, keep, show
 from ..common.timing import median_time
+from .exudyn_arm import LEVELS, Run, compare, time_at
 
-NAMES = {"exudyn": "Exudyn's reduced body", "mujoco": "MuJoCo's chain"}
 STEP = 1.0 / 480.0
 BODIES, DURATIONS, MODES = (4, 8, 16, 32, 64, 128), (1_000, 10_000, 100_000), (4, 8, 16, 32, 64)
 
@@ -88,9 +86,10 @@ def growths(
     lasting = [steps * step_time(one, steps, 3 if steps < 50_000 else 1) for steps in durations]
     rich = [step_time(prepared(*link_chain(1, count, 12)), 400) for count in modes]
     return [
-        Growth("bodies", tuple(bodies), tuple(chains)), Growth("steps", tuple(durations), tuple(lasting)),
+        Growth("bodies", tuple(bodies), tuple(chains)),
+        Growth("steps", tuple(durations), tuple(lasting)),
         Growth("modes in a body", tuple(modes), tuple(rich)),
-    ]  # fmt: skip
+    ]
 
 
 @one_blas_thread()
@@ -98,68 +97,32 @@ def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("scaling", __doc__)
     parser.add_argument("--quick", action="store_true", help="fewer and smaller sizes")
-    output_options(parser)
     options = parser.parse_args(arguments)
     measured = growths((4, 8, 16, 32), (1_000, 5_000), (4, 8, 16, 32)) if options.quick else growths()
     tree = step_time(prepared(*branched_links()), 400)
-    peers = [] if options.quick else _peers()
-    if options.json:
-        print(json.dumps(_report(measured, tree, peers)))
-    else:
-        _print(measured, tree, peers)
-    return 0
-
-
-def _peers() -> list[Any]:
-    """The swung arm by the codes that are installed, and by ours."""
-    from . import exudyn_arm, mujoco_arm
-
-    codes: dict[str, Any] = {}
-    if find_spec("exudyn") is not None:
-        codes["exudyn"] = exudyn_arm.Exudyn()
-    if find_spec("mujoco") is not None:
-        codes["mujoco"] = mujoco_arm.MujocoChain()
-    return exudyn_arm.compare(codes)
-
-
-def _times_faster(peers: list[Any], peer: str) -> list[dict[str, Any]]:
-    """Run time of a peer over that of each of our integrators, at equal errors; empty without the peer."""
-    from .exudyn_arm import LEVELS, time_at
-
-    codes = list(dict.fromkeys(run.code for run in peers))
-    return [
-        {"code": code, "error_m": level, "ratio": time_at(peers, peer, level) / time_at(peers, code, level)}
-        for code in codes
-        if code not in NAMES and peer in codes
+    runs = [] if options.quick or find_spec("exudyn") is None else compare()
+    keep(options, Run, runs)
+    faster = [
+        {"code": code, "error_m": level, "ratio": time_at(runs, "exudyn", level) / time_at(runs, code, level)}
+        for code in dict.fromkeys(run.code for run in runs if run.code != "exudyn")
         for level in LEVELS
     ]
-
-
-def _report(measured: Sequence[Growth], tree: float, peers: list[Any]) -> dict[str, Any]:
-    return {
-        "growth": [asdict(growth) | {"exponent": growth.exponent} for growth in measured],
-        "tree_step_s": tree,
-        "exudyn": [asdict(run) for run in peers if run.code != "mujoco"],
-        "times_faster_than_exudyn": _times_faster(peers, "exudyn"),
-        "mujoco": [asdict(run) for run in peers if run.code == "mujoco"],
-        "times_faster_than_mujoco": _times_faster(peers, "mujoco"),
-    }
-
-
-def _print(measured: Sequence[Growth], tree: float, peers: list[Any]) -> None:
-    report = _report(measured, tree, peers)
+    if options.json:
+        found = {
+            "growth": [asdict(growth) | {"exponent": growth.exponent} for growth in measured],
+            "tree_step_s": tree,
+            "exudyn": [asdict(run) for run in runs],
+            "times_faster_than_exudyn": faster,
+        }
+        print(json.dumps(found))
+        return 0
     for growth in measured:
-        shown = [
-            [f"{value:,}", f"{1e6 * seconds:,.0f}"]
-            for value, seconds in zip(growth.values, growth.seconds, strict=True)
-        ]
-        show(f"{growth.name}: exponent {growth.exponent:.2f}", [growth.name, "time [us]"], shown, texts=0)
+        cells = [[str(v), f"{1e6 * seconds:.0f}"] for v, seconds in zip(growth.values, growth.seconds, strict=True)]
+        show(f"{growth.name}: exponent {growth.exponent:.2f}", [growth.name, "time [us]"], cells)
     print(f"a step of 14 bodies of 10 modes: {1e6 * tree:.0f} us")
-    missing = [title for code, title in NAMES.items() if code not in {run.code for run in peers}]
-    if missing:
-        print(f"not compared: {', '.join(missing)}; install the extra `bench`, and leave out --quick")
-    shown = [[run.code, str(run.steps), f"{run.error:.1e}", f"{run.wall_s:.4f}"] for run in peers]
-    show("The swung arm, 14 coordinates", ["code", "steps", "error [m]", "time [s]"], shown)
-    for code, title in NAMES.items():
-        for row in report[f"times_faster_than_{code}"]:
-            print(f"{row['code']}: {row['ratio']:.3g} times as fast as {title} at an error of {row['error_m']:.0e} m")
+    if not runs:
+        print("not compared with Exudyn: install the extra `bench`, and leave out --quick")
+    show("The swung arm, 14 coordinates", heads_of(Run), [cells_of(run) for run in runs])
+    for row in faster:
+        print(f"{row['code']}: {row['ratio']:.3g} times as fast as Exudyn at an error of {row['error_m']:.0e} m")
+    return 0

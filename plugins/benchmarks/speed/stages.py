@@ -10,30 +10,34 @@ from __future__ import annotations
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from calmotion import ShotError
 from calmotion.host import OperatorResult
 from calmotion.model import OutputPaths, RunSettings
 from calmotion.support import compiling
 from calmotion.tolerance import simulate_at
 from calmotion.workflow import optimize
 
-from ..common.parsers import bench_parser, shots_argument
+from ..common.reporting import bench_parser, finish, keep
 from ..common.shots import SAMPLES, load
-from ..common.tables import markdown
 from ..common.timing import processor_time
 
-STAGES = ("read", "analyse", "mesh", "reduce", "search", "write", "compile")
-_TIMES = 3
-# what is named nowhere here is `other`
+REPEATS = 3  # of the single simulation; the fastest counts
+# the stages of operators; what is named nowhere here is `other`
 OPERATORS = {
-    "bvh.read": "read", "motion.read": "read", "usd.read": "read", "accuracy.analyse": "analyse", "fe.mesh": "mesh",
-    "fem.reduce": "reduce", "accuracy.refine": "reduce", "dynamics.compile": "reduce", "retarget.optimize": "search",
+    "usd.read": "read",
+    "bvh.read": "read",
+    "motion.read": "read",
+    "accuracy.analyse": "analyse",
+    "fe.mesh": "mesh",
+    "fem.reduce": "reduce",
+    "accuracy.refine": "refine",
+    "dynamics.compile": "refine",
+    "retarget.optimize": "search",
     "usd.write": "write",
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -42,22 +46,26 @@ class Stages:
 
     Attributes:
         shot: Name of the shot.
-        used: Time of each stage, without compiling.
+        read_s, analyse_s, mesh_s, reduce_s, refine_s, search_s, write_s, other_s: Of each stage, without compiling.
+        compile_s: Of compiling.
         wall_s: The whole run by the clock.
-        simulations: Simulated and linearised sweeps of the search.
-        single_s: Processor time of one simulation by the step of the search, with all coordinates.
+        sweeps: Simulated and linearised sweeps of the search.
+        single_simulations: The search in simulations by its step, with all coordinates.
     """
 
     shot: str
-    used: Mapping[str, float]
+    read_s: float
+    analyse_s: float
+    mesh_s: float
+    reduce_s: float
+    refine_s: float
+    search_s: float
+    write_s: float
+    other_s: float
+    compile_s: float
     wall_s: float
-    simulations: int
-    single_s: float
-
-    @property
-    def singles(self) -> float:
-        """The search in single simulations."""
-        return self.used.get("search", 0.0) / self.single_s
+    sweeps: int
+    single_simulations: float
 
 
 def measure(path: str) -> Stages:
@@ -78,40 +86,29 @@ def measure(path: str) -> Stages:
     begin = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         found = optimize(path, outputs=OutputPaths(layer=str(Path(folder) / "layer.usda")), on_operator=done).result
-    used["compile"] = compiling.seconds - already
+    wall, compiled = time.perf_counter() - begin, compiling.seconds - already
+    stages = {f"{stage}_s": used[stage] for stage in (*OPERATORS.values(), "other")}
     sweeps = found.search.forward_simulations + found.search.linearized_sweeps
-    wall = time.perf_counter() - begin
-    return Stages(Path(path).stem, dict(used), wall, sweeps, _single_simulation(path, found.step_s))
+    singles = used["search"] / _single_simulation(path, found.step_s)
+    return Stages(Path(path).stem, **stages, compile_s=compiled, wall_s=wall, sweeps=sweeps, single_simulations=singles)
 
 
 def _single_simulation(path: str, step: float) -> float:
-    """Processor time of a simulation of a shot as it is searched, the least of three [s]."""
+    """Processor time of a simulation of a shot as it is searched [s]."""
     shot, times = load(path, rigid=True), []
-    for _ in range(1 + _TIMES):  # the first one may compile
+    for _ in range(1 + REPEATS):  # the first one may compile
         begin = time.process_time()
         simulate_at(shot, RunSettings(), step)
         times.append(time.process_time() - begin)
     return min(times[1:])
 
 
-def table(runs: Sequence[Stages]) -> str:
-    """The runs as Markdown."""
-    heads = ["shot", *STAGES, "other", "processor time [s]", "by the clock [s]", "sweeps", "single simulations"]
-    rows = []
-    for run in runs:
-        times = [run.used.get(stage, 0.0) for stage in (*STAGES, "other")]
-        numbers = [*times, sum(times), run.wall_s]
-        rows.append([run.shot, *(f"{value:.2f}" for value in numbers), str(run.simulations), f"{run.singles:.0f}"])
-    return markdown(heads, rows, "---:")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure shots and print the table."""
-    parser = bench_parser("speed", __doc__)
-    shots_argument(parser, SAMPLES)
-    options = parser.parse_args(arguments)
-    try:
-        print(table([measure(path) for path in options.shots]))
-    except ShotError as error:
-        parser.exit(1, f"error: {error}\n")
+    options = bench_parser("speed", __doc__, SAMPLES).parse_args(arguments)
+    rows = []
+    for path in options.shots:
+        rows.append(measure(path))
+        keep(options, Stages, rows)
+    finish(options, "Processor time by stage", rows)
     return 0

@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 
 calibration = pytest.importorskip("calmotion_plugins.benchmarks.accuracy.calibration")  # needs the plugin calibration
-HEADS, Recovered, main, table_of = (
-    calibration.HEADS, calibration.Recovered, calibration.main, calibration.table_of,
-)  # fmt: skip
+HEADS, Recovered, main, table_of = (getattr(calibration, n) for n in ("HEADS", "Recovered", "main", "table_of"))
 recorded_arm = calibration.recorded_arm
 
 
 def row(trial, kind, error, deviation, identifiable=True):
-    return Recovered(trial, True, kind, error, deviation, error / deviation, identifiable, True, 100, 1.0)
+    return Recovered(trial, kind, error, deviation, error / deviation, identifiable, True, 100, 1.0)
 
 
 def test_the_table_counts_intervals_that_cover_the_truth():
@@ -30,5 +28,5 @@ def test_an_arm_is_the_same_every_time_and_its_parameters_are_recovered(tmp_path
     for a, b in zip(one.recordings, other.recordings, strict=True):
         assert np.array_equal(a.channels[0].values, b.channels[0].values, equal_nan=True)
     table = tmp_path / "rows.csv"
-    main(["--trials", "1", "--first", "4", "--csv", str(table)])
+    main(["--count", "1", "--first", "4", "--csv", str(table)])
     assert "modulus" in capsys.readouterr().out and len(table.read_text().splitlines()) > 2

@@ -3,9 +3,10 @@
 import pytest
 from calmotion.testing import beam_arm, quintic, shot_of
 from calmotion.tolerance.step_error import distance
-from calmotion_plugins.benchmarks.accuracy import reference_bench, work_precision_points
+from calmotion_plugins.benchmarks.accuracy import reference_bench, work_precision
+from calmotion_plugins.benchmarks.accuracy.figure import draw_work_precision
 from calmotion_plugins.benchmarks.accuracy.reference_bench import Bench
-from calmotion_plugins.benchmarks.accuracy.work_precision_points import forward_points
+from calmotion_plugins.benchmarks.accuracy.work_precision import forward_points
 from calmotion_plugins.benchmarks.common.shots import Unreduced
 
 
@@ -26,14 +27,14 @@ def reference(bench):
 @pytest.fixture(scope="module")
 def points(bench, reference):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(work_precision_points, "STEPS", (1 / 60, 1 / 120, 1 / 240, 1 / 480))
-        patch.setattr(work_precision_points, "FINER_STEPS", (1 / 960,))
-        patch.setattr(work_precision_points, "MODES", (2, 8))
-        patch.setattr(work_precision_points, "LEVELS", (5e-6,))
-        patch.setattr(work_precision_points, "DIRECTIONS", (1e-4,))
-        patch.setattr(work_precision_points, "REDUCTIONS", (1e-2, 1e-4))
-        patch.setattr(work_precision_points, "BASE", 1e-4)
-        patch.setattr(work_precision_points, "CUBATURE", 1e-4)
+        patch.setattr(work_precision, "STEPS", (1 / 60, 1 / 120, 1 / 240, 1 / 480))
+        patch.setattr(work_precision, "FINER_STEPS", (1 / 960,))
+        patch.setattr(work_precision, "MODES", (2, 8))
+        patch.setattr(work_precision, "LEVELS", (5e-6,))
+        patch.setattr(work_precision, "DIRECTIONS", (1e-4,))
+        patch.setattr(work_precision, "REDUCTIONS", (1e-2, 1e-4))
+        patch.setattr(work_precision, "BASE", 1e-4)
+        patch.setattr(work_precision, "CUBATURE", 1e-4)
         return forward_points(bench, reference)
 
 
@@ -50,3 +51,8 @@ def test_the_error_bar_of_the_reference_covers_a_finer_one(bench, reference):
 def test_a_linear_arm_is_farther_off_than_a_nonlinear_one(points):
     law = {point.setting: point.error_m for point in of(points, "law")}
     assert law["stvk"] < 0.5 * law["linear"] and abs(law["neohookean"] - law["stvk"]) < 0.2 * law["linear"]
+
+
+def test_the_figure_has_all_points(points, tmp_path):
+    assert draw_work_precision(str(tmp_path), points, 1e-5).endswith("work_precision_arm.png")
+    assert (tmp_path / "work_precision_arm.png").stat().st_size > 10_000

@@ -45,6 +45,6 @@ def test_the_command_reads_a_shot_whose_motors_have_gains(tmp_path, capsys):
             drive.CreateDampingAttr(0.1)
 
     status = main([str(write_arm(tmp_path / "arm.usda", edit)), "--json"])
-    (row,) = json.loads(capsys.readouterr().out)
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
     assert status == int(max(row["share"], row["mujoco_share"]) > ALLOWED) and row["motors"] == 2
     assert row["mujoco_ideal_mm"] == pytest.approx(row["ideal_mm"], rel=0.05)

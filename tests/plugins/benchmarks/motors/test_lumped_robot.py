@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from arms import chain, frame
 from calmotion import ShotError
-from calmotion.model import Animation, Body, Character, FlexibleSettings, Joint, MassProperties, Motor, Target, Track
-from calmotion.model.character import ElasticMaterial
-from calmotion.model.motor import Follows, Rotor
+from calmotion.model import Animation, Body, Character, Joint, MassProperties, Motor, Target, Track
+from calmotion.model.motor import Rotor
 from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
@@ -67,32 +66,16 @@ def test_both_programs_move_the_targets_alike(character):
 
 
 @pytest.mark.parametrize(
-    ("change", "what", "path"),
+    ("change", "path"),
     [
-        (
-            lambda c: replace(c, joints=(c.joints[0], replace(c.joints[1], closes_chain=True))),
-            "closes a chain",
-            "/C/J1",
-        ),
-        (lambda c: replace(c, bodies=(replace(c.bodies[0], mass=None), c.bodies[1])), "without mass", "/C/L0"),
-        (
-            lambda c: replace(
-                c,
-                bodies=(
-                    c.bodies[0],
-                    replace(c.bodies[1], flexible=FlexibleSettings(ElasticMaterial("/M", 1e9, 0.3, 1e3, 0.01))),
-                ),
-            ),
-            "flexible",
-            "/C/L1",
-        ),
-        (lambda c: servos(c, model="prescribed"), "ideal", "/C/J0"),
-        (lambda c: servos(c, rotor=replace(ROTOR, gear_stiffness=9.0)), "a compliant gear", "/C/J0"),
-        (lambda c: servos(c, follows=Follows(0, 1.0, 0.0)), "geared", "/C/J0"),
+        (lambda c: replace(c, joints=(c.joints[0], replace(c.joints[1], closes_chain=True))), "/C/J1"),
+        (lambda c: replace(c, bodies=(replace(c.bodies[0], mass=None), c.bodies[1])), "/C/L0"),
+        (lambda c: servos(c, model="prescribed"), "/C/J0"),
+        (lambda c: servos(c, rotor=replace(ROTOR, gear_stiffness=9.0)), "/C/J0"),
     ],
-    ids=["chain", "mass", "flexible", "ideal", "gear", "geared"],
+    ids=["chain", "mass", "ideal", "gear"],
 )
-def test_what_has_no_place_in_it_is_refused(change, what, path):
-    with pytest.raises(ShotError, match=what) as caught:
+def test_what_has_no_place_in_it_is_refused(change, path):
+    with pytest.raises(ShotError, match="no place in the lumped model") as caught:
         lumped_mjcf(change(servos(chain(2, driven=(0, 1)))))
     assert caught.value.path == path

@@ -2,15 +2,7 @@
 
 import pytest
 from calmotion.model.run import INTEGRATORS
-from calmotion_plugins.benchmarks.integrators.stability import largest_steps
-from calmotion_plugins.benchmarks.integrators.stability_map import (
-    MAPS,
-    REFUSED,
-    RUNS,
-    STEPS,
-    Cell,
-    cells_of,
-)
+from calmotion_plugins.benchmarks.integrators.stability import MAPS, REFUSED, RUNS, STEPS, Cell, cells_of, largest_steps
 
 
 def rows_of(name, *values):
