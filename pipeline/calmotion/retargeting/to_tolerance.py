@@ -90,6 +90,7 @@ def optimize_to_tolerance(
         try:
             latest = _searched(reduced, of_step, searches, checkpoint, memory)
             searches.ended()
+            memory.searched = reduced
             result = with_modes(latest if result is None else continued(result, latest), shot.bodies)
             if result.interrupted:
                 break

@@ -42,6 +42,7 @@ class RunMemory:
         step: Its time step [s]; 0 where it was not chosen.
         integrator: By which it was simulated.
         search: What its search leaves to the next, see `retargeting.search_memory`.
+        searched: The shot of that search, with the bodies of its result.
         taken: Names of what the latest run took over of this.
     """
 
@@ -49,6 +50,7 @@ class RunMemory:
     step: float = 0.0
     integrator: str = ""
     search: Any = None
+    searched: CompiledShot | None = None
     taken: list[str] = field(default_factory=list)
 
 

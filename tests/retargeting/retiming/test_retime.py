@@ -15,6 +15,8 @@ from calmotion.retargeting.retiming.retime import optimize_with_tempo, told_betw
 from calmotion.retargeting.retiming.rigid_robot import tempo_input
 from calmotion.retargeting.retiming.settings import pinned_times, refuse_tempo
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
+from calmotion.simulation.bodies import with_elasticity
+from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.tolerance.simulation import found_tracks
@@ -87,6 +89,14 @@ def test_slower_motors_perform_the_animation_later_and_within_their_limits(arm, 
     assert exceeded(shot, found, quantity) <= 1.001
     assert largest(found) < max(1e-3, 1.2 * at_full_tempo)
     assert found.after.motion.times[-1] == pytest.approx(found.retimed.animation.frame_times[-1])
+
+
+def test_both_motions_have_the_elastic_coordinates_of_the_last_search(arm, animation, bodies, meshes):
+    slow = with_elasticity(limited(arm, animation, bodies, "velocity", 0.6), "stvk")
+    shot = reduced_shot(slow, animation, meshes, RunSettings(tolerance=1e-3))
+    found = optimize_with_tempo(shot, replace(RETIMED, step=None, tolerance=1e-3), ignore_progress)
+    before, after = ([u.shape for u in run.motion.elastic] for run in (found.before, found.after))
+    assert before == after and before[0][1] < len(shot.bodies[0].stiffness)
 
 
 def test_what_curves_exceed_between_instants_is_told():

@@ -94,7 +94,7 @@ def optimize_with_tempo(
     tracks = found_tracks(searches.done, performance.shot.animation)
     if options.robust is not None and not searches.interrupted:
         searches.searched(performance.shot.with_tracks(tracks), robust=options.robust)
-    done = searches.with_input_resolved(performance.shot)
+    done = searches.with_input_resolved()
     return replace(done, retimed=performance.retimed)
 
 
@@ -125,9 +125,10 @@ class _Searches:
         self._count += 1
         return self.done
 
-    def with_input_resolved(self, shot: CompiledShot) -> Result:
-        """The result, whose input is simulated as well as that of a single search."""
-        if self._count == 1 or self.interrupted or not chooses_step(shot.character, self._options):
+    def with_input_resolved(self) -> Result:
+        """The result, whose input is simulated as well as that of a single search, with the bodies of the last one."""
+        shot = self._memory.searched
+        if shot is None or self._count == 1 or self.interrupted or not chooses_step(shot.character, self._options):
             return self.done
         return with_input_resolved(self.done, shot.with_tracks(shot.animation.tracks), self._options)
 
