@@ -6,11 +6,14 @@ Plugins with formats of their own take `CommandFormat` and what it works with fr
 from calmotion.host import registration
 from calmotion.public_names import public_names
 
-from .animation import BvhFile, GltfFile, Keyframes
-from .controllers import BottangoCurves, CsvTable, Ros2Bag, Ros2Trajectory, ServoTicks, UrScript
+from .formats.bottango import BottangoCurves
+from .formats.csv_table import CsvTable
+from .formats.gltf import GltfFile
+from .formats.keyframes import Keyframes
+from .formats.ros2 import Ros2Trajectory
+from .formats.ticks import ServoTicks
+from .formats.ur_script import UrScript
 
-register, unregister = registration(
-    Ros2Trajectory, Ros2Bag, CsvTable, ServoTicks, UrScript, BottangoCurves, Keyframes, BvhFile, GltfFile
-)
+register, unregister = registration(Ros2Trajectory, CsvTable, ServoTicks, UrScript, BottangoCurves, Keyframes, GltfFile)
 
 __getattr__, __dir__ = public_names(__name__)

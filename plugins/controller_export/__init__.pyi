@@ -4,9 +4,6 @@ from collections.abc import Callable
 
 from calmotion.host import Host
 
-from .animation import BvhFile as BvhFile
-from .animation import GltfFile as GltfFile
-from .animation import Keyframes as Keyframes
 from .command_format import CommandFormat as CommandFormat
 from .commands import BEZIER as BEZIER
 from .commands import CUBIC as CUBIC
@@ -19,15 +16,16 @@ from .commands import Follower as Follower
 from .commands import MotorCurves as MotorCurves
 from .commands import WrittenCommands as WrittenCommands
 from .commands import instants as instants
-from .controllers import BottangoCurves as BottangoCurves
-from .controllers import CsvTable as CsvTable
-from .controllers import Ros2Bag as Ros2Bag
-from .controllers import Ros2Trajectory as Ros2Trajectory
-from .controllers import ServoTicks as ServoTicks
-from .controllers import UrScript as UrScript
 from .exporting import Export as Export
 from .exporting import export as export
 from .exporting import write_curves as write_curves
+from .formats.bottango import BottangoCurves as BottangoCurves
+from .formats.csv_table import CsvTable as CsvTable
+from .formats.gltf import GltfFile as GltfFile
+from .formats.keyframes import Keyframes as Keyframes
+from .formats.ros2 import Ros2Trajectory as Ros2Trajectory
+from .formats.ticks import ServoTicks as ServoTicks
+from .formats.ur_script import UrScript as UrScript
 from .sampling import bezier_commands as bezier_commands
 from .sampling import followed_commands as followed_commands
 from .sampling import held_commands as held_commands

@@ -32,20 +32,6 @@ def replay_ros2(files, names, at):
         return replay_trajectory(yaml.safe_load(stream), names, at)
 
 
-def replay_mcap(files, names, at):
-    from mcap_ros2.reader import read_ros2_messages
-
-    with open(files[0], "rb") as stream:
-        (found,) = read_ros2_messages(stream)
-    message = found.ros_msg
-    points = [
-        {f: list(getattr(p, f)) for f in ("positions", "velocities", "accelerations")}
-        | {"time_from_start": {"sec": p.time_from_start.sec, "nanosec": p.time_from_start.nanosec}}
-        for p in message.points
-    ]
-    return replay_trajectory({"joint_names": list(message.joint_names), "points": points}, names, at)
-
-
 def replay_csv(files, names, at):
     with open(files[0], newline="") as stream:
         text = stream.read().splitlines()
@@ -119,40 +105,6 @@ def replay_bottango(files, names, at):
             column[inside] = casteljau(p, 1e3 * at[inside] - start) / 8192
         columns.append(motor["minimum"] + (motor["maximum"] - motor["minimum"]) * column)
     return np.stack(columns, axis=1)
-
-
-def replay_bvh(files, at):
-    """World transforms of the joints: place [m] and rotation of each by name, channels interpolated by lines."""
-    with open(files[0]) as stream:
-        head, motion = stream.read().split("MOTION")
-    frame_time = float(re.search(r"Frame Time: (\S+)", motion)[1])
-    rows = np.array([line.split() for line in motion.splitlines()[3:] if line.strip()], float)
-    values = lines(at, np.arange(len(rows)) * frame_time, rows)
-    stack, worlds, column, tips = [], {}, 0, {}
-    identity = (np.zeros((len(at), 3)), Rotation.from_quat(np.tile([0.0, 0.0, 0.0, 1.0], (len(at), 1))))
-    for words in (line.split() for line in head.splitlines() if line.split()):
-        if words[0] in ("ROOT", "JOINT", "End"):
-            stack.append(words[1])
-        elif words[0] == "OFFSET":
-            offset = 0.01 * np.array(words[1:], float)
-            place, turn = worlds.get(stack[-2], identity) if len(stack) > 1 else identity
-            worlds[stack[-1]] = (place + turn.apply(np.tile(offset, (len(at), 1))), turn)
-            if stack[-1] == "Site":
-                tips[stack[-2]] = worlds.pop("Site")[0]
-        elif words[0] == "CHANNELS":
-            place, turn = worlds[stack[-1]]
-            moved = [w for w in words[2:] if w.endswith("position")]
-            if moved:
-                assert len(stack) == 1 and moved == ["Xposition", "Yposition", "Zposition"]
-                place = 0.01 * values[:, column : column + 3]
-            order = "".join(w[0] for w in words[2:] if w.endswith("rotation"))
-            angles = values[:, column + len(moved) : column + len(moved) + 3]
-            worlds[stack[-1]] = (place, turn * Rotation.from_euler(order, angles, degrees=True))
-            column += len(words) - 2
-        elif words[0] == "}":
-            stack.pop()
-    assert column == rows.shape[1]
-    return worlds, tips
 
 
 def replay_gltf(files, at):

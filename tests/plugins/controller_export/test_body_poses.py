@@ -10,11 +10,15 @@ import pytest
 from calmotion.errors import ShotError
 from calmotion.model import Animation, Character, Provenance
 from calmotion.workflow.run import carry_out
-from calmotion_plugins.controller_export.animation.body_poses import body_tree, local_poses, motor_values, near_turn
-from calmotion_plugins.controller_export.animation.parallel_frames import euler_angles, parallel_skeleton
 from calmotion_plugins.controller_export.controller_files import curves_of
+from calmotion_plugins.controller_export.formats.body_poses import (
+    body_tree,
+    local_poses,
+    motor_values,
+    near_turn,
+    upward,
+)
 from one_hinge import ONE_HINGE
-from scipy.spatial.transform import Rotation
 from six_hinges import LENGTH, six_hinges, smooth, track_values
 
 
@@ -43,23 +47,11 @@ def test_whole_turns_are_those_of_the_curves(arm):
     np.testing.assert_allclose(values[0], far - [2.0 * np.pi, 0.0, -4.0 * np.pi, 0.0, 0.0, 0.0])
 
 
-def test_a_skeleton_with_parallel_axes_is_the_robot_again(arm):
-    bodies = body_tree(arm)
-    skeleton, poses = parallel_skeleton(bodies), local_poses(bodies, arm, 24.0)
-    translations, rotations = skeleton.of(poses)
-    assert all(rotation[0].magnitude() < 1e-9 for rotation in rotations[1:]), "nothing is rotated at rest"
-    np.testing.assert_allclose(translations[:, 1:], np.broadcast_to([0.0, LENGTH, 0.0], (25, 5, 3)), atol=1e-7)
-    back = skeleton.local(poses.times, translations, rotations)
-    np.testing.assert_allclose(motor_values(bodies, back), smooth(poses.times), atol=1e-6)
-
-
-@pytest.mark.parametrize("axis", ["x", "y", "z"])
-def test_euler_angles_of_a_hinge_pass_a_quarter_turn_without_a_jump(axis):
-    angles = np.linspace(-2.5, 2.5, 101)
-    order, found = euler_angles(Rotation.from_euler(axis, angles[:, None]))
-    column = order.index(axis.upper())
-    np.testing.assert_allclose(found[:, column], angles - angles[0] + found[0, column], atol=1e-9)
-    assert np.abs(np.delete(found, column, axis=1)).max() < 1e-9 and column != 1
+@pytest.mark.parametrize("down", [(0, 0, -9.81), (0, -9.81, 0), (0, 9.81, 0), (0, 0, 0), (1, 2, 3)])
+def test_up_becomes_y(arm, down):
+    character = dataclasses.replace(arm.character, gravity=np.array(down, float))
+    up = -character.gravity if any(down) else np.array([0.0, 0.0, 1.0])
+    np.testing.assert_allclose(upward(character).apply(up / np.linalg.norm(up)), [0.0, 1.0, 0.0], atol=1e-12)
 
 
 def body(name, x, z, mass=0.3):

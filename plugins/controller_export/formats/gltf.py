@@ -4,23 +4,52 @@ from __future__ import annotations
 
 import json
 import struct
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
+from calmotion.host import PropertyValues
 from calmotion.model import SurfaceMesh
 from calmotion.support import distinct_names, replaced
 from calmotion.version import __version__
 
-from ..commands import LINEAR, Commands, MotorCurves
-from .body_poses import LocalPoses, body_tree, local_poses, motor_values, near_turn
-from .parallel_frames import parallel_skeleton
+from ..command_format import CommandFormat
+from ..commands import LINEAR, Commands, MotorCurves, instants
+
+if TYPE_CHECKING:
+    from .body_poses import LocalPoses
 
 _FLOAT, _UINT = 5126, 5125
 _MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 _GREY = (0.55, 0.55, 0.57)
 _MOVES = 1e-9  # what a node that has no animation may move [m], or its quaternion [-]
+
+
+class GltfFile(CommandFormat):
+    """The rigid robot with its geometry and an animation of its joints, in a binary glTF 2.0 file."""
+
+    idname = "export.gltf"
+    label = "Write a glTF animation"
+    format = "gltf"
+    suffix = ".glb"
+
+    def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
+        """The keyframes."""
+        times = instants(curves, rate, fixed_period=True)
+        return Commands(LINEAR, times, curves.at(times))
+
+    def write(
+        self, file: str, commands: Commands, curves: MotorCurves, rate: float, properties: PropertyValues
+    ) -> tuple[str, ...]:
+        """Write bodies and motion."""
+        write_gltf(file, curves, rate)
+        return (file,)
+
+    def read(self, files: Sequence[str], curves: MotorCurves, properties: PropertyValues) -> Commands:
+        """Read what the motors do."""
+        return read_gltf(files[0], curves)
 
 
 class _Buffer:
@@ -38,9 +67,11 @@ class _Buffer:
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": stored.nbytes}
         self.views.append(view if target is None else view | {"target": target})
         accessor: dict[str, Any] = {
-            "bufferView": len(self.views) - 1, "componentType": _UINT if integer else _FLOAT, "count": len(stored),
+            "bufferView": len(self.views) - 1,
+            "componentType": _UINT if integer else _FLOAT,
+            "count": len(stored),
             "type": kind,
-        }  # fmt: skip
+        }
         if bounds:
             rows = stored.reshape(len(stored), -1)
             accessor |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
@@ -61,14 +92,16 @@ def write_gltf(file: str, curves: MotorCurves, rate: float) -> None:
         OSError: It cannot be written.
         ShotError: The motors do not determine the motion.
     """
+    from .body_poses import body_tree, local_poses, upward
+
     bodies = body_tree(curves)
     poses = local_poses(bodies, curves, rate)
     buffer = _Buffer()
     nodes: list[dict[str, Any]] = []
     meshes: list[dict[str, Any]] = []
     materials: dict[tuple[float, float, float], int] = {}
-    up = parallel_skeleton(bodies).upward.as_quat()
-    root: dict[str, Any] = {"name": curves.shot, "rotation": up.tolist(), "children": []}
+    up = upward(bodies.character).as_quat().tolist()
+    root: dict[str, Any] = {"name": curves.shot, "rotation": up, "children": []}
     nodes.append(root)
     paths = [body.path for body in bodies.bodies]
     short = distinct_names(paths)
@@ -116,6 +149,8 @@ def read_gltf(file: str, curves: MotorCurves) -> Commands:
     Raises:
         ShotError: The file holds another robot.
     """
+    from .body_poses import LocalPoses, body_tree, motor_values, near_turn
+
     bodies = body_tree(curves)
     content, data = _read(file)
     by_path = {node.get("extras", {}).get("path"): index for index, node in enumerate(content["nodes"])}
@@ -167,9 +202,9 @@ def _animation(buffer: _Buffer, poses: LocalPoses) -> dict[str, Any]:
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
     for k in range(poses.translations.shape[1]):
-        for path, kind, values in (
-            ("translation", "VEC3", poses.translations[:, k]), ("rotation", "VEC4", _xyzw(poses.rotations[:, k])),
-        ):  # fmt: skip
+        moves = ("translation", "VEC3", poses.translations[:, k])
+        turns = ("rotation", "VEC4", _xyzw(poses.rotations[:, k]))
+        for path, kind, values in (moves, turns):
             last = k == poses.translations.shape[1] - 1 and path == "rotation" and not channels
             if np.ptp(values, axis=0).max() > _MOVES or last:
                 channels.append({"sampler": len(samplers), "target": {"node": _node(k), "path": path}})

@@ -11,59 +11,74 @@ from dataclasses import asdict
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError, raise_all
+from calmotion.host import Property, PropertyValues
 from calmotion.support import write_text
 from numpy.typing import NDArray
 
+from ..command_format import CommandFormat
 from ..commands import HOLD, Commands, MotorCurves
-from .servos import Servo
+from ..sampling import held_commands
+from .servos import Servo, read_servos
 
 
-def write_ticks(
-    file: str, commands: Commands, curves: MotorCurves, rate: float, servos: Sequence[Servo]
-) -> tuple[str, ...]:
-    """Write both files, atomically each; returns their paths.
+class ServoTicks(CommandFormat):
+    """Positions of servos in their own ticks, at a fixed period, as JSON and as a header for C.
 
-    Raises:
-        OSError: A file cannot be written.
-        ShotError: A motor leaves the range of its servo.
+    A servo holds each command until the next one. Resolution, range, direction and centre of each servo come from a
+    TOML file.
     """
-    ticks = ticks_of(commands.positions, curves, servos)
-    _refuse_beyond(ticks, commands.times, curves, servos)
-    start = ticks_of((commands.positions[0] if commands.start is None else commands.start)[None], curves, servos)[0]
-    content = {
-        "shot": curves.shot,
-        "rate_hz": rate,
-        "player": HOLD,
-        "servos": [asdict(servo) for servo in servos],
-        "start": start.tolist(),
-        "ticks": ticks.tolist(),
-    }
-    text = json.dumps(content, indent=1)
-    # one line for each frame
-    text = re.sub(r"\[\s+(-?\d+(?:,\s+-?\d+)*)\s+\]", lambda found: f"[{re.sub(chr(92) + 's+', ' ', found[1])}]", text)
-    write_text(file, text + "\n")
-    header = f"{os.path.splitext(file)[0]}.h"
-    write_text(header, _header(os.path.basename(header), ticks, start, curves, rate, servos))
-    return file, header
 
+    idname = "export.ticks"
+    label = "Write servo ticks"
+    format = "ticks"
+    suffix = ".json"
+    properties = (
+        Property(
+            "motors",
+            str,
+            "",
+            description="TOML file with a table for each motor; see docs/reference/controller_formats.md",
+        ),
+    )
 
-def read_ticks(file: str, curves: MotorCurves) -> Commands:
-    """Read the JSON file; angles at which the servos stand.
+    def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
+        """Positions at the rate."""
+        return held_commands(curves, rate)
 
-    Raises:
-        ShotError: It holds other servos.
-    """
-    with open(file, encoding="utf-8") as stream:
-        content = json.load(stream)
-    try:
-        servos = [Servo(**entry) for entry in content["servos"]]
-        order = [[servo.name for servo in servos].index(name) for name in curves.names]
-        ticks, start = np.array(content["ticks"], np.float64)[:, order], np.array(content["start"], np.float64)[order]
-        times = np.arange(len(ticks)) / float(content["rate_hz"])
-    except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise ShotError("this file does not hold these servos", path=file, found=error) from error
-    kept = [servos[k] for k in order]
-    return Commands(HOLD, times, angles_of(ticks, curves, kept), start=angles_of(start[None], curves, kept)[0])
+    def write(
+        self, file: str, commands: Commands, curves: MotorCurves, rate: float, properties: PropertyValues
+    ) -> tuple[str, ...]:
+        """Write both files."""
+        servos = read_servos(properties.motors, curves)
+        ticks = ticks_of(commands.positions, curves, servos)
+        _refuse_beyond(ticks, commands.times, curves, servos)
+        start = ticks_of((commands.positions[0] if commands.start is None else commands.start)[None], curves, servos)[0]
+        content = {
+            "shot": curves.shot,
+            "rate_hz": rate,
+            "player": HOLD,
+            "servos": [asdict(servo) for servo in servos],
+            "start": start.tolist(),
+        }
+        rows = ",\n".join(f"  {json.dumps(row)}" for row in ticks.tolist())  # one line for each frame
+        write_text(file, json.dumps(content, indent=1)[:-2] + f',\n "ticks": [\n{rows}\n ]\n}}\n')
+        header = f"{os.path.splitext(file)[0]}.h"
+        write_text(header, _header(os.path.basename(header), ticks, start, curves, rate, servos))
+        return file, header
+
+    def read(self, files: Sequence[str], curves: MotorCurves, properties: PropertyValues) -> Commands:
+        """Read the ticks of the JSON file as the angles at which the servos stand."""
+        with open(files[0], encoding="utf-8") as stream:
+            content = json.load(stream)
+        try:
+            servos = {entry["name"]: (k, Servo(**entry)) for k, entry in enumerate(content["servos"])}
+            order, kept = zip(*(servos[name] for name in curves.names), strict=True)
+            ticks = np.array([content["start"], *content["ticks"]], np.float64)[:, list(order)]
+            times = np.arange(len(ticks) - 1) / float(content["rate_hz"])
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise ShotError("this file does not hold these servos", path=files[0], found=error) from error
+        start, *angles = angles_of(ticks, curves, kept)
+        return Commands(HOLD, times, np.array(angles), start=start)
 
 
 def ticks_of(positions: Array, curves: MotorCurves, servos: Sequence[Servo]) -> NDArray[np.int64]:
@@ -99,9 +114,13 @@ def _refuse_beyond(ticks: NDArray[np.int64], times: Array, curves: MotorCurves, 
 
 
 def _header(
-    name: str, ticks: NDArray[np.int64], start: NDArray[np.int64], curves: MotorCurves, rate: float,
+    name: str,
+    ticks: NDArray[np.int64],
+    start: NDArray[np.int64],
+    curves: MotorCurves,
+    rate: float,
     servos: Sequence[Servo],
-) -> str:  # fmt: skip
+) -> str:
     prefix = re.sub(r"\W", "_", os.path.splitext(name)[0])
     prefix = f"_{prefix}" if prefix[:1].isdigit() else prefix
     guard = f"{prefix.upper()}_H"

@@ -77,6 +77,16 @@ def body_tree(curves: MotorCurves) -> BodyTree:
     return BodyTree(character, tree, np.array(pivots).reshape(-1, 3), curves.animation)
 
 
+def upward(character: Character) -> Rotation:
+    """The shortest rotation that turns up, away from gravity, to y."""
+    up = -character.gravity if np.any(character.gravity) else np.array([0.0, 0.0, 1.0])
+    up, y = up / np.linalg.norm(up), np.array([0.0, 1.0, 0.0])
+    axis = np.cross(up, y)
+    if not np.any(axis):
+        axis = np.array([1.0, 0.0, 0.0])
+    return Rotation.from_rotvec(axis / np.linalg.norm(axis) * np.arctan2(np.linalg.norm(np.cross(up, y)), up @ y))
+
+
 def local_poses(bodies: BodyTree, curves: MotorCurves, rate: float) -> LocalPoses:
     """What the rigid robot does with the curves, at a fixed rate [Hz] from the first frame to the last or just after.
 
@@ -100,8 +110,7 @@ def local_poses(bodies: BodyTree, curves: MotorCurves, rate: float) -> LocalPose
 def motor_values(bodies: BodyTree, poses: LocalPoses) -> Array:
     """Angles [rad] and lengths [m] of the motors in poses, angles without jumps, shape [T, M].
 
-    An angle is that of the rotation about the joint's axis; what a pose rotates about other axes, as interpolated
-    Euler angles do, no hinge can follow.
+    An angle is that of the rotation about the joint's axis.
     """
     c, q = _composed(bodies, poses)
     character, component = bodies.character, {body: k for k, body in enumerate(bodies.tree.body)}
@@ -171,9 +180,11 @@ def _simulated(
     massless = next((body for body in bodies.character.bodies if body.mass is None), None)
     if massless is not None:
         raise ShotError(
-            "the motion of a robot with closed chains or free joints needs the mass of each body", path=massless.path,
-            attribute="physics:mass", remedy="Author physics:mass, or use a format of motor commands such as csv",
-        )  # fmt: skip
+            "the motion of a robot with closed chains or free joints needs the mass of each body",
+            path=massless.path,
+            attribute="physics:mass",
+            remedy="Author physics:mass, or use a format of motor commands such as csv",
+        )
     period = float(times[1] - times[0])
     substeps = int(np.ceil(period / MAX_STEP - 1e-9))
     h = period / substeps
@@ -189,9 +200,11 @@ def _simulated(
         run = run_forward(model, Workspace.for_system(model.system), angles, rates, h, world)
     except SimulationFailure as failure:
         raise ShotError(
-            "the rigid robot cannot follow these curves", path=character.path, found=failure.reason.name,
+            "the rigid robot cannot follow these curves",
+            path=character.path,
+            found=failure.reason.name,
             remedy="Check the shot with calmotion simulate, or use a format of motor commands such as csv",
-        ) from failure  # fmt: skip
+        ) from failure
     states = run.trajectory.states
     return states.c[grid.frames], states.q[grid.frames]
 
