@@ -8,7 +8,7 @@ import re
 
 import pytest
 from calmotion.usd import dialects
-from calmotion.usd.reading.bodies.unused_physics import OF_BODIES, OF_JOINTS
+from calmotion.usd.reading.unread import OF_BODIES, OF_JOINTS
 
 WRITES = "CALMOTION_WRITE_PAGES"  # set it, and the test writes the page
 SPELLED = {

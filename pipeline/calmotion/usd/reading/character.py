@@ -14,25 +14,20 @@ from calmotion.model import Body, Character, Joint, MassProperties, RetargetSett
 from calmotion.model.motor import PRESCRIBED
 from calmotion.support.naming import grouped_notes
 from calmotion.usd.clock import Clock
-from calmotion.usd.reading import scene, targets, topology
+from calmotion.usd.reading import scene, targets
 from calmotion.usd.reading.actuators.motor_models import motor_model
-from calmotion.usd.reading.animated_transforms import moves, refuse_moving
-from calmotion.usd.reading.bases.contacts import contact_carriers, contact_joints
-from calmotion.usd.reading.bases.joint_places import tell_what_is_elsewhere
-from calmotion.usd.reading.bases.kinematic_links import refuse_held_twice
-from calmotion.usd.reading.bases.lost_bodies import refuse_lost_bodies
-from calmotion.usd.reading.bases.roots import on_moving_prim
+from calmotion.usd.reading.animated import moves, refuse_moving
 from calmotion.usd.reading.bodies import mass
-from calmotion.usd.reading.bodies.absent import no_bodies
-from calmotion.usd.reading.bodies.flexible import flexible_settings
+from calmotion.usd.reading.bodies.flexible import flexible_settings, with_parts
 from calmotion.usd.reading.bodies.interfaces import interfaces_of
-from calmotion.usd.reading.bodies.part_materials import with_parts
 from calmotion.usd.reading.bodies.scenery import scenery_of
 from calmotion.usd.reading.bodies.shapes import note_unread_shape, shapes_of, tets_of
-from calmotion.usd.reading.bodies.unused_physics import tell_what_is_not_used
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
-from calmotion.usd.reading.generic_joints.chains import Between, expanded
-from calmotion.usd.reading.joints import (
+from calmotion.usd.reading.joints import topology
+from calmotion.usd.reading.joints.chains import Between, expanded
+from calmotion.usd.reading.joints.contacts import contact_carriers, contact_joints
+from calmotion.usd.reading.joints.contradictions import refuse_held_twice, refuse_lost_bodies, tell_what_is_elsewhere
+from calmotion.usd.reading.joints.joint_prims import (
     JointPrim,
     body_index,
     joint_prims,
@@ -40,11 +35,14 @@ from calmotion.usd.reading.joints import (
     read_joint,
     refuse_unsupported,
 )
+from calmotion.usd.reading.joints.roots import on_moving_prim
 from calmotion.usd.reading.motors import driven_motors as motors
 from calmotion.usd.reading.motors.motor_limits import limits_of_commands
 from calmotion.usd.reading.motors.posed_motors import posed_joints
 from calmotion.usd.reading.motors.undriven_joints import tell_what_swings
-from calmotion.usd.reading.plausibility.bodies import warn_of_units
+from calmotion.usd.reading.plausibility import warn_of_units
+from calmotion.usd.reading.unread import tell_what_is_not_used
+from calmotion.usd.reading.variants import no_bodies
 from calmotion.usd.transforms import Pose
 
 if TYPE_CHECKING:

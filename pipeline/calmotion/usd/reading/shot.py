@@ -17,23 +17,21 @@ from calmotion.usd import stages
 from calmotion.usd.clock import Clock, clock_of, still_clock
 from calmotion.usd.diagnostics import quiet, with_places
 from calmotion.usd.masks import masked
-from calmotion.usd.reading.animated.constants import hold_constants
-from calmotion.usd.reading.animated.retiming import retime_map, tempo_of
-from calmotion.usd.reading.animated_transforms import carriers, codes_of
-from calmotion.usd.reading.bases.roots import moving_frames
+from calmotion.usd.reading.animated import carriers, codes_of, hold_constants, retime_map, tempo_of
 from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
-from calmotion.usd.reading.joints import joint_prims
+from calmotion.usd.reading.doubtful_motions import limit_doubts, motion_doubts
+from calmotion.usd.reading.joints.joint_prims import joint_prims
+from calmotion.usd.reading.joints.roots import moving_frames
 from calmotion.usd.reading.motors.driven_motors import BODIES, CONSTANT, DRIVE, GIVEN, Drive, to_si
-from calmotion.usd.reading.motors.free_ranges import free_tracks
 from calmotion.usd.reading.motors.given_tracks import given_joints, given_track, length_note
 from calmotion.usd.reading.motors.holds import held
+from calmotion.usd.reading.motors.motor_limits import free_tracks
 from calmotion.usd.reading.motors.posed_motors import joint_motions, pose_codes, posed_track
 from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stacks, performed_on, skeletal_tracks
 from calmotion.usd.reading.motors.tracks import read_track, sample_codes
 from calmotion.usd.reading.motors.turns import unwrapped
-from calmotion.usd.reading.motors.unused_animation import target_positions
-from calmotion.usd.reading.plausibility.motions import limit_doubts, motion_doubts
+from calmotion.usd.reading.motors.undriven_joints import target_positions
 from calmotion.usd.reading.provenance import notes_of_results, provenance_of
 from calmotion.usd.reading.targets import weight_tracks
 from calmotion.usd.reading.unread import misplaced_schemas, unread_attributes

@@ -15,8 +15,7 @@ from calmotion.model.character import WORLD
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
-from calmotion.usd.reading.animated.animation_codes import animation_codes
-from calmotion.usd.reading.animated_transforms import moves_on_body
+from calmotion.usd.reading.animated import animation_codes, moves_on_body
 from calmotion.usd.reading.context import Reading, carrying_body, prims_of, refuse_without_transform
 from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
 

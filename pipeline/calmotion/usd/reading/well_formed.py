@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError
-from calmotion.usd.reading.animated.animation_codes import animation_codes
+from calmotion.usd.reading.animated import animation_codes
 from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.schemas import NAMES
 

@@ -10,7 +10,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model.retiming.tempo import TimeMap
 from calmotion.usd.clock import Clock
-from calmotion.usd.reading.animated.retiming import MAP
+from calmotion.usd.reading.animated import MAP
 from calmotion.usd.reading.context import prims_of
 from calmotion.usd.writing.curves import attribute_spec
 

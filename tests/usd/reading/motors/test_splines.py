@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from calmotion.model.curves import curve_of
 from calmotion.usd.reading import read_shot
-from calmotion.usd.reading.motors.splines import STEP
+from calmotion.usd.reading.motors.tracks import STEP
 from calmotion.usd.writing import write_result
 from performing import result_with
 from pxr import Ts, Usd

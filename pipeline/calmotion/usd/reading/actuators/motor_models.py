@@ -15,10 +15,9 @@ from calmotion.model.motor import MODELS, ON_ERROR, ON_JOINT, PRESCRIBED, Direct
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dialects import GAINS, POSITION_ACTUATOR, Spelling, authored
-from calmotion.usd.reading.actuators.mujoco_actuators import affine_actuators
+from calmotion.usd.reading.actuators.foreign_actuators import NewtonActuator, affine_actuators
 from calmotion.usd.reading.actuators.named_types import TYPE
-from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
-from calmotion.usd.reading.joints import JointPrim
+from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from calmotion.catalogs.motor_types import MotorType, likely_motor_types, motor_type_named, motor_types
 from calmotion.errors import ShotError
 from calmotion.usd import schemas
-from calmotion.usd.reading.joints import JointPrim
+from calmotion.usd.reading.joints.joint_prims import JointPrim
 
 if TYPE_CHECKING:
     from pxr import Usd

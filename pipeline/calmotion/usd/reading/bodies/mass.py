@@ -9,7 +9,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import MassProperties
 from calmotion.usd import gf, schemas
-from calmotion.usd.reading.bodies.materials import ELASTIC
+from calmotion.usd.reading.bodies.flexible import ELASTIC
 from calmotion.usd.reading.bodies.moments import Moments, sum_of, surface_moments
 from calmotion.usd.reading.bodies.primitives import TYPES
 from calmotion.usd.reading.bodies.shapes import MESH, Shape

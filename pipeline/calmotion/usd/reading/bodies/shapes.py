@@ -11,7 +11,7 @@ from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
 from calmotion.model import SurfaceMesh, TetGeometry
 from calmotion.usd import gf
-from calmotion.usd.reading.animated_transforms import moves_on_body
+from calmotion.usd.reading.animated import moves_on_body
 from calmotion.usd.reading.bodies import primitives
 from calmotion.usd.reading.bodies.moments import Moments, is_closed, surface_moments
 from calmotion.usd.reading.bodies.polygons import triangulate

@@ -14,21 +14,27 @@ from calmotion.model import Follows, Motor
 from calmotion.model.motor import SERVO
 from calmotion.usd import schemas
 from calmotion.usd.dialects import number_of
-from calmotion.usd.reading.actuators.laws import direct_current, gain_factor
+from calmotion.usd.reading.actuators.foreign_actuators import (
+    ACTUATOR,
+    TARGETS,
+    actuators_beside,
+    affine_actuators,
+    newton_actuator,
+)
 from calmotion.usd.reading.actuators.motor_models import motor_model, read_gains
-from calmotion.usd.reading.actuators.mujoco_actuators import actuators_beside, affine_actuators
 from calmotion.usd.reading.actuators.named_types import named_type
-from calmotion.usd.reading.actuators.newton_actuators import ACTUATOR, TARGETS, newton_actuator
-from calmotion.usd.reading.actuators.rotors import read_backlash, read_delay, read_rotor
+from calmotion.usd.reading.actuators.rotors import direct_current, gain_factor, read_backlash, read_delay, read_rotor
 from calmotion.usd.reading.context import Reading, prims_of
-from calmotion.usd.reading.joints import JointPrim, refuse_unsupported
-from calmotion.usd.reading.motors.free_ranges import may_change
-from calmotion.usd.reading.motors.gears.gear_joints import gears_of_joints
-from calmotion.usd.reading.motors.gears.gearing import Gear, led_by_driven, read_gear, resolve
-from calmotion.usd.reading.motors.motor_limits import calmotion_limit, effort_limit, velocity_limit
+from calmotion.usd.reading.joints.joint_prims import JointPrim, refuse_unsupported
+from calmotion.usd.reading.motors.couplings import gears_of_joints
+from calmotion.usd.reading.motors.gearing import Gear, led_by_driven, read_gear, resolve
+from calmotion.usd.reading.motors.motor_limits import calmotion_limit, effort_limit, may_change, velocity_limit
 from calmotion.usd.reading.motors.tracks import sample_codes
-from calmotion.usd.reading.motors.undriven_joints import note_or_refuse_no_motors
-from calmotion.usd.reading.motors.unused_animation import refuse_connection, refuse_unused_animation
+from calmotion.usd.reading.motors.undriven_joints import (
+    note_or_refuse_no_motors,
+    refuse_connection,
+    refuse_unused_animation,
+)
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:

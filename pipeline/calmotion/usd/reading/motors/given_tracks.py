@@ -10,8 +10,8 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import MotorTracks, Track
 from calmotion.support.naming import nearest
-from calmotion.usd.reading.generic_joints import freedoms
-from calmotion.usd.reading.joints import JointPrim, joint_prims
+from calmotion.usd.reading.joints import freedoms
+from calmotion.usd.reading.joints.joint_prims import JointPrim, joint_prims
 
 if TYPE_CHECKING:
     from pxr import Usd

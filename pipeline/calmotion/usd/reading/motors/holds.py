@@ -14,7 +14,7 @@ from calmotion.arrays import Array
 from calmotion.model import Track
 from calmotion.model.curves import interpolate
 from calmotion.usd.reading.context import Reading
-from calmotion.usd.reading.joints import JointPrim
+from calmotion.usd.reading.joints.joint_prims import JointPrim
 
 _SAME = 1e-6  # of the range of a track: values that are nearer are equal
 _KEYS = 2.0  # frames: equal samples that are farther apart are keys, and two of them a hold

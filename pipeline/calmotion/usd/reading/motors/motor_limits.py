@@ -1,4 +1,4 @@
-"""Limits of a motor in any supported dialect."""
+"""Limits of a motor in any supported dialect, and when it may be changed."""
 
 from __future__ import annotations
 
@@ -10,12 +10,19 @@ import numpy as np
 
 from calmotion.catalogs.motor_types import MotorType
 from calmotion.errors import ShotError
+from calmotion.model import FreeTrack, Motor
 from calmotion.usd import schemas
+from calmotion.usd.clock import Clock
 from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, authored, number_of
-from calmotion.usd.reading.actuators.mujoco_actuators import actuators_beside, numbers_of, reachable, token_of
-from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
+from calmotion.usd.reading.actuators.foreign_actuators import (
+    NewtonActuator,
+    actuators_beside,
+    numbers_of,
+    reachable,
+    token_of,
+)
 from calmotion.usd.reading.context import Reading
-from calmotion.usd.reading.joints import JointPrim
+from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:
@@ -157,3 +164,31 @@ def positive(prim: Usd.Prim, name: str, value: float | None) -> float:
             remedy="Correct the limit, or remove the attribute (the motor then has no limit)",
         )
     return float(value)
+
+
+_FREE = "calm:motor:optimize"
+
+
+def may_change(prim: Usd.Prim) -> bool:
+    """Whether a motor may be changed at all."""
+    samples = _free_samples(prim)
+    return any(value for _, value in samples) if samples else bool(schemas.value(prim, _SCHEMA, _FREE))
+
+
+def _free_samples(prim: Usd.Prim) -> list[tuple[float, bool]]:
+    attribute = prim.GetAttribute(_FREE)
+    if not attribute or not schemas.is_applied(prim, _SCHEMA):
+        return []
+    return [(code, bool(attribute.Get(code))) for code in attribute.GetTimeSamples()]
+
+
+def free_tracks(stage: Usd.Stage, motors: Sequence[Motor], clock: Clock) -> tuple[FreeTrack, ...]:
+    """When motors may be changed, of those for which the shot animates calm:motor:optimize: each sample holds until
+    the next."""
+    ranges = []
+    for index, motor in enumerate(motors):
+        samples = _free_samples(stage.GetPrimAtPath(motor.prim_path))
+        if len({value for _, value in samples}) > 1:
+            codes, values = zip(*samples, strict=True)
+            ranges.append(FreeTrack(index, clock.seconds(np.array(codes, dtype=np.float64)), np.array(values, bool)))
+    return tuple(ranges)

@@ -14,11 +14,11 @@ from calmotion.model import Track
 from calmotion.model.character import Frame
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
-from calmotion.usd.reading.animated_transforms import carriers, codes_of, has_splines, moves
-from calmotion.usd.reading.bases.roots import world_frame, world_side_prim
+from calmotion.usd.reading.animated import carriers, codes_of, has_splines, moves
 from calmotion.usd.reading.context import Reading
-from calmotion.usd.reading.generic_joints.chains import axis_values
-from calmotion.usd.reading.joints import JointPrim
+from calmotion.usd.reading.joints.chains import axis_values
+from calmotion.usd.reading.joints.joint_prims import JointPrim
+from calmotion.usd.reading.joints.roots import world_frame, world_side_prim
 from calmotion.usd.transforms import pose_from_matrix, rotation_from_quaternion
 from calmotion.usd.units import StageUnits
 

@@ -21,7 +21,7 @@ from calmotion.model import Track
 from calmotion.rigging.hinge_rows import follow
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
-from calmotion.usd.reading.animated_transforms import moves
+from calmotion.usd.reading.animated import moves
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.motors.driven_motors import SKEL_JOINT, SKELETON, Drive
 from calmotion.usd.reading.motors.posed_motors import GAP_TOLERANCE, TILT_TOLERANCE, joint_motions

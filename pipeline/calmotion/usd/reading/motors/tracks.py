@@ -1,4 +1,4 @@
-"""The samples of a drive as a track in seconds, and radians or metres."""
+"""The samples or the spline of a drive as a track in seconds, and radians or metres."""
 
 from __future__ import annotations
 
@@ -12,10 +12,138 @@ from calmotion.model import Track
 from calmotion.model.curves import interpolate
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading
-from calmotion.usd.reading.motors.splines import read_spline, value_at
 
 if TYPE_CHECKING:
-    from pxr import Sdf, Usd
+    from pxr import Gf, Sdf, Ts, Usd
+
+STEP = 0.01  # duration over which a step is played, since no motor can jump [s]
+_JUMP = 1e-6  # smallest step, relative to the range of the spline
+_CORNER = 1e-3  # smallest change of slope at a corner, relative to the steepest slope
+_EXACT = 2e-8  # largest difference between track and spline between samples [rad or m]
+_ROUNDS = 8  # largest number of refinements
+
+
+def read_spline(attribute: Usd.Attribute, clock: Clock, reading: Reading, to_si: float) -> Track:
+    """A spline as a track that differs from it by less than a millionth of a radian or metre.
+
+    It is sampled at its knots and at the frames, where a smooth one is read back exactly, and more densely where its
+    tangents need it. Corners stay corners; a step becomes a steep line. Both raise a warning, since they excite the
+    structure.
+
+    Args:
+        attribute: The drive's target position, degrees or stage length.
+        clock: The clock of the shot.
+        reading: Receives notes and warnings for the user.
+        to_si: Radians, or metres, in its unit.
+
+    Raises:
+        ShotError: It has no value, or one that is not finite, within the shot.
+    """
+    spline, path = attribute.GetSpline(), attribute.GetPath()
+    frames = clock.time_codes(clock.frame_times())
+    knots = np.array(list(spline.GetKnotsWithLoopsBaked(_interval(frames)).keys()), dtype=np.float64)
+    inner = knots[(knots > frames[0]) & (knots < frames[-1])]
+    codes = clock.merged(inner)
+    values = np.array([value_at(attribute, code) for code in codes])  # raises a ShotError if a value is not a number
+    steps, corners = _breaks(spline, inner, float(np.ptp(values)))
+    ramp = STEP * clock.time_codes_per_second
+    starts = np.array([max(code - ramp, 0.5 * (code + codes[codes < code].max())) for code in steps])
+    breaks = np.unique(np.concatenate([steps, starts, corners]))
+    lines = list(zip(starts, steps, strict=True))
+    codes = _refined_codes(spline, np.unique(np.concatenate([codes, starts])), breaks, lines, clock, to_si)
+    track = _track(spline, codes, breaks, clock, to_si)
+    reading.note(f"{path}: the spline is read at its knots and at the frames of the shot")
+    _warn_of_breaks(spline, attribute, steps, corners, reading)
+    return track
+
+
+def _interval(frames: Array) -> Gf.Interval:
+    from pxr import Gf
+
+    return Gf.Interval(float(frames[0]), float(frames[-1]))
+
+
+def _breaks(spline: Ts.Spline, knots: Array, size: float) -> tuple[Array, Array]:
+    """Time codes of the knots at which a spline jumps, and of those at which it has a corner."""
+    slopes = np.array([[spline.EvalPreDerivative(k), spline.EvalDerivative(k)] for k in knots]).reshape(-1, 2)
+    jumps = np.array([abs(spline.Eval(k) - spline.EvalPreValue(k)) for k in knots])
+    step = jumps > _JUMP * max(size, 1e-12)
+    steepest = float(np.max(np.abs(slopes), initial=0.0))
+    corner = np.abs(np.diff(slopes, axis=1)[:, 0]) > _CORNER * steepest
+    return knots[step], knots[corner & ~step]
+
+
+def _track(spline: Ts.Spline, codes: Array, breaks: Array, clock: Clock, to_si: float) -> Track:
+    values = np.array([spline.Eval(code) for code in codes])
+    return Track(clock.seconds(codes), to_si * values, clock.seconds(breaks))
+
+
+def _refined_codes(
+    spline: Ts.Spline, codes: Array, breaks: Array, lines: list[tuple[float, float]], clock: Clock, to_si: float
+) -> Array:
+    """Time codes, refined where the track would differ from the spline by more than the tolerance, except in steps."""
+    from calmotion.model.curves import held_curve
+
+    end = float(clock.seconds(codes[-1]))
+    for _ in range(_ROUNDS):
+        middles = 0.5 * (codes[:-1] + codes[1:])
+        sampled = held_curve(_track(spline, codes, breaks, clock, to_si), end)(clock.seconds(middles), 0)
+        far = np.abs(sampled - to_si * np.array([spline.Eval(code) for code in middles])) > _EXACT
+        for start, step in lines:
+            far &= ~((middles > start) & (middles < step))
+        if not far.any():
+            break
+        codes = np.union1d(codes, middles[far])
+    return codes
+
+
+def _warn_of_breaks(
+    spline: Ts.Spline, attribute: Usd.Attribute, steps: Array, corners: Array, reading: Reading
+) -> None:
+    """Warn of steps and corners, which excite the structure."""
+    if len(steps):
+        jump = max(steps, key=lambda code: abs(spline.Eval(code) - spline.EvalPreValue(code)))
+        reading.warn(
+            ShotError(
+                f"the spline jumps, which is played within {1e3 * STEP:g} ms and excites the structure",
+                path=attribute.GetPrimPath(),
+                attribute=attribute.GetName(),
+                found=f"{len(steps)} times, most at time code {jump:g}: from {spline.EvalPreValue(jump):.6g} to "
+                f"{spline.Eval(jump):.6g}",
+                remedy="Replace the step by a smooth transition, unless it is intended",
+            )
+        )
+    if len(corners):
+        sharpest = max(corners, key=lambda code: abs(spline.EvalDerivative(code) - spline.EvalPreDerivative(code)))
+        reading.warn(
+            ShotError(
+                "the spline has corners, which excite the structure",
+                path=attribute.GetPrimPath(),
+                attribute=attribute.GetName(),
+                found=f"{len(corners)}, the sharpest at time code {sharpest:g}: from "
+                f"{spline.EvalPreDerivative(sharpest):.6g} to {spline.EvalDerivative(sharpest):.6g} a time code",
+                remedy="Smooth the tangents, unless the corners are intended",
+            )
+        )
+
+
+def value_at(attribute: Usd.Attribute, code: float) -> float:
+    """The value of an attribute at a time code, which must be a finite number."""
+    value = attribute.Get(code)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not np.isfinite(number):
+        raise ShotError(
+            "a sample of the animation is not a finite number",
+            path=attribute.GetPrimPath(),
+            attribute=attribute.GetName(),
+            found=f"{'a block' if value is None else value} at time code {code:g}",
+            remedy="Correct or remove the sample",
+        )
+    return number
+
 
 MOST = 1_000_000  # samples of one motor
 _SPARSE = 2.0  # frames: samples further apart are keys rather than a sampled curve

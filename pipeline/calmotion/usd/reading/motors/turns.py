@@ -9,7 +9,7 @@ from calmotion.errors import ShotError
 from calmotion.model import Track
 from calmotion.model.curves import TURN
 from calmotion.usd.reading.context import Reading
-from calmotion.usd.reading.joints import JointPrim
+from calmotion.usd.reading.joints.joint_prims import JointPrim
 
 _FASTEST = 20.0  # of a joint that turns by a whole turn between two samples: 190 turns a minute [rad/s]
 _NEAR = 0.25 * TURN  # how far a jump less its turns may be from what its neighbours lead to [rad]

@@ -1,1 +1,0 @@
-"""What holds a robot: its root, and the ground under its feet."""

@@ -1,1 +1,0 @@
-"""Generic (D6) joints of UsdPhysics: what they leave free, and the hinges and sliders that they are made of."""
