@@ -12,7 +12,7 @@ from calmotion.usd.gf import vector as vector
 from calmotion.usd.layers import EXTENSIONS as EXTENSIONS
 from calmotion.usd.layers import refuse_input_as_output as refuse_input_as_output
 from calmotion.usd.layers import write_layer as write_layer
-from calmotion.usd.reading.actuators.motor_models import DAMPING_ON as DAMPING_ON
+from calmotion.usd.reading.actuators.gains import DAMPING_ON as DAMPING_ON
 from calmotion.usd.reading.bodies.mass import mass_of as mass_of
 from calmotion.usd.reading.bodies.shapes import shapes_of as shapes_of
 from calmotion.usd.reading.bodies.shapes import tets_of as tets_of

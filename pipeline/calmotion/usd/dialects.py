@@ -6,10 +6,14 @@ mujoco-usd-converter), PhysX. usd-core does not define the schemas of the last t
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from calmotion.errors import ShotError
+from calmotion.model.motor import FRICTION_LAWS
+from calmotion.usd import schemas
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -113,29 +117,107 @@ GEARS = (
 )  # fmt: skip
 
 
-def number_of(prim: Usd.Prim, name: str) -> float | None:
-    """The value of a numeric attribute, of any numeric type; None where none is authored.
+@dataclass(frozen=True)
+class Rule:
+    """What the number of an attribute may be, and what a user reads of another one."""
+
+    allows: Callable[[float], bool]
+    problem: str
+    remedy: str = schemas.CORRECT
+
+
+def spelled_law(field: str) -> str:
+    """The attribute of a field of a law of friction."""
+    return "calm:motor:friction:" + re.sub(r"_(\w)", lambda found: found[1].upper(), field)
+
+
+_FINITE = Rule(math.isfinite, "is not finite", "Correct the value")
+_NUMBER = Rule(lambda value: not math.isnan(value), "is not a number", "Author a number")
+_POSITIVE = Rule(lambda value: 0.0 < value < math.inf, "must be positive and finite")
+_POSITIVE_OR_INFINITE = Rule(lambda value: value > 0.0, "must be positive")
+_NOT_NEGATIVE = Rule(lambda value: 0.0 <= value < math.inf, "must be finite and not negative")
+_LIMIT = Rule(
+    lambda value: value > 0.0,
+    "a limit must be positive",
+    "Correct the limit, or remove the attribute (the motor then has no limit)",
+)
+_MASS = Rule(
+    lambda value: 0.0 <= value < math.inf,
+    "masses and densities must be positive",
+    "Author a positive value, or remove the attribute so that it follows from geometry and density",
+)
+
+RULES = {
+    "physics:mass": _MASS,
+    "physics:density": _MASS,
+    "physics:youngsModulus": _POSITIVE,
+    "physics:poissonsRatio": Rule(lambda value: -1.0 < value < 0.5, "must lie between -1 and 0.5, exclusively"),
+    "calm:damping:ratio": Rule(
+        lambda value: 0.0 <= value < 1.0,
+        "must lie between 0 and 1 (critical damping)",
+        "Author a fraction of critical damping, such as 0.01",
+    ),
+    "calm:damping:rayleighMass": _NOT_NEGATIVE,
+    "calm:damping:rayleighStiffness": _NOT_NEGATIVE,
+    "physics:lowerLimit": _NUMBER,
+    "physics:upperLimit": _NUMBER,
+    "limit:{drive}:physics:low": _NUMBER,
+    "limit:{drive}:physics:high": _NUMBER,
+    "drive:{drive}:physics:targetPosition": _FINITE,
+    "drive:{drive}:physics:maxForce": _LIMIT,
+    **dict.fromkeys((f"calm:motor:max{what}" for what in ("Torque", "Velocity", "Acceleration", "Jerk")), _LIMIT),
+    **dict.fromkeys((f"calm:motor:{what}" for what in ("delay", "backlash", "backEmf", "gearDamping")), _NOT_NEGATIVE),
+    **dict.fromkeys(
+        (f"calm:motor:{what}" for what in ("gearStiffness", "frictionSpeed", "noLoadSpeed")), _POSITIVE_OR_INFINITE
+    ),
+    "calm:motor:torqueSpeedKnee": Rule(
+        lambda value: 0.0 <= value < 1.0, "must be a share of the no-load speed, below 1"
+    ),
+    "calm:motor:gainFactor": _POSITIVE,
+    **dict.fromkeys(
+        (f"calm:motor:{what}" for what in ("voltage", "resistance", "torqueConstant", "dutyGain", "maxDuty")), _POSITIVE
+    ),
+    **{spelled_law(name): _NOT_NEGATIVE for law in FRICTION_LAWS for name in law.__dataclass_fields__},
+    "calm:motor:friction:stribeckSpeed": _POSITIVE,
+    "calm:motor:friction:stribeckExponent": _POSITIVE,
+    "physics:gearRatio": Rule(
+        lambda value: math.isfinite(value) and value != 0.0,
+        "the ratio of a gear is a number that is not zero",
+        "Author the teeth of hinge 0 over those of hinge 1, with a sign",
+    ),
+    "physics:ratio": Rule(
+        lambda value: math.isfinite(value) and value != 0.0,
+        "the ratio of a rack is a number that is not zero",
+        "Author the degrees that the pinion turns while the rack moves by one unit of length",
+    ),
+    **dict.fromkeys((name for gear in GEARS for name in (gear.ratio, gear.offset)), _FINITE),
+    **dict.fromkeys((one.attribute for one in (*ARMATURE, *FRICTION, *VISCOUS_FRICTION)), _NOT_NEGATIVE),
+}
+
+
+def number_of(prim: Usd.Prim, name: str, fallback: float | None = None, drive: str = "") -> float | None:
+    """The value of a numeric attribute, of any numeric type; the fallback where none is authored.
+
+    Args:
+        name: With `{drive}` in place of the drive, where the attribute has one.
 
     Raises:
-        ShotError: The value is not a number.
+        ShotError: The value is not a number, or not one that `RULES` allow.
     """
-    attribute = prim.GetAttribute(name)
+    full, rule = name.format(drive=drive), RULES.get(name)
+    attribute = prim.GetAttribute(full)
     value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
     if value is None:
-        return None
+        return fallback
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ShotError(
-            "is not a number",
-            path=prim.GetPath(),
-            attribute=name,
-            found=f"{value} ({attribute.GetTypeName() or 'of an unknown type'})",
-            remedy="Author it as float",
-        )
+        found = f"{value} ({attribute.GetTypeName() or 'of an unknown type'})"
+        schemas.require(False, prim, full, found, "is not a number", "Author it as float")
+    if rule is not None:
+        schemas.require(rule.allows(value), prim, full, value, rule.problem, rule.remedy)
     return float(value)
 
 
 def authored(prim: Usd.Prim, spelling: Spelling, drive: str) -> tuple[str, float] | None:
     """Name and value of an attribute where it is authored on a joint."""
-    name = spelling.attribute.format(drive=drive)
-    value = number_of(prim, name)
-    return None if value is None else (name, value)
+    value = number_of(prim, spelling.attribute, drive=drive)
+    return None if value is None else (spelling.attribute.format(drive=drive), value)

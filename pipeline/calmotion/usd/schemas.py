@@ -110,12 +110,12 @@ def require(holds: bool, prim: Usd.Prim, attribute: str, found: object, problem:
 def choice(
     prim: Usd.Prim, schema: str, attribute: str, allowed: Sequence[str], problem: str, fallback: str = ""
 ) -> str:
-    """The value of an attribute that has one of some names.
+    """The value of an attribute that has one of some names; the fallback where it has none.
 
     Raises:
         ShotError: Another one; the problem says which kind of name it is.
     """
-    found = str(value(prim, schema, attribute))
+    found = str(value(prim, schema, attribute) or fallback)
     require(
         found in allowed, prim, attribute, found, problem, f"{nearest(found, allowed)}Use one of {', '.join(allowed)}"
     )

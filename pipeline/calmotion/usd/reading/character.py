@@ -15,7 +15,7 @@ from calmotion.model.motor import PRESCRIBED
 from calmotion.support.naming import grouped_notes
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import scene, targets
-from calmotion.usd.reading.actuators.motor_models import motor_model
+from calmotion.usd.reading.actuators.described_motors import motor_model
 from calmotion.usd.reading.animated import moves, refuse_moving
 from calmotion.usd.reading.bodies import mass
 from calmotion.usd.reading.bodies.flexible import flexible_settings, with_parts

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -77,39 +76,22 @@ def _is_elastic(material: Usd.Prim) -> bool:
 
 def _material(reading: Reading, prim: Usd.Prim) -> ElasticMaterial:
     units = reading.units
-    modulus = _number(prim, "physics:youngsModulus", lambda x: x > 0.0, "must be positive")
-    ratio = _number(prim, "physics:poissonsRatio", lambda x: -1.0 < x < 0.5, "must lie between -1 and 0.5, exclusively")
-    density = _number(prim, "physics:density", lambda x: x > 0.0, "must be positive")
-    damping = float(schemas.value(prim, "CalmDampingAPI", "calm:damping:ratio"))
-    schemas.require(
-        0.0 <= damping < 1.0, prim, "calm:damping:ratio", damping, "must lie between 0 and 1 (critical damping)",
-        "Author a fraction of critical damping, such as 0.01",
-    )  # fmt: skip
-    rayleigh = [_rayleigh(prim, name) for name in ("calm:damping:rayleighMass", "calm:damping:rayleighStiffness")]
+    modulus, ratio, density = (
+        number_of(prim, name) for name in ("physics:youngsModulus", "physics:poissonsRatio", "physics:density")
+    )
+    for name, value in (("youngsModulus", modulus), ("poissonsRatio", ratio), ("density", density or None)):
+        if value is None:
+            raise ShotError("is not authored", path=prim.GetPath(), attribute=f"physics:{name}", remedy=_REMEDY)
+    usual = schemas.value(prim, "CalmDampingAPI", "calm:damping:ratio")
+    rayleigh = [number_of(prim, f"calm:damping:rayleigh{of}") for of in ("Mass", "Stiffness")]
     return ElasticMaterial(
         path=str(prim.GetPath()),
         youngs_modulus=units.pressure(modulus),
         poissons_ratio=ratio,
         density=units.density(density),
-        damping_ratio=damping,
+        damping_ratio=number_of(prim, "calm:damping:ratio", usual),
         rayleigh=None if rayleigh == [None, None] else (rayleigh[0] or 0.0, rayleigh[1] or 0.0),
     )
-
-
-def _number(prim: Usd.Prim, name: str, allowed: Callable[[float], bool], problem: str) -> float:
-    value = number_of(prim, name)
-    if value is None:
-        raise ShotError("is not authored", path=prim.GetPath(), attribute=name, remedy=_REMEDY)
-    schemas.require(math.isfinite(value) and allowed(value), prim, name, value, problem)
-    return value
-
-
-def _rayleigh(prim: Usd.Prim, name: str) -> float | None:
-    value = schemas.value(prim, "CalmDampingAPI", name)
-    if value is None:
-        return None
-    schemas.require(math.isfinite(value) and value >= 0.0, prim, name, value, "must not be negative")
-    return float(value)
 
 
 _SCHEMA, _INFILL, _PERIMETERS = "CalmFlexibleBodyAPI", "calm:flexible:infill", "calm:flexible:perimeters"

@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import MassProperties
 from calmotion.usd import gf, schemas
+from calmotion.usd.dialects import number_of
 from calmotion.usd.reading.bodies.flexible import ELASTIC
 from calmotion.usd.reading.bodies.moments import Moments, sum_of, surface_moments
 from calmotion.usd.reading.bodies.primitives import TYPES
@@ -45,7 +46,7 @@ def mass_of(reading: Reading, prim: Usd.Prim, pose: Pose, shapes: list[Shape]) -
         ShotError: A mass or density that is authored and negative, or not finite; an inertia that is not positive.
     """
     units = reading.units
-    mass = _authored(prim, "physics:mass", "mass")
+    mass = _authored(prim, "physics:mass")
     written = prim.GetAttribute("physics:mass")
     if mass is None and written and written.HasAuthoredValue():
         reading.note(
@@ -87,22 +88,12 @@ def _solids(prim: Usd.Prim, shapes: list[Shape]) -> list[Shape]:
 
 
 def _states(prim: Usd.Prim) -> bool:
-    return any(_authored(prim, f"physics:{what}", what) is not None for what in ("mass", "density"))
+    return any(_authored(prim, f"physics:{what}") is not None for what in ("mass", "density"))
 
 
-def _authored(prim: Usd.Prim, name: str, what: str) -> float | None:
+def _authored(prim: Usd.Prim, name: str) -> float | None:
     """A mass or density: None where not authored, or zero, which UsdPhysics reads as not authored."""
-    attribute = prim.GetAttribute(name)
-    if not attribute or not attribute.HasAuthoredValue():
-        return None
-    value = attribute.Get()
-    if value is None or value == 0.0:
-        return None
-    schemas.require(
-        bool(np.isfinite(value) and value > 0.0), prim, name, value, f"the {what} must be positive",
-        f"Author a positive {what}, or remove the attribute so that it follows from geometry and density",
-    )  # fmt: skip
-    return float(value)
+    return number_of(prim, name) or None
 
 
 def _center(prim: Usd.Prim) -> Array | None:
@@ -158,13 +149,13 @@ def _from_geometry(
     _note_unread_colliders(reading, prim)
     solids = _solids(prim, shapes)
     note_unread_masses(reading, prim, shapes)
-    density = _authored(prim, "physics:density", "density")
+    density = _authored(prim, "physics:density")
     parts: list[MassProperties] = []
     for shape in solids:
         separate = shape.prim != prim  # a body may itself be its only geometry
-        part_density = _authored(shape.prim, "physics:density", "density") if separate else None
+        part_density = _authored(shape.prim, "physics:density") if separate else None
         part_density = part_density or density or _material_density(shape.prim)
-        part_mass = _authored(shape.prim, "physics:mass", "mass") if separate else None
+        part_mass = _authored(shape.prim, "physics:mass") if separate else None
         si = None if part_density is None else reading.units.density(part_density)
         if si is None and (shape.collider or body_mass is not None or part_mass is not None):
             si = _DEFAULT_DENSITY
@@ -224,7 +215,7 @@ def note_unread_masses(reading: Reading, prim: Usd.Prim, shapes: list[Shape]) ->
             continue
         said: dict[str, Any] = {"physics:centerOfMass": _center(below), "physics:diagonalInertia": _inertia(below)}
         if below.GetPath() not in solids:
-            said |= {name: _authored(below, name, name[8:]) for name in ("physics:mass", "physics:density")}
+            said |= {name: _authored(below, name) for name in ("physics:mass", "physics:density")}
         for name in (name for name, value in said.items() if value is not None):
             reading.note(f"{below.GetPath()}: {name} is not used here; author it on the body, {prim.GetPath()}")
 
@@ -259,4 +250,4 @@ def _material_density(prim: Usd.Prim, elastic: bool = True) -> float | None:
         return None
     if not elastic and is_applied(material.GetPrim(), ELASTIC):
         return None
-    return _authored(material.GetPrim(), "physics:density", "density")
+    return _authored(material.GetPrim(), "physics:density")

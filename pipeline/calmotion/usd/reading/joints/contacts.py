@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
@@ -67,30 +66,14 @@ def contact_joints(
 
 def _joint(reading: Reading, path: str, body: str, pose: Pose, clock: Clock) -> JointPrim:
     prim, meters = reading.stage.GetPrimAtPath(path), reading.units.length(1.0)
-    kind = str(schemas.value(prim, _SCHEMA, _KIND))
-    if kind not in _KINDS:
-        raise ShotError(
-            "there is no such kind of contact",
-            path=path,
-            attribute=_KIND,
-            found=kind,
-            remedy=f"Use one of {', '.join(_KINDS)}",
-        )
-    friction = float(schemas.value(prim, _SCHEMA, _FRICTION))
-    if not (math.isfinite(friction) and (friction >= 0.0 or friction == -1.0)):
-        raise ShotError(
-            "a coefficient of friction must not be negative",
-            path=path,
-            attribute=_FRICTION,
-            found=friction,
-            remedy="Author 0 or more, or -1 where it is not known",
-        )
+    kind = schemas.choice(prim, _SCHEMA, _KIND, tuple(_KINDS), "there is no such kind of contact")
+    friction = schemas.automatic(prim, _SCHEMA, _FRICTION, zero=True)
     world = pose_from_matrix(reading.world_matrix(prim), path)
     local = Frame(
         reading.units.length(pose.to_local(world.position[None])[0]),
         quaternion_from_rotation(pose.rotation.T @ world.rotation),
     )
-    contact = _activity(prim, clock, friction)
+    contact = _activity(prim, clock, -1.0 if friction is None else friction)
     return JointPrim(None, path, _KINDS[kind], "", body, world.frame(meters), local, closes_chain=True, contact=contact)
 
 

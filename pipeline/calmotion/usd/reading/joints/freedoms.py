@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 GENERIC_JOINT = "PhysicsJoint"
 NO_ROTATION, NO_TRANSLATION = 1e-2, 1e-5  # play of a locked direction [deg], [stage length]
 TRANSLATIONS, ROTATIONS = ("transX", "transY", "transZ"), ("rotX", "rotY", "rotZ")
+LIMITS = "limit:{drive}:physics:low", "limit:{drive}:physics:high"  # attributes of a direction
 SEVERAL_FREEDOMS = "several"  # kind of a joint that is made of hinges and sliders
 
 
@@ -44,15 +45,11 @@ class Freedoms:
         """`X`, `Y` or `Z`."""
         return self.freedom[-1:]
 
-    @property
-    def limits(self) -> tuple[str, str]:
-        """Names of the attributes with the lower and upper limit."""
-        return limits_of(self.freedom)
-
 
 def limits_of(direction: str) -> tuple[str, str]:
     """Names of the attributes with the lower and upper limit of a direction."""
-    return f"limit:{direction}:physics:low", f"limit:{direction}:physics:high"
+    low, high = (limit.format(drive=direction) for limit in LIMITS)
+    return low, high
 
 
 def freedoms(prim: Usd.Prim) -> Freedoms:
@@ -81,13 +78,12 @@ def _is_driven(prim: Usd.Prim, name: str) -> bool:
 
 def _is_locked(prim: Usd.Prim, name: str) -> bool:
     least = NO_ROTATION if name in ROTATIONS else NO_TRANSLATION
-    low, high = (_number(prim, f"limit:{name}:physics:{end}") for end in ("low", "high"))
+    low, high = (_known(prim.GetAttribute(limit)) for limit in limits_of(name))
     if low is None or high is None:
         return False
     return low > high or max(abs(low), abs(high)) <= least
 
 
-def _number(prim: Usd.Prim, name: str) -> float | None:
-    attribute = prim.GetAttribute(name)
+def _known(attribute: Usd.Attribute) -> float | None:
     value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
     return None if value is None or math.isnan(value) else float(value)

@@ -14,6 +14,7 @@ from calmotion.model import WORLD, Frame
 from calmotion.model.animation import Contact
 from calmotion.support.naming import nearest
 from calmotion.usd import gf
+from calmotion.usd.dialects import number_of
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.reading.joints import freedoms
 from calmotion.usd.transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
@@ -117,7 +118,7 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
     free: tuple[str, ...] = ()
     if prim.GetTypeName() == freedoms.GENERIC_JOINT:
         found = freedoms.freedoms(prim)
-        kind, drive, axis, limits, free = found.kind, found.freedom, found.axis, found.limits, found.free
+        kind, drive, axis, limits, free = found.kind, found.freedom, found.axis, freedoms.LIMITS, found.free
         if not kind:
             reading.note(f"{path}: it leaves all directions free and nothing drives it, so it is left out")
             return None
@@ -128,10 +129,9 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
     turn = axis_rotation(axis) if axis else np.eye(3)
     meters = reading.units.length(1.0)
     to_si = np.deg2rad(1.0) if kind == "revolute" else meters
-    lower, upper = _limits(prim, limits, to_si) if kind in _WITH_AXIS else (-np.inf, np.inf)
-    authored = [prim.GetAttribute(name) for name in limits] if kind in _WITH_AXIS else []
-    given = [attribute.Get() for attribute in authored if attribute and attribute.HasAuthoredValue()]
-    if len(given) == 2 and None not in given and given[0] > given[1]:
+    lower, upper = _limits(prim, limits, to_si, drive) if kind in _WITH_AXIS else (-np.inf, np.inf)
+    given = [number_of(prim, name, drive=drive) for name in limits] if kind in _WITH_AXIS else [None]
+    if None not in given and given[0] > given[1]:
         reading.note(f"{path}: its lower limit is above its upper one, so UsdPhysics does not limit it")
     (body0, position0, rotation0), (body1, position1, rotation1) = ends
     turned = body1 == ""
@@ -166,7 +166,7 @@ def axis_limits(prim: Usd.Prim, direction: str, kind: str, meters: float) -> tup
         kind: `revolute` or `prismatic`.
         meters: Metres in the stage's unit of length.
     """
-    return _limits(prim, freedoms.limits_of(direction), np.deg2rad(1.0) if kind == "revolute" else meters)
+    return _limits(prim, freedoms.LIMITS, np.deg2rad(1.0) if kind == "revolute" else meters, direction)
 
 
 def joint_to_world(body: str, pose: Pose, meters: float, kind: str = "fixed") -> JointPrim:
@@ -243,22 +243,12 @@ def _finite(prim: Usd.Prim, name: str, convert: Callable[[Any], Array]) -> Array
     return converted
 
 
-def _limits(prim: Usd.Prim, names: tuple[str, str], to_si: float) -> tuple[float, float]:
+def _limits(prim: Usd.Prim, names: tuple[str, str], to_si: float, direction: str = "") -> tuple[float, float]:
     """Lower and upper limit [rad or m], infinite where there is none."""
-    values = []
-    for name, unlimited in zip(names, (-np.inf, np.inf), strict=True):
-        attribute = prim.GetAttribute(name)
-        value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
-        value = unlimited if value is None else float(value)
-        if np.isnan(value):
-            raise ShotError(
-                "is not a number", path=prim.GetPath(), attribute=name, found=value, remedy="Author a number"
-            )
-        values.append(to_si * value)
-    lower, upper = values
+    lower, upper = (number_of(prim, name, end, direction) for name, end in zip(names, (-np.inf, np.inf), strict=True))
     if lower > upper:
         return -np.inf, np.inf  # UsdPhysics: a joint whose lower limit exceeds its upper one is not limited
-    return lower, upper
+    return to_si * lower, to_si * upper
 
 
 def refuse_unsupported(joint: JointPrim) -> None:

@@ -5,7 +5,6 @@ usd-core does not know their types, so that their attributes have no fallbacks.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -85,19 +84,6 @@ def coupled_joint(
     )  # fmt: skip
 
 
-def ratio_of(prim: Usd.Prim, attribute: str, what: str, remedy: str) -> float:
-    """The ratio of a coupling as authored, 1 where it is not.
-
-    Raises:
-        ShotError: Zero, or not a finite number.
-    """
-    ratio = number_of(prim, attribute)
-    ratio = 1.0 if ratio is None else ratio
-    if not math.isfinite(ratio) or ratio == 0.0:
-        raise ShotError(what, path=str(prim.GetPath()), attribute=attribute, found=ratio, remedy=remedy)
-    return ratio
-
-
 ALONG = 0.99  # cosine: an axis that is farther off does not lie along the joint's
 CLOSE = 1e-3  # as in PhysX, units of the stage: a rack whose distance from the axis is below it has no side
 
@@ -119,10 +105,7 @@ def rack_coupling(
     what = "a rack and pinion couples a hinge and a slide"
     hinge = coupled_joint(prim, first, hinges, "", what, "PhysicsRevoluteJoint")
     slide = coupled_joint(prim, second, slides, "", what, "PhysicsPrismaticJoint")
-    ratio = ratio_of(
-        prim, "physics:ratio", "the ratio of a rack is a number that is not zero",
-        "Author the degrees that the pinion turns while the rack moves by one unit of length",
-    )  # fmt: skip
+    ratio = number_of(prim, "physics:ratio", 1.0)
     e, p0, turn = _frame(reading, prim, 0, hinge)
     r, p1, push = _frame(reading, prim, 1, slide)
     way = float(np.cross(e, p1 - p0) @ r)
@@ -216,8 +199,5 @@ def _coupling(reading: Reading, prim: Usd.Prim, hinges: Mapping[str, JointPrim])
             )  # fmt: skip
         found.append(hinge.path)
         signs.append(-1.0 if ends[0] in on else 1.0)
-    ratio = ratio_of(
-        prim, "physics:gearRatio", "the ratio of a gear is a number that is not zero",
-        "Author the teeth of hinge 0 over those of hinge 1, with a sign",
-    )  # fmt: skip
+    ratio = number_of(prim, "physics:gearRatio", 1.0)
     return Coupling(prim, (found[0], found[1]), -ratio * signs[0] / signs[1])

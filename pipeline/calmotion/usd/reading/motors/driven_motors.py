@@ -11,24 +11,17 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.model import Follows, Motor
-from calmotion.model.motor import SERVO
 from calmotion.usd import schemas
 from calmotion.usd.dialects import number_of
-from calmotion.usd.reading.actuators.foreign_actuators import (
-    ACTUATOR,
-    TARGETS,
-    actuators_beside,
-    affine_actuators,
-    newton_actuator,
-)
-from calmotion.usd.reading.actuators.motor_models import motor_model, read_gains
-from calmotion.usd.reading.actuators.named_types import named_type
-from calmotion.usd.reading.actuators.rotors import direct_current, gain_factor, read_backlash, read_delay, read_rotor
+from calmotion.usd.reading.actuators.described_motors import described_motor
+from calmotion.usd.reading.actuators.foreign_actuators import ACTUATOR, TARGETS, affine_actuators
+from calmotion.usd.reading.actuators.gains import read_gains
+from calmotion.usd.reading.actuators.rotors import read_delay, read_rotor
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.reading.joints.joint_prims import JointPrim, refuse_unsupported
 from calmotion.usd.reading.motors.couplings import gears_of_joints
 from calmotion.usd.reading.motors.gearing import Gear, led_by_driven, read_gear, resolve
-from calmotion.usd.reading.motors.motor_limits import calmotion_limit, effort_limit, may_change, velocity_limit
+from calmotion.usd.reading.motors.motor_limits import effort_limit, may_change, velocity_limit
 from calmotion.usd.reading.motors.tracks import sample_codes
 from calmotion.usd.reading.motors.undriven_joints import (
     note_or_refuse_no_motors,
@@ -40,7 +33,7 @@ from calmotion.usd.units import StageUnits
 if TYPE_CHECKING:
     from pxr import Usd
 
-_TARGET_POSITION = "drive:{}:physics:targetPosition"
+_TARGET_POSITION = "drive:{drive}:physics:targetPosition"
 SKEL_JOINT = "calm:motor:skelJoint"
 DRIVE, BODIES, SKELETON, CONSTANT, GEARED, GIVEN = "drive", "bodies", "skeleton", "constant", "geared", "given"
 _SCHEMA = "CalmMotorAPI"
@@ -51,7 +44,7 @@ _WRITTEN_AS = {BODIES: "xformOpOrder", SKELETON: SKEL_JOINT}
 
 def target_attribute(joint: JointPrim) -> str:
     """Name of the attribute with the track of a joint that a motor can drive."""
-    return _TARGET_POSITION.format(joint.drive)
+    return _TARGET_POSITION.format(drive=joint.drive)
 
 
 def to_si(kind: str, units: StageUnits) -> float:
@@ -232,41 +225,36 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
     Raises:
         ShotError: A limit that is not positive; a model or gains that cannot be used.
     """
-    prim, linear = drive.joint.prim, drive.joint.kind == "prismatic"
-    from_stage = reading.units.length if linear else np.deg2rad
-    gear, model, kind = drive.gear, motor_model(prim), named_type(drive.joint)
-    newton = newton_actuator(reading.stage, drive.actuator)
-    mujoco = actuators_beside(reading.stage, drive.actuator, drive.joint) if drive.actuator and newton is None else ()
-    for actuator in affine_actuators(mujoco):
+    prim, gear = drive.joint.prim, drive.gear
+    described = described_motor(reading, drive.joint, drive.actuator)
+    for actuator in affine_actuators(described.mujoco):
         if actuator.holds and (doubt := actuator.doubt()):
             reading.note(f"{drive.joint.path}: {doubt} ({actuator.prim.GetPath()})")
-    current = direct_current(drive.joint, reading.units, kind) if model == SERVO else None
-    gains = read_gains(drive.joint, mujoco, newton, reading.units, model, kind, current)
-    limit = effort_limit(drive.joint, reading.units, reading.notes, kind, newton, mujoco)
+    gains = read_gains(described)
     motor = Motor(
         joint=index,
         path=drive.joint.path,
         attribute=_WRITTEN_AS.get(drive.source, target_attribute(drive.joint)),
         source=drive.source if drive.source in _WRITTEN_AS else DRIVE,
         optimize=may_change(prim),
-        max_velocity=velocity_limit(drive.joint, reading.units, reading.notes, kind),
-        max_acceleration=float(from_stage(calmotion_limit(prim, "calm:motor:maxAcceleration"))),
-        max_jerk=float(from_stage(calmotion_limit(prim, "calm:motor:maxJerk"))),
-        max_torque=limit if current is None else current.largest_torque,
-        linear=linear,
+        max_velocity=velocity_limit(described),
+        max_acceleration=described.own_or_named("maxAcceleration", "", described.length, math.inf),
+        max_jerk=described.own_or_named("maxJerk", "", described.length, math.inf),
+        max_torque=effort_limit(described),
+        linear=described.linear,
         follows=None if gear is None else Follows(motors[gear.leader], gear.ratio, gear.offset),
-        model=model,
+        model=described.model,
         position_gain=gains.position,
         velocity_gain=gains.velocity,
         damping_on=gains.damping_on,
         gains_from=gains.source,
-        rotor=read_rotor(drive.joint, reading.units, model, kind, newton, reading.notes, current),
-        delay=read_delay(drive.joint, model, kind, newton),
-        backlash=read_backlash(drive.joint, reading.units, kind),
-        kind=kind.name,
+        rotor=read_rotor(described),
+        delay=read_delay(described),
+        backlash=described.own_or_named("backlash", "backlash", described.length, 0.0),
+        kind=described.kind.name,
     )
-    factor = gain_factor(prim)
-    return motor if factor == 1.0 else motor.with_gain(factor * motor.position_gain)
+    factor = described.own("gainFactor")  # by what a calibration found the gain to differ
+    return motor if factor is None else motor.with_gain(factor * motor.position_gain)
 
 
 def _drive(
@@ -301,15 +289,11 @@ def _drive(
         return Drive(joint, SKELETON, skel_joint=skel_joint)
     if posed:
         return Drive(joint, BODIES)
-    constant = number_of(prim, name) if has_drive else None
+    constant = number_of(prim, _TARGET_POSITION, drive=drive) if has_drive else None
     holds = constant is not None and schemas.value(prim, _SCHEMA, "calm:motor:optimize") is False  # as a spring
     if ours and not still and not holds:
         raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint))
     if constant is not None:
-        if not math.isfinite(constant):
-            raise ShotError(
-                "is not finite", path=joint.path, attribute=name, found=constant, remedy="Correct the value"
-            )
         note = f"its drive is not animated and holds {constant:g} {unit}"
         return Drive(joint, CONSTANT, constant=constant * to_si(joint.kind, reading.units), note=note)
     if ours or joint.path in actuated:

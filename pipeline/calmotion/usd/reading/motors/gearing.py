@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -16,7 +15,7 @@ from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:
-    from pxr import Usd
+    pass
 
 _LEADING = ("revolute", "prismatic")
 
@@ -72,8 +71,8 @@ def read_gear(joint: JointPrim, kinds: dict[str, str], units: StageUnits) -> Gea
 
 
 def _gear(joint: JointPrim, spelling: GearSpelling, leader: str, leader_kind: str, units: StageUnits) -> Gear:
-    ratio = _number(joint.prim, spelling.ratio, spelling.default_ratio)
-    offset = _number(joint.prim, spelling.offset, 0.0)
+    ratio = number_of(joint.prim, spelling.ratio, spelling.default_ratio)
+    offset = number_of(joint.prim, spelling.offset, 0.0)
     follower_unit, leader_unit = (_to_si(kind, spelling, units) for kind in (joint.kind, leader_kind))
     return Gear(leader, spelling.sign * ratio * follower_unit / leader_unit, spelling.sign * offset * follower_unit)
 
@@ -82,14 +81,6 @@ def _to_si(kind: str, spelling: GearSpelling, units: StageUnits) -> float:
     if kind == "prismatic":
         return units.length(1.0)
     return 1.0 if spelling.angles == SI else float(np.deg2rad(1.0))
-
-
-def _number(prim: Usd.Prim, name: str, fallback: float) -> float:
-    value = number_of(prim, name)
-    value = fallback if value is None else value
-    if not math.isfinite(value):
-        raise ShotError("is not finite", path=prim.GetPath(), attribute=name, found=value, remedy="Correct the value")
-    return value
 
 
 def led_by_driven(gears: dict[str, Gear], driven: Collection[str]) -> dict[str, Gear]:

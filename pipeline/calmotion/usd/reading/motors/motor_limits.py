@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calmotion.catalogs.motor_types import MotorType
-from calmotion.errors import ShotError
 from calmotion.model import FreeTrack, Motor
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, authored, number_of
+from calmotion.usd.reading.actuators.described_motors import DescribedMotor
 from calmotion.usd.reading.actuators.foreign_actuators import (
-    NewtonActuator,
     actuators_beside,
     numbers_of,
     reachable,
@@ -23,74 +21,63 @@ from calmotion.usd.reading.actuators.foreign_actuators import (
 )
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints.joint_prims import JointPrim
-from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:
     from pxr import Usd
 
-_SCHEMA = "CalmMotorAPI"
+_SCHEMA, _FREE = "CalmMotorAPI", "calm:motor:optimize"
 _SAME = 1e-4  # of a range: what a conversion rounds
 
 
-def effort_limit(
-    joint: JointPrim, units: StageUnits, notes: list[str], kind: MotorType, newton: NewtonActuator | None,
-    mujoco: Sequence[Usd.Prim],
-) -> float:  # fmt: skip
+def effort_limit(motor: DescribedMotor) -> float:
     """Largest torque [N m] or force [N]; the lower of Calmotion's and UsdPhysics' limit, else that of another dialect.
 
-    Args:
-        kind: The named motor, whose limit stands for one of Calmotion that is not authored.
-        newton, mujoco: The joint's actuator, or actuators, of one or the other.
+    The limit of the named motor stands for one of Calmotion that is not authored.
 
     Raises:
         ShotError: A limit that is not positive.
     """
-    to_si = units.force if joint.kind == "prismatic" else units.torque
-    own = authored(joint.prim, EFFORT_LIMIT[0], joint.drive)
-    limit = kind.get("max_torque", math.inf) if own is None else to_si(positive(joint.prim, *own))
+    joint, newton = motor.joint, motor.newton
+    if motor.current is not None:
+        return motor.current.largest_torque
+    limit = motor.own_or_named("maxTorque", "max_torque", motor.effort, math.inf)
     force = authored(joint.prim, EFFORT_LIMIT[1], joint.drive)
     if force is not None:
-        limit = min(limit, to_si(positive(joint.prim, *force)))
+        limit = min(limit, motor.effort(force[1]))
     if not math.isfinite(limit):
-        limit = _mujoco_limit(joint, mujoco, to_si, notes)
+        limit = _mujoco_limit(motor)
     if not math.isfinite(limit) and newton is not None and 0.0 < newton.effort < math.inf:
-        notes.append(f"{joint.path}: its limit is taken from {newton.path} (Newton)")
-        limit = to_si(newton.effort)
+        motor.notes.append(f"{joint.path}: its limit is taken from {newton.path} (Newton)")
+        limit = motor.effort(newton.effort)
     return float(limit)
 
 
-def velocity_limit(joint: JointPrim, units: StageUnits, notes: list[str], kind: MotorType) -> float:
+def velocity_limit(motor: DescribedMotor) -> float:
     """Largest speed [rad/s or m/s]; Calmotion's limit, else that of another dialect.
 
-    Args:
-        kind: The named motor, whose largest or no-load speed stands for a limit of Calmotion that is not authored.
+    The largest or no-load speed of the named motor stands for a limit of Calmotion that is not authored.
 
     Raises:
         ShotError: A limit that is not positive.
     """
-    to_si = units.length if joint.kind == "prismatic" else np.deg2rad
-    own = authored(joint.prim, VELOCITY_LIMIT[0], joint.drive)
-    named = min(kind.get("max_speed", math.inf), kind.get("no_load_speed", math.inf))
-    limit = named if own is None else to_si(positive(joint.prim, *own))
-    return float(limit if math.isfinite(limit) else _dialect_limit(joint, to_si, notes))
-
-
-def _dialect_limit(joint: JointPrim, to_si: Callable[[float], float], notes: list[str]) -> float:
+    named = min(motor.kind.get("max_speed", math.inf), motor.kind.get("no_load_speed", math.inf))
+    limit = motor.own_or_named("maxVelocity", "", motor.length, named)
+    if math.isfinite(limit):
+        return limit
     for spelling in VELOCITY_LIMIT[1:]:
-        found = authored(joint.prim, spelling, joint.drive)
+        found = authored(motor.joint.prim, spelling, motor.joint.drive)
         if found is not None and found[1] < math.inf:
             if not found[1] > 0.0:
                 return math.inf  # in these dialects 0 means no limit
-            notes.append(f"{joint.path}: its limit is taken from {found[0]} ({spelling.dialect})")
-            return float(to_si(found[1]))
+            motor.notes.append(f"{motor.joint.path}: its limit is taken from {found[0]} ({spelling.dialect})")
+            return motor.length(found[1])
     return math.inf
 
 
-def _mujoco_limit(
-    joint: JointPrim, actuators: Sequence[Usd.Prim], to_si: Callable[[float], float], notes: list[str]
-) -> float:
+def _mujoco_limit(motor: DescribedMotor) -> float:
     """What the joint of MuJoCo lets through, and what its actuators give at most together, each times its gear. The
     narrower side of each range counts."""
+    joint, actuators = motor.joint, motor.mujoco
     found = {"mjc:actuatorfrcrange": _range(joint.prim, "mjc:actuatorfrcrange")}
     if actuators:
         limits = [_limit_of(prim) for prim in actuators]
@@ -99,8 +86,8 @@ def _mujoco_limit(
     source = min(found, key=found.__getitem__)
     if not found[source] < math.inf:
         return math.inf
-    notes.append(f"{joint.path}: its limit is taken from {source} (MuJoCo)")
-    return float(to_si(found[source]))
+    motor.notes.append(f"{joint.path}: its limit is taken from {source} (MuJoCo)")
+    return motor.effort(found[source])
 
 
 def _limit_of(actuator: Usd.Prim) -> tuple[str, float]:
@@ -146,27 +133,6 @@ def limits_of_commands(reading: Reading, joint: JointPrim, actuator: str) -> tup
         f"{shown * high:.4g} {unit}"
     )
     return low, high
-
-
-def calmotion_limit(prim: Usd.Prim, name: str) -> float:
-    """A limit of CalmMotorAPI in stage units; infinite where there is none."""
-    return positive(prim, name, schemas.value(prim, _SCHEMA, name))
-
-
-def positive(prim: Usd.Prim, name: str, value: float | None) -> float:
-    """The value of a limit; raises a ShotError unless it is positive."""
-    if value is None or not value > 0.0:
-        raise ShotError(
-            "a limit must be positive",
-            path=prim.GetPath(),
-            attribute=name,
-            found=value,
-            remedy="Correct the limit, or remove the attribute (the motor then has no limit)",
-        )
-    return float(value)
-
-
-_FREE = "calm:motor:optimize"
 
 
 def may_change(prim: Usd.Prim) -> bool:
