@@ -195,8 +195,8 @@ RULES = {
 }
 
 
-def number_of(prim: Usd.Prim, name: str, fallback: float | None = None, drive: str = "") -> float | None:
-    """The value of a numeric attribute, of any numeric type; the fallback where none is authored.
+def number_of(prim: Usd.Prim, name: str, drive: str = "") -> float | None:
+    """The value of a numeric attribute, of any numeric type; None where none is authored.
 
     Args:
         name: With `{drive}` in place of the drive, where the attribute has one.
@@ -208,7 +208,7 @@ def number_of(prim: Usd.Prim, name: str, fallback: float | None = None, drive: s
     attribute = prim.GetAttribute(full)
     value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
     if value is None:
-        return fallback
+        return None
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         found = f"{value} ({attribute.GetTypeName() or 'of an unknown type'})"
         schemas.require(False, prim, full, found, "is not a number", "Author it as float")
@@ -217,7 +217,13 @@ def number_of(prim: Usd.Prim, name: str, fallback: float | None = None, drive: s
     return float(value)
 
 
+def number_or(prim: Usd.Prim, name: str, fallback: float, drive: str = "") -> float:
+    """The same; the fallback where none is authored."""
+    found = number_of(prim, name, drive)
+    return fallback if found is None else found
+
+
 def authored(prim: Usd.Prim, spelling: Spelling, drive: str) -> tuple[str, float] | None:
     """Name and value of an attribute where it is authored on a joint."""
-    value = number_of(prim, spelling.attribute, drive=drive)
+    value = number_of(prim, spelling.attribute, drive)
     return None if value is None else (spelling.attribute.format(drive=drive), value)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -85,7 +85,7 @@ class DescribedMotor:
         return self.kind.get(quantity, fallback) if found is None else float(to_si(found))
 
     def of_dialects(
-        self, spellings: tuple[Spelling, ...], quantity: str, to_si: ToSI, others: dict[str, ToSI] | None = None
+        self, spellings: tuple[Spelling, ...], quantity: str, to_si: ToSI, others: Mapping[str, ToSI] | None = None
     ) -> float:
         """The value of the first dialect that has one, SI; zero where none has.
 

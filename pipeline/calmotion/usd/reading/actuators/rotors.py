@@ -14,7 +14,7 @@ from calmotion.model.motor import FRICTION_LAWS, PRESCRIBED, SERVO, Coulomb, Rot
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dialects import ARMATURE, FRICTION, VISCOUS_FRICTION, number_of, spelled_law
-from calmotion.usd.reading.actuators.described_motors import CALMOTION, SCHEMA, DescribedMotor
+from calmotion.usd.reading.actuators.described_motors import CALMOTION, SCHEMA, DescribedMotor, ToSI
 
 _LAW = "calm:motor:frictionModel"
 _COEFFICIENT = "physxJoint:jointFriction"
@@ -32,11 +32,12 @@ def friction_law(motor: DescribedMotor) -> Coulomb:
     remedy = f"{nearest(name, known)}Use {', '.join(known)}"
     schemas.require(name in known, prim, _LAW, name, "names a friction that does not exist", remedy)
     own = {spelled_law(item.name): item.name for item in fields(known[name])}
-    for other in map(str, prim.GetAuthoredPropertyNames(lambda text: text.startswith(spelled_law("")))):
+    given = [prop.GetName() for prop in prim.GetAuthoredPropertiesInNamespace("calm:motor:friction")]
+    for other in (name for name in given if name.startswith(spelled_law(""))):
         problem = f"the friction {name} has no such value"
         remedy = f"Remove it, or set {_LAW} to the friction that has it ({', '.join(known)})"
         schemas.require(other in own, prim, other, prim.GetAttribute(other).Get(), problem, remedy)
-    to_si = {
+    to_si: dict[str, ToSI] = {
         "stribeck": motor.effort,
         "stribeck_speed": motor.length,
         "motor_quadratic": lambda value: value / motor.effort(1.0),

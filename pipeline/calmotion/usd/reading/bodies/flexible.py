@@ -16,7 +16,7 @@ from calmotion.model.materials.parts import Part
 from calmotion.model.materials.printed import LINE_WIDTH, PERIMETERS, Core, core_of
 from calmotion.usd import schemas
 from calmotion.usd.dependencies import refuse_place
-from calmotion.usd.dialects import number_of
+from calmotion.usd.dialects import number_of, number_or
 from calmotion.usd.reading.bodies.shapes import Shape
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
 from calmotion.usd.transforms import Pose
@@ -76,20 +76,20 @@ def _is_elastic(material: Usd.Prim) -> bool:
 
 def _material(reading: Reading, prim: Usd.Prim) -> ElasticMaterial:
     units = reading.units
-    modulus, ratio, density = (
-        number_of(prim, name) for name in ("physics:youngsModulus", "physics:poissonsRatio", "physics:density")
-    )
-    for name, value in (("youngsModulus", modulus), ("poissonsRatio", ratio), ("density", density or None)):
-        if value is None:
-            raise ShotError("is not authored", path=prim.GetPath(), attribute=f"physics:{name}", remedy=_REMEDY)
+    values = []
+    for name in ("physics:youngsModulus", "physics:poissonsRatio", "physics:density"):
+        value = number_of(prim, name)
+        if value is None or (value == 0.0 and name == "physics:density"):
+            raise ShotError("is not authored", path=prim.GetPath(), attribute=name, remedy=_REMEDY)
+        values.append(value)
     usual = schemas.value(prim, "CalmDampingAPI", "calm:damping:ratio")
     rayleigh = [number_of(prim, f"calm:damping:rayleigh{of}") for of in ("Mass", "Stiffness")]
     return ElasticMaterial(
         path=str(prim.GetPath()),
-        youngs_modulus=units.pressure(modulus),
-        poissons_ratio=ratio,
-        density=units.density(density),
-        damping_ratio=number_of(prim, "calm:damping:ratio", usual),
+        youngs_modulus=units.pressure(values[0]),
+        poissons_ratio=values[1],
+        density=units.density(values[2]),
+        damping_ratio=number_or(prim, "calm:damping:ratio", usual),
         rayleigh=None if rayleigh == [None, None] else (rayleigh[0] or 0.0, rayleigh[1] or 0.0),
     )
 

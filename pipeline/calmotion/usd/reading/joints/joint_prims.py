@@ -14,7 +14,7 @@ from calmotion.model import WORLD, Frame
 from calmotion.model.animation import Contact
 from calmotion.support.naming import nearest
 from calmotion.usd import gf
-from calmotion.usd.dialects import number_of
+from calmotion.usd.dialects import number_of, number_or
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.reading.joints import freedoms
 from calmotion.usd.transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
@@ -130,8 +130,8 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
     meters = reading.units.length(1.0)
     to_si = np.deg2rad(1.0) if kind == "revolute" else meters
     lower, upper = _limits(prim, limits, to_si, drive) if kind in _WITH_AXIS else (-np.inf, np.inf)
-    given = [number_of(prim, name, drive=drive) for name in limits] if kind in _WITH_AXIS else [None]
-    if None not in given and given[0] > given[1]:
+    low, high = (number_of(prim, name, drive) for name in limits) if kind in _WITH_AXIS else (None, None)
+    if low is not None and high is not None and low > high:
         reading.note(f"{path}: its lower limit is above its upper one, so UsdPhysics does not limit it")
     (body0, position0, rotation0), (body1, position1, rotation1) = ends
     turned = body1 == ""
@@ -245,7 +245,7 @@ def _finite(prim: Usd.Prim, name: str, convert: Callable[[Any], Array]) -> Array
 
 def _limits(prim: Usd.Prim, names: tuple[str, str], to_si: float, direction: str = "") -> tuple[float, float]:
     """Lower and upper limit [rad or m], infinite where there is none."""
-    lower, upper = (number_of(prim, name, end, direction) for name, end in zip(names, (-np.inf, np.inf), strict=True))
+    lower, upper = (number_or(prim, name, end, direction) for name, end in zip(names, (-np.inf, np.inf), strict=True))
     if lower > upper:
         return -np.inf, np.inf  # UsdPhysics: a joint whose lower limit exceeds its upper one is not limited
     return to_si * lower, to_si * upper

@@ -15,7 +15,7 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.support.naming import nearest
 from calmotion.usd import gf
-from calmotion.usd.dialects import number_of
+from calmotion.usd.dialects import number_or
 from calmotion.usd.reading.context import Reading, body_on, prims_of
 from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.reading.motors.gearing import Gear
@@ -105,7 +105,7 @@ def rack_coupling(
     what = "a rack and pinion couples a hinge and a slide"
     hinge = coupled_joint(prim, first, hinges, "", what, "PhysicsRevoluteJoint")
     slide = coupled_joint(prim, second, slides, "", what, "PhysicsPrismaticJoint")
-    ratio = number_of(prim, "physics:ratio", 1.0)
+    ratio = number_or(prim, "physics:ratio", 1.0)
     e, p0, turn = _frame(reading, prim, 0, hinge)
     r, p1, push = _frame(reading, prim, 1, slide)
     way = float(np.cross(e, p1 - p0) @ r)
@@ -199,5 +199,5 @@ def _coupling(reading: Reading, prim: Usd.Prim, hinges: Mapping[str, JointPrim])
             )  # fmt: skip
         found.append(hinge.path)
         signs.append(-1.0 if ends[0] in on else 1.0)
-    ratio = number_of(prim, "physics:gearRatio", 1.0)
+    ratio = number_or(prim, "physics:gearRatio", 1.0)
     return Coupling(prim, (found[0], found[1]), -ratio * signs[0] / signs[1])

@@ -289,7 +289,7 @@ def _drive(
         return Drive(joint, SKELETON, skel_joint=skel_joint)
     if posed:
         return Drive(joint, BODIES)
-    constant = number_of(prim, _TARGET_POSITION, drive=drive) if has_drive else None
+    constant = number_of(prim, _TARGET_POSITION, drive) if has_drive else None
     holds = constant is not None and schemas.value(prim, _SCHEMA, "calm:motor:optimize") is False  # as a spring
     if ours and not still and not holds:
         raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint))

@@ -10,7 +10,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.support.naming import nearest
-from calmotion.usd.dialects import GEARS, SI, GearSpelling, number_of
+from calmotion.usd.dialects import GEARS, SI, GearSpelling, number_or
 from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.units import StageUnits
 
@@ -71,8 +71,8 @@ def read_gear(joint: JointPrim, kinds: dict[str, str], units: StageUnits) -> Gea
 
 
 def _gear(joint: JointPrim, spelling: GearSpelling, leader: str, leader_kind: str, units: StageUnits) -> Gear:
-    ratio = number_of(joint.prim, spelling.ratio, spelling.default_ratio)
-    offset = number_of(joint.prim, spelling.offset, 0.0)
+    ratio = number_or(joint.prim, spelling.ratio, spelling.default_ratio)
+    offset = number_or(joint.prim, spelling.offset, 0.0)
     follower_unit, leader_unit = (_to_si(kind, spelling, units) for kind in (joint.kind, leader_kind))
     return Gear(leader, spelling.sign * ratio * follower_unit / leader_unit, spelling.sign * offset * follower_unit)
 
