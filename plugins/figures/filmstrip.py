@@ -30,8 +30,6 @@ from calmotion.views import (
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .magnifier import choose_magnifier, draw_magnifier
-
 PANEL = 340  # pixels across a panel, before it is drawn into the figure
 SMOOTH = 2  # factor of the rendering, which is then averaged
 TRAIL_S = 0.5
@@ -80,7 +78,6 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
     floor = floor_below(model, reference)
     targets = farthest_targets(result.before, times)
     heads = panel_titles(character, [run for run, _, _ in runs], targets, times)
-    magnifier = choose_magnifier(reference, motions, targets, camera)
     figure = new_figure(WIDTH, 0.55 + len(runs) * (0.22 * heads[0][0].count("\n") + 0.22 + aspect * WIDTH / len(times)))
     grid = figure.subplots(len(runs), len(times), squeeze=False)
     for row, (run, color, name), motion, titles in zip(grid, runs, motions, heads, strict=True):
@@ -88,10 +85,8 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
             panel = View(model, motion, reference, column, camera, SMOOTH, floor=floor)
             picture = draw_over_ghost(panel)
             axes.imshow(picture, extent=(0, camera.size[0], camera.size[1], 0), interpolation="antialiased")
-            trails = draw_trails(axes, character, result.reference, times[column], camera, INTENDED, 1.0)
-            trails += draw_trails(axes, character, run.motion, times[column], camera, color, 1.4)
-            if magnifier.useful:
-                draw_magnifier(axes, magnifier, panel, int(targets[column]), color, trails)
+            draw_trails(axes, character, result.reference, times[column], camera, INTENDED, 1.0)
+            draw_trails(axes, character, run.motion, times[column], camera, color, 1.4)
             axes.set_axis_off()
             axes.set_xlim(0, camera.size[0])
             axes.set_ylim(camera.size[1], 0)
@@ -99,8 +94,6 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
         place = {"ha": "right", "va": "center", "transform": row[0].transAxes, "rotation": 90}
         row[0].text(0.0, 0.5, name, fontsize=NORMAL, color=color, fontweight="bold", **place)
     text = "Simulated motion over the intended motion (green) at the largest errors of the input"
-    if magnifier.useful:
-        text += f"; insets: the target named above, enlarged {magnifier.factor:g} times"
     figure.suptitle(text, fontsize=NORMAL, color=TEXT)
     return figure
 
@@ -143,13 +136,10 @@ def error_at(run: Simulation, target: int, time: float) -> float:
 
 def draw_trails(
     axes: Axes, character: Character, motion: Motion, time: float, camera: Camera, color: str, width: float
-) -> list[Array]:
-    """The path of each target up to a time [s]; its pixels, shape [n, 2] for each target."""
+) -> None:
+    """The path of each target up to a time [s]."""
     trail = trail_of(motion, time)
-    drawn = []
     for k in range(len(character.targets)):
         pixels = camera.project(trail[:, k])[:, :2]
         axes.plot(pixels[:, 0], pixels[:, 1], color=color, linewidth=width, solid_capstyle="round")
         axes.plot(pixels[-1:, 0], pixels[-1:, 1], "o", color=color, markersize=2.5)
-        drawn.append(pixels)
-    return drawn

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from calmotion.model import Character, Result, SystemModes
 from calmotion.views import LIMIT, SMALL, error_spectrum, highest_frequency, new_figure, tidy, titles
 from matplotlib.figure import Figure
@@ -10,8 +9,7 @@ from matplotlib.figure import Figure
 from .curves import WIDTH, runs_of, worst_targets
 
 DECADES = 5.0  # of the vertical axis
-NEAR = 0.05  # of the width: distance below which labels are joined
-LETTER = 0.0065  # of the width: that of a letter of a label
+NEAR = 0.05  # of the width: least distance of two labels
 ROOM = 1.15  # end of the axis over the highest significant frequency
 
 
@@ -40,13 +38,13 @@ def plot_spectra(character: Character, result: Result, modes: SystemModes | None
         for n, frequency in enumerate(marked):
             label = mode_label(modes) if n == 0 else None
             axes.axvline(frequency, color=LIMIT, linewidth=1.0, linestyle=":", label=label)
-        for group in grouped(marked, NEAR * end, LETTER * end, end):
-            inside = group[-1] + LETTER * end * len(label_of(group)) < end
-            axes.annotate(
-                label_of(group), (group[-1] if inside else group[0], 1.0),
-                xycoords=("data", "axes fraction"), xytext=(2 if inside else -2, -2), textcoords="offset points",
-                fontsize=SMALL - 1.0, color=LIMIT, va="top", ha="left" if inside else "right",
-            )  # fmt: skip
+        labelled = -end
+        for frequency in (f for f in marked if f > 0.0):
+            if frequency - labelled > NEAR * end:
+                labelled = frequency
+                place = {"xycoords": ("data", "axes fraction"), "xytext": (2, -2), "textcoords": "offset points"}
+                look = {"fontsize": SMALL - 1.0, "color": LIMIT, "va": "top"}
+                axes.annotate(f"{frequency:.1f}", (frequency, 1.0), **place, **look)
     # above the axes: inside, it would cover a curve or a mode
     all_axes[0].legend(
         fontsize=SMALL, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=3, frameon=False, borderaxespad=0.0
@@ -60,30 +58,3 @@ def mode_label(modes: SystemModes | None) -> str:
     if modes is None or modes.time_s <= 0.0:
         return "modes in the first pose"
     return f"modes in the pose at {modes.time_s:.2f} s (largest error)"
-
-
-def label_of(group: list[float]) -> str:
-    """The frequencies of a group as a text: each of up to two, and of more the range and their number."""
-    if len(group) > 2:
-        return f"{group[0]:.1f}–{group[-1]:.1f} ({len(group)})"
-    return ", ".join(f"{frequency:.1f}" for frequency in group)
-
-
-def grouped(values: list[float], gap: float, letter: float = 0.0, end: float = np.inf) -> list[list[float]]:
-    """Ascending values in groups, with less than `gap` between successive values of a group.
-
-    A value that the label of a group would cover, which begins at the last of the group, joins it; `letter` is the
-    width of one. The label of the last group stands before it where it would reach beyond `end`.
-    """
-    groups: list[list[float]] = []
-    for value in values:
-        if groups and value - groups[-1][-1] < max(gap, letter * (2 + len(label_of(groups[-1])))):
-            groups[-1].append(value)
-        else:
-            groups.append([value])
-    if len(groups) > 1:
-        before, last = groups[-2:]
-        wide = letter * len(label_of(last))
-        if last[-1] + wide >= end and before[-1] + letter * (1 + len(label_of(before))) > last[0] - wide:
-            groups[-2:] = [before + last]
-    return groups

@@ -1,4 +1,4 @@
-"""What came of a batch: one report for people, one object for programs."""
+"""What came of a batch, as an object for programs."""
 
 from __future__ import annotations
 
@@ -120,37 +120,3 @@ class BatchResult:
         """The outcomes that there are, and how many jobs have each."""
         counts = {name: sum(job.outcome == name for job in self.jobs) for name in OUTCOMES}
         return {name: count for name, count in counts.items() if count}
-
-    def page(self) -> str:
-        """The report for people, in Markdown."""
-        rows = [self._row(job.as_dict()) for job in self.jobs]
-        counts = ", ".join(f"{count} {name}" for name, count in self.outcomes.items())
-        lines = [
-            f"# Batch of {len(self.jobs)} shots", "",
-            f"`calmotion {self.command}` on {self.on}, {self.wall_s:.1f} s: {counts}"
-            + (" (interrupted: the same command goes on)." if self.interrupted else "."), "",
-            "| shot | outcome | attempts | time | largest error | tolerance | host |",
-            "| --- | --- | --- | --- | --- | --- | --- |",
-            *("| " + " | ".join(row) + " |" for row in rows),
-        ]  # fmt: skip
-        bad = [job for job in self.jobs if job.problem]
-        lines += ["", "## Problems"] if bad else []
-        for job in bad:
-            found = job.problem or {}
-            place = ".".join(filter(None, (found.get("path"), found.get("attribute"))))
-            lines += ["", f"### {job.job.shot}", "", f"{place + ': ' if place else ''}{found.get('problem', '')}."]
-            lines += [f"Found: {found['found']}."] if found.get("found") else []
-            lines += [found["remedy"]] if found.get("remedy") else []
-            lines += [f"Log: `{job.job.log}`"]
-        return "\n".join(lines) + "\n"
-
-    @staticmethod
-    def _row(job: dict[str, Any]) -> list[str]:
-        before, after = job.get("max_error_before_m", job.get("max_error_m")), job.get("max_error_after_m")
-        errors = [f"{1e3 * error:.2f} mm" for error in (before, after) if error is not None]
-        errors[-1:] = [f"{error} (worse)" if job["improved"] is False else error for error in errors[-1:]]
-        kept = {True: "kept", False: "missed", None: ""}[job["tolerance_kept"]]
-        return [
-            job["name"], job["outcome"], str(job["attempts"]), f"{job['wall_s']:.1f} s", " to ".join(errors), kept,
-            job["host"],
-        ]  # fmt: skip

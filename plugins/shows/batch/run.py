@@ -26,7 +26,7 @@ from .report import DIED, KEPT, WAITING, BatchResult, JobResult
 from .workers import LOCAL, executor_on, finished, refuse_unknown_place, result_of
 
 MOST_ATTEMPTS = 3
-REPORT, PAGE, LOCK = "batch.json", "batch.md", ".batch.lock"
+REPORT, LOCK = "batch.json", ".batch.lock"
 _STAGE = "Batch"
 
 
@@ -46,9 +46,9 @@ def batch(
 ) -> BatchResult:
     """Run `calmotion optimize` or `calmotion simulate` on many shots.
 
-    The folder gets a layer and a manifest for each shot, logs, and the report as `batch.json` and `batch.md`, which
-    are up to date while the batch runs. The same call goes on after an interruption: a shot is not run again while its
-    inputs, its request and its outputs are unchanged.
+    The folder gets a layer and a manifest for each shot, logs, and the report as `batch.json`, which is up to date
+    while the batch runs. The same call goes on after an interruption: a shot is not run again while its inputs, its
+    request and its outputs are unchanged.
 
     Args:
         shots: USD files, or one.
@@ -140,7 +140,6 @@ class _State:
         results = [self._results[job.name] for job in self.jobs]
         found = BatchResult(self._folder, self._command, self._on, results, wall, self.interrupted)
         write_text(os.path.join(self._folder, REPORT), json.dumps(plain(found.report()), indent=2) + "\n")
-        write_text(os.path.join(self._folder, PAGE), found.page())
         return found
 
     def show(self) -> None:

@@ -103,7 +103,10 @@ def _print_answer(report: dict[str, Any], console: Console) -> None:
         if job["problem"]:
             problem = job["problem"]
             place = ".".join(filter(None, (problem.get("path"), problem.get("attribute"))))
-            say(console, f"    {place + ': ' if place else ''}{problem['problem']}")
+            found = f" ({problem['found']})" if problem.get("found") else ""
+            say(console, f"    {place + ': ' if place else ''}{problem['problem']}{found}")
+            if problem.get("remedy"):
+                say(console, f"    {problem['remedy']}")
             say(console, f"    log: {job['log']}")
 
 
@@ -114,7 +117,7 @@ def _print(report: dict[str, Any], console: Console) -> None:
     _print_answer(report, console)
     if report["html"]:
         say(console, f"wrote {report['html']}")
-    say(console, f"report: {report['folder']}/batch.md")
+    say(console, f"report: {report['folder']}/batch.json")
     roots = [job["root_layer"] for job in report["jobs"] if job["root_layer"]]
     if roots:
         say(console, f"next: open {roots[0]}{' (one for each shot)' if len(roots) > 1 else ''}")

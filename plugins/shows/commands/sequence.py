@@ -44,7 +44,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
             args.clips, args.output, arguments=forwarded(args), plugins=args.plugins, on=args.on, workers=args.workers,
             progress=display,
         )  # fmt: skip
-    conclude(found.report() | {"page": found.page()}, [], output, None if args.quiet else _print)
+    conclude(found.report(), [], output, None if args.quiet else _print)
     if found.interrupted:
         return INTERRUPTED
     return 0 if found.good else FAILED
@@ -67,7 +67,7 @@ def _print(report: dict[str, Any], console: Console) -> None:
     for member in members:
         if member["problem"]:
             say(console, f"{member['name']}: {member['problem']['problem']}")
-    say(console, f"wrote {report['folder'] + '/sequence.md'}")
+    say(console, f"wrote {report['folder'] + '/sequence.json'}")
     layers = [member["layer"] for member in members if member["good"] and member["layer"]]
     if not report["good"]:
         say(

@@ -21,7 +21,7 @@ from ..batch.run import run_jobs
 from ..batch.workers import LOCAL
 from .clips import Clip, Plan, pace_of, read_clips, read_plan, transition
 
-SHOTS, REPORT, PAGE = "shots", "sequence.json", "sequence.md"
+SHOTS, REPORT = "shots", "sequence.json"
 ENDPOINTS, REFERENCE = "calm:retarget:endpoints", "calm:retarget:reference"
 SEAM = 1e-5  # largest gap of a motor where a clip and a transition meet [rad or m]
 
@@ -102,25 +102,6 @@ class Repertoire:
         )
         return made
 
-    def page(self) -> str:
-        """The report for people, in Markdown, with a table of what each transition costs."""
-        names = [clip.name for clip in self.clips]
-        by_pair = {(member.start, member.end): member for member in self.transitions}
-        lines = [f"# Repertoire of {len(names)} clips", ""]
-        lines += [
-            self.verdict,
-            "",
-            "| clip | length | largest error | may be played |",
-            "| --- | --- | --- | --- |",
-        ]
-        lines += [f"| {c.name} | {c.seconds:.2f} s | {_error(c)} | {_verdict(c)} |" for c in self.clips]
-        lines += ["", "Transitions from the clip of the row to that of the column: length, largest error.", ""]
-        lines += ["| from, to | " + " | ".join(names) + " |", "| --- |" + " --- |" * len(names)]
-        for one in names:
-            cells = [_cell(by_pair[(one, two)]) if one != two else "" for two in names]
-            lines.append(f"| {one} | " + " | ".join(cells) + " |")
-        return "\n".join(lines) + "\n"
-
 
 _TOLD = {True: "Every clip may follow every other one.", False: "Not every clip may follow every other one."}
 
@@ -157,7 +138,6 @@ def sequence(
     result = run_jobs(jobs, target, "optimize", on, workers, progress, cancel)
     made = _repertoire(clips, lengths, result)
     write_text(os.path.join(target, REPORT), json.dumps(made.report(), indent=2) + "\n")
-    write_text(os.path.join(target, PAGE), made.page())
     return made
 
 
@@ -227,10 +207,6 @@ def _is_joined(job: JobResult, poses: tuple[Any, Any]) -> bool:
     return True
 
 
-def _error(member: Member) -> str:
-    return member.outcome if member.error_m is None else f"{1e3 * member.error_m:.2f} mm"
-
-
 def _verdict(member: Member) -> str:
     if member.good:
         return "yes"
@@ -239,8 +215,3 @@ def _verdict(member: Member) -> str:
     reasons = [] if member.within_tolerance else ["tolerance missed"]
     reasons += [f"exceeds {limit}" for limit in member.exceeded_limits] + ([] if member.joined else ["ends changed"])
     return f"no: {', '.join(reasons)}"
-
-
-def _cell(member: Member) -> str:
-    mark = "" if member.good else " (!)"
-    return f"{member.seconds:.2f} s, {_error(member)}{mark}"

@@ -19,7 +19,7 @@ def test_the_answer_is_first_and_the_next_command_last():
     lines = printed(member("up_to_down", "up", "down"), member("down_to_up", "down", "up")).splitlines()
     assert lines[0] == "Every clip may follow every other one."
     assert any(line.split() == ["up", "to", "down", "1.00", "s", "20", "mm", "1", "mm", "yes"] for line in lines)
-    assert "wrote out/sequence.md" in lines
+    assert "wrote out/sequence.json" in lines
     assert lines[-1].startswith("next: calmotion export out/up.usda --to csv --rate 100")
 
 

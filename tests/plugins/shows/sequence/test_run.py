@@ -44,7 +44,7 @@ def plan_file(tmp_path):
 def test_every_clip_may_follow_every_other_one(plan_file, tmp_path, calmotion):
     folder = tmp_path / "out"
     made = sequence(plan_file, folder, arguments=ARGUMENTS, workers=2)
-    assert made.good, made.page()
+    assert made.good
     assert [m.name for m in made.clips] == ["up", "down"] and [m.name for m in made.transitions] == [
         "up_to_down", "down_to_up",
     ]  # fmt: skip
@@ -59,7 +59,7 @@ def test_every_clip_may_follow_every_other_one(plan_file, tmp_path, calmotion):
         np.testing.assert_allclose(ends[name][0], ends[one][1], atol=1e-6)
         np.testing.assert_allclose(ends[name][1], ends[two][0], atol=1e-6)
     report = json.loads((folder / "sequence.json").read_text())
-    assert report["good"] and len(report["transitions"]) == 2 and "| up |  | " in (folder / "sequence.md").read_text()
+    assert report["good"] and len(report["transitions"]) == 2
     again = calmotion(
         "sequence", plan_file, "-o", folder, "--tolerance", "2mm", "--step", "8ms", "--workers", "2", "--json"
     )
@@ -70,19 +70,20 @@ def test_every_clip_may_follow_every_other_one(plan_file, tmp_path, calmotion):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"within_tolerance": False}, "1.00 s, 1.00 mm (!)"),
-        ({"exceeded_limits": ("/Arm/elbow velocity",)}, "(!)"),
-        ({"joined": False}, "(!)"),
-        ({"error_m": None, "outcome": "failed", "layer": None}, "1.00 s, failed (!)"),
+        ({"within_tolerance": False}, "no: tolerance missed"),
+        ({"exceeded_limits": ("/Arm/elbow velocity",)}, "no: exceeds /Arm/elbow velocity"),
+        ({"joined": False}, "no: ends changed"),
+        ({"error_m": None, "outcome": "failed", "layer": None}, "no"),
     ],
 )
 def test_a_transition_that_may_not_be_played_is_marked(change, told):
     clips = [member("a", "a", "a"), member("b", "b", "b")]
     pairs = [member("a_to_b", "a", "b"), member("b_to_a", "b", "a")]
-    assert Repertoire("out", clips, pairs, 1.0).good and "(!)" not in Repertoire("out", clips, pairs, 1.0).page()
+    assert Repertoire("out", clips, pairs, 1.0).good
     made = Repertoire("out", clips, [pairs[0], member("b_to_a", "b", "a", **change)], 1.0)
-    assert not made.good and told in made.page() and "Not every clip" in made.page()
-    assert made.report()["good"] is False and made.report()["transitions"][0]["good"] is True
+    report = made.report()
+    assert report["good"] is False and "Not every clip" in report["verdict"]
+    assert [row["may_be_played"] for row in report["transitions"]] == ["yes", told]
 
 
 def test_robots_that_are_not_animated_by_drives_are_refused(plan_file, tmp_path, repository):
