@@ -6,7 +6,7 @@ from calmotion.model import Character, Result, SystemModes
 from calmotion.views import LIMIT, SMALL, error_spectrum, highest_frequency, new_figure, tidy, titles
 from matplotlib.figure import Figure
 
-from .curves import WIDTH, runs_of, worst_targets
+from .curves import SMALLEST, WIDTH, runs_of, worst_targets
 
 DECADES = 5.0  # of the vertical axis
 NEAR = 0.05  # of the width: least distance of two labels
@@ -15,7 +15,7 @@ ROOM = 1.15  # end of the axis over the highest significant frequency
 
 def plot_spectra(character: Character, result: Result, modes: SystemModes | None) -> Figure:
     """Amplitude of the position error of each target [mm] by frequency [Hz]."""
-    shown = worst_targets(result)
+    shown = worst_targets(character, result)
     names = titles([target.path for target in character.targets])
     figure = new_figure(WIDTH, 0.7 + 2.1 * len(shown))
     all_axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
@@ -29,8 +29,7 @@ def plot_spectra(character: Character, result: Result, modes: SystemModes | None
             if simulation is result.before:
                 end = max(end, ROOM * highest_frequency(frequencies, amplitudes))
         tidy(axes, "amplitude [mm]", names[character.targets[k].path])
-        if largest > 0.0:
-            axes.set_ylim(largest * 10.0**-DECADES, 3.0 * largest)
+        axes.set_ylim(max(largest, SMALLEST) * 10.0**-DECADES, 3.0 * max(largest, SMALLEST))
         axes.margins(x=0.0)
     marked = [] if modes is None else [float(f) for f in modes.frequencies if f < end]
     for axes in all_axes:

@@ -27,7 +27,8 @@ def plot_tempo(character: Character, retimed: Retimed) -> Figure:
     for time, late in retimed.report.pins:
         axes.axvline(time + late, color=LIMIT, linewidth=1.0)
     added, bound = retimed.animation.tempo.added, retimed.report.lower_bound
-    _finish(axes, f"{added:.2f} s longer; nowhere faster, rigid links need {bound:.2f} s", "performance")
+    longer = f"the performance takes {added:.2f} s more" if added >= 0.005 else "the performance takes no more time"
+    _finish(axes, f"{longer} (at least {bound:.2f} s if no part may be faster)", "performance")
     return figure
 
 

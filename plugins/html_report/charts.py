@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.views import AFTER, BEFORE, INTENDED, LIMIT
+from calmotion.views import AFTER, BEFORE, CHANGE, INTENDED, LIMIT
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
@@ -17,7 +17,8 @@ from matplotlib.ticker import FixedLocator
 
 from .packing import Packing
 
-ROLES = {BEFORE: "var(--before)", AFTER: "var(--after)", INTENDED: "var(--intended)", LIMIT: "var(--limit)"}
+COLORS = {"before": BEFORE, "after": AFTER, "intended": INTENDED, "change": CHANGE, "limit": LIMIT}
+ROLES = {color: f"var(--{name})" for name, color in COLORS.items()}  # so that the page has them in light and dark
 POINTS = 1600  # of a curve, two for each part of its width
 ROOM = 2_000_000  # letters of all charts; with more of them, each curve has fewer points
 

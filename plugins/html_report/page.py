@@ -103,7 +103,8 @@ def _section(section: Section) -> str:
 
 
 def _table(table: TextTable) -> str:
-    kinds = ["text" if number < table.texts else "number" for number in range(len(table.columns))]
+    columns = [[row[n] for row in table.rows] for n in range(len(table.columns))]
+    kinds = ["text" if n < table.texts or _has_words(cells) else "number" for n, cells in enumerate(columns)]
     head = "".join(f'<th class="{kind}">{escape(cell)}</th>' for kind, cell in zip(kinds, table.columns, strict=True))
     rows = "".join(
         "<tr>" + "".join(f'<td class="{k}">{escape(cell)}</td>' for k, cell in zip(kinds, row, strict=True)) + "</tr>"
@@ -111,6 +112,11 @@ def _table(table: TextTable) -> str:
     )
     caption = f"<caption>{escape(table.title)}</caption>"
     return f'<div class="wide"><table>{caption}<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+
+
+def _has_words(cells: Sequence[str]) -> bool:
+    """Whether a column has other things than numbers with units."""
+    return any(cell[:1].isalpha() or cell[:1] == "/" for cell in cells)
 
 
 def _provenance(origin: Mapping[str, Any]) -> str:

@@ -70,7 +70,7 @@ def _described(
         "time": result.before.time_of_largest_error,
         "worst": int(np.argmax(errors.max(axis=0))) if errors.size else -1,
         "largest": float(errors.max(initial=0.0)),
-        "targets": list(names.values()),
+        "targets": [names[target.path] for target in character.targets],
         "bodies": [body.path for body in character.bodies],
         "surfaces": surfaces,
         "reference": {

@@ -87,7 +87,7 @@ def test_the_tempo_that_a_robot_needs_is_drawn_where_limits_are_exceeded(tmp_pat
 
 def test_errors_are_drawn_in_millimetres_and_degrees_from_the_first_frame_on(figures):
     result = synthetic.result()
-    position, rotation = figures.curves.plot_errors(synthetic.character(), result).axes
+    position, after, rotation, _ = figures.curves.plot_errors(synthetic.character(), result).axes
     first = int(np.searchsorted(result.before.motion.times, -1e-9))
     for name, run in (("before", result.before), ("after", result.after)):
         times, values = lines_of(position)[name].get_data()
@@ -98,6 +98,8 @@ def test_errors_are_drawn_in_millimetres_and_degrees_from_the_first_frame_on(fig
     assert "[mm]" in position.get_ylabel() and "[deg]" in rotation.get_ylabel()
     assert position.get_title(loc="left") == "/Robot/Tip/Target"
     assert rotation.get_title(loc="left") == "/Robot/Tip/Target, rotation"
+    assert set(lines_of(after)) == {"after"} and after.get_title(loc="left").startswith("after")
+    assert [axes.get_yscale() for axes in (position, after)] == ["linear"] * 2, "the win is seen"
 
 
 def test_spectra_are_drawn_in_millimetres_with_the_modes_marked(figures):
@@ -131,7 +133,7 @@ def test_of_many_targets_the_figure_shows_the_worst_and_says_so(figures):
     figure = figures.curves.plot_errors(
         dataclasses.replace(character, targets=targets), dataclasses.replace(result, before=before)
     )
-    assert [axes.get_title(loc="left") for axes in figure.axes] == [f"/Robot/T{k}" for k in range(4, 12)]
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [f"/Robot/T{k}" for k in range(11, 3, -1)]
     assert "8 of 12" in figure.get_supxlabel()
 
 
@@ -171,15 +173,15 @@ def robustness():
     return Robustness("worst", (), nominal, drawn)
 
 
-def test_robustness_is_drawn_as_shares_of_robots_and_as_what_the_model_pays(figures, tmp_path):
+def test_robustness_is_drawn_as_shares_of_robots_beside_the_error_of_the_model(figures, tmp_path):
     found = robustness()
-    shares, paid = figures.drawing.plot_robustness(synthetic.character(), found).axes
+    (shares,) = figures.drawing.plot_robustness(synthetic.character(), found).axes
     errors, share = lines_of(shares)["robust"].get_data()
     assert np.allclose(errors, 1e3 * found.drawn["robust"][:, 0]) and share[-1] == 100.0 and share[0] == 5.0
     errors, share = lines_of(shares)["optimised for the model"].get_data()
     assert len(errors) == 18 and share[-1] == 90.0  # two robots are missing
-    points = {tuple(np.round(line.get_xydata()[0], 9)) for line in paid.get_lines() if len(line.get_xdata()) == 1}
-    assert points == {(1.0, 19.0), (2.0, 10.0)}
+    points = {float(line.get_xdata()[0].round(9)) for line in shares.get_lines() if len(line.get_xdata()) == 1}
+    assert points == {60.0, 1.0, 2.0}
     result = dataclasses.replace(synthetic.result(), robustness=found)
     assert "robustness.png" in [Path(path).name for path in draw(tmp_path, result, {"figures.plot": {"dpi": 60}})]
 

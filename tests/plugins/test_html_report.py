@@ -120,6 +120,15 @@ def test_a_simulation_shows_one_robot_and_a_long_one_at_a_lower_rate(tmp_path, m
     assert len(small["arrays"]) <= 2600 and small["count"] < data["scene"]["count"]
 
 
+def test_targets_have_their_own_names_and_words_stand_at_the_left_of_a_table():
+    character, result = synthetic.character(), synthetic.result()
+    targets = tuple(dataclasses.replace(character.targets[0], path=path) for path in ("/Robot/Tip/B", "/Robot/A"))
+    both = dataclasses.replace(character, targets=targets)
+    assert scene.scene_of(both, synthetic.animation(), result, scene.Detail())["targets"] == ["B", "A"]
+    table = page._table(TextTable("", ("part", "factor", "because of"), (("0 s", "0.98", ""), ("1 s", "1.1", "speed"))))
+    assert re.findall(r'<th class="(\w+)"', table) == ["text", "number", "text"]
+
+
 def test_a_robot_without_surfaces_and_a_report_without_a_motion_have_pages(tmp_path):
     bare = dataclasses.replace(
         synthetic.character(),
@@ -235,7 +244,7 @@ def test_a_browser_shows_a_page_without_complaints_or_requests(chromium, optimiz
     assert chromium.value("document.documentElement.scrollWidth") <= width
     panels = chromium.value("document.querySelectorAll('figure').length")
     curves = chromium.value("[...document.querySelectorAll('figure')].filter(f => f.querySelector('path')).length")
-    assert panels == curves == 7
+    assert panels == curves == 9
     small = "[...document.querySelectorAll('p, td, figcaption, button')]"
     assert chromium.value(f"Math.min(...{small}.map(n => parseFloat(getComputedStyle(n).fontSize)))") >= 11.5
     dark_page = chromium.value("getComputedStyle(document.body).backgroundColor")

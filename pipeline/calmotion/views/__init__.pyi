@@ -27,6 +27,7 @@ from calmotion.views.spectrum import error_spectrum as error_spectrum
 from calmotion.views.spectrum import highest_frequency as highest_frequency
 from calmotion.views.style import AFTER as AFTER
 from calmotion.views.style import BEFORE as BEFORE
+from calmotion.views.style import CHANGE as CHANGE
 from calmotion.views.style import INTENDED as INTENDED
 from calmotion.views.style import LIMIT as LIMIT
 from calmotion.views.style import NORMAL as NORMAL

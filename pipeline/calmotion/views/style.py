@@ -14,6 +14,7 @@ from calmotion.support.naming import distinct_names
 
 # Okabe and Ito's colors, which color-blind readers can tell apart; the line styles differ as well.
 BEFORE, AFTER, INTENDED = "#d55e00", "#0072b2", "#009e73"
+CHANGE = "#8e4585"  # of motors, by the optimiser
 LIMIT = "#7f7f7f"
 TEXT = "#222222"
 SMALL, NORMAL = 8.0, 9.5

@@ -94,7 +94,7 @@ def _print_answer(report: dict[str, Any], console: Console) -> None:
         line = f"  {job['name']}: {SAID.get(job['outcome'], job['outcome'])}"
         before, after = job.get("max_error_before_m", job.get("max_error_m")), job.get("max_error_after_m")
         if before is not None:
-            line += f", largest error {length(before)}" + ("" if after is None else f" to {length(after)}")
+            line += f", largest error {length(before)}" + ("" if after is None else f" becomes {length(after)}")
         if job["tolerance_kept"] is False:
             line += ", tolerance missed"
         if job["attempts"] > 1:

@@ -50,11 +50,10 @@ def print_retiming(console: Console, retime: dict[str, Any] | None) -> None:
     if not parts:
         say(console, "The tempo stays as it is: the animation keeps the limits of the motors.")
         return
-    say(
-        console,
-        f"The performance takes {added:.2f} s more; rigid links that are nowhere faster need "
-        f"{retime['lower_bound_s']:.2f} s at least, and {retime['uniform_added_s']:.2f} s at one tempo for the whole.",
-    )
+    longer = f"{added:.2f} s more" if added >= 0.005 else "no more time"
+    bounds = f"{retime['lower_bound_s']:.2f} s at least if no part may be faster"
+    say(console, f"The performance takes {longer} than the animation.")
+    say(console, f"Rigid links would need {bounds}, and {retime['uniform_added_s']:.2f} s at one tempo for the whole.")
     rows = []
     for part in parts:
         reasons = [f"{reason['quantity']} of {reason['path']}" for reason in part["because"]]
@@ -65,9 +64,10 @@ def print_retiming(console: Console, retime: dict[str, Any] | None) -> None:
     if retime["lacking_stretch"]:
         more = math.ceil(20.0 * retime["lacking_stretch"]) / 20.0
         say(console, f"limits ask for parts that take {more:g} times as long: --retime slowest={more:g} allows them")
-    late = [f"{pin['time_s']:.2f} s {pin['shift_s']:+.3f} s" for pin in retime["pins"]]
-    if late:
-        say(console, f"pinned times in the performance: {', '.join(late)}")
+    pins = retime["pins"]
+    if pins:
+        later = f", {1e3 * pins[0]['shift_s']:.0f} ms later" if pins[0]["shift_s"] > 5e-4 else ""
+        say(console, f"kept: {counted(len(pins), 'pinned time')}{later}")
 
 
 def print_reason(console: Console, report: dict[str, Any]) -> None:

@@ -128,13 +128,18 @@ def print_robustness(console: Console, report: dict[str, Any]) -> None:
         for name, shown in names.items():
             values = [target["robustness"][name][f"{head}_max_error_m"] for head in heads]
             rows.append([target["path"], shown, *(_length_or_failed(value) for value in values)])
+    main = next(target for target in report["targets"] if target["path"] == report["main_target"])
+    nominal, robust = (main["robustness"][name]["p95_max_error_m"] for name in ("nominal", "robust"))
+    if nominal is not None and robust is not None and robust < nominal:
+        say(console, f"On 95% of the robots around the model, the error at {main['path']} is at most {length(robust)}.")
+        say(console, f"The curves for the model alone would leave up to {length(nominal)} there.")
     title = f"Largest error on {report['draws']} random robots"
     print_table(console, title, ["target", "curves", "model", "median", "95%", "worst"], rows, texts=2)
     if all(target["robustness"]["robust"] == target["robustness"]["nominal"] for target in report["targets"]):
         say(
             console,
-            "no robust curves were found: the layer has the curves optimised for the model, since none that leave as "
-            "little error on it as allowed leave less on the robots that differ",
+            "No robust curves were found that keep the allowed error on the model. The layer has the curves for the "
+            "model alone.",
         )
 
 
