@@ -124,7 +124,7 @@ def test_targets_have_their_own_names_and_words_stand_at_the_left_of_a_table():
     character, result = synthetic.character(), synthetic.result()
     targets = tuple(dataclasses.replace(character.targets[0], path=path) for path in ("/Robot/Tip/B", "/Robot/A"))
     both = dataclasses.replace(character, targets=targets)
-    assert scene.scene_of(both, synthetic.animation(), result, scene.Detail())["targets"] == ["B", "A"]
+    assert scene.scene_of(both, synthetic.animation(), result, scene.Detail(9000, 60.0))["targets"] == ["B", "A"]
     table = page._table(TextTable("", ("part", "factor", "because of"), (("0 s", "0.98", ""), ("1 s", "1.1", "speed"))))
     assert re.findall(r'<th class="(\w+)"', table) == ["text", "number", "text"]
 
