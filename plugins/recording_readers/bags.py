@@ -20,7 +20,9 @@ from calmotion.recordings import (
     SensorRecording,
     hash_of,
 )
-from calmotion.support import nearest, read_toml
+from calmotion.support import nearest
+
+from .maps import map_of, prims_in
 
 JOINTS, IMU, POSE = "sensor_msgs/JointState", "sensor_msgs/Imu", "geometry_msgs/PoseStamped"
 EXAMPLE = (
@@ -114,23 +116,11 @@ def _stamp(message: Any, stored: float) -> float:
 
 def _map(file: str, map_file: str) -> tuple[dict[str, str] | None, dict[str, str] | None]:
     """Prim paths by the name of a joint and by topic; None where nothing is said."""
-    beside = map_file or f"{os.path.splitext(file)[0]}.toml"
-    if not map_file and not os.path.isfile(beside):
-        return None, None
-    try:
-        content = read_toml(beside)
-    except (OSError, ValueError) as error:
-        raise ShotError("the map of the recording cannot be read", path=beside, found=error, remedy=EXAMPLE) from error
-    for name in content:
-        if name not in ("joints", "topics"):
-            raise ShotError("the map has no such entry", path=beside, attribute=name, remedy=EXAMPLE)
-    tables = [content.get(name) for name in ("joints", "topics")]
-    for name, table in zip(("joints", "topics"), tables, strict=True):
-        if table is not None and not (
-            isinstance(table, dict) and all(isinstance(p, str) and p.startswith("/") for p in table.values())
-        ):
-            raise ShotError("must be a table of prim paths", path=beside, attribute=name, remedy=EXAMPLE)
-    return tables[0], tables[1]
+    content, path = map_of(file, map_file, ("joints", "topics"), EXAMPLE)
+    joints, topics = (
+        prims_in(content, name, path, EXAMPLE) if content and name in content else None for name in ("joints", "topics")
+    )
+    return joints, topics
 
 
 def _check(

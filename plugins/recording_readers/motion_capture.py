@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.recordings import MARKER, Channel, RecordingRequest, SensorRecording, hash_of
-from calmotion.support import nearest, read_toml
+from calmotion.support import nearest
 
 from .columns import UNITS
+from .maps import axes_of, map_of, prims_in
 
 EXAMPLE = 'Write [markers] with lines such as Cup1 = "/Arm/Hand/cup", and axes = "x, z, -y" above it if axes differ'
 LENGTHS = ("m", "cm", "mm", "in")
@@ -45,9 +44,12 @@ def read_c3d(request: RecordingRequest, map_file: str) -> SensorRecording:
     rate = float(rates[0]) if len(rates) else 0.0
     if unit not in LENGTHS or not rate > 0.0:
         raise ShotError(
-            "the file has a unit or a rate that does not fit", path=file, attribute="POINT:UNITS and POINT:RATE",
-            found=f"{unit} and {rate:g}", remedy=f"Export it again in {', '.join(LENGTHS)}",
-        )  # fmt: skip
+            "the file has a unit or a rate that does not fit",
+            path=file,
+            attribute="POINT:UNITS and POINT:RATE",
+            found=f"{unit} and {rate:g}",
+            remedy=f"Export it again in {', '.join(LENGTHS)}",
+        )
     markers, axes = _map(file, map_file, labels)
     points = np.asarray(content["data"]["points"], np.float64)[:3]
     lost = np.asarray(content["data"]["meta_points"]["residuals"])[0] < 0.0
@@ -66,37 +68,24 @@ def read_c3d(request: RecordingRequest, map_file: str) -> SensorRecording:
 
 def _map(file: str, map_file: str, labels: list[str]) -> tuple[dict[str, str], list[tuple[int, float]]]:
     """Prim paths by label, and the column and sign of each axis of the world."""
-    beside = map_file or f"{os.path.splitext(file)[0]}.toml"
-    if not map_file and not os.path.isfile(beside):
+    content, beside = map_of(file, map_file, (), EXAMPLE)
+    if content is None:
         paths = {label: label for label in labels if label.startswith("/")}
         if not paths:
             raise ShotError(
-                "nothing says on which prims the markers sit", path=file, found=", ".join(labels[:8]),
+                "nothing says on which prims the markers sit",
+                path=file,
+                found=", ".join(labels[:8]),
                 remedy=f"Write {beside}. {EXAMPLE}",
-            )  # fmt: skip
-        return paths, [(0, 1.0), (1, 1.0), (2, 1.0)]
-    try:
-        content = read_toml(beside)
-    except (OSError, ValueError) as error:
-        raise ShotError("the map of the recording cannot be read", path=beside, found=error, remedy=EXAMPLE) from error
-    markers = content.get("markers")
-    if not isinstance(markers, dict) or not all(isinstance(p, str) and p.startswith("/") for p in markers.values()):
-        raise ShotError("must be a table of prim paths", path=beside, attribute="markers", remedy=EXAMPLE)
+            )
+        return paths, axes_of("x, y, z", file, "recording")
+    markers = prims_in({"markers": None} | content, "markers", beside, EXAMPLE)
     for label in markers:
         if label not in labels:
             raise ShotError(
-                "the recording has no marker of this label", path=beside, attribute=f"markers.{label}",
+                "the recording has no marker of this label",
+                path=beside,
+                attribute=f"markers.{label}",
                 remedy=f"{nearest(label, labels)}Its labels are {', '.join(labels)}",
-            )  # fmt: skip
-    return {str(k): str(v) for k, v in markers.items()}, _axes(str(content.get("axes", "x, y, z")), beside)
-
-
-def _axes(text: str, file: str) -> list[tuple[int, float]]:
-    names = [name.strip().lower() for name in text.split(",")]
-    plain = [name.lstrip("+-") for name in names]
-    if sorted(plain) != ["x", "y", "z"]:
-        raise ShotError(
-            "must name each axis of the recording once", path=file, attribute="axes", found=text,
-            remedy="Write those along x, y and z of the stage, such as x, z, -y",
-        )  # fmt: skip
-    return [("xyz".index(own), -1.0 if name.startswith("-") else 1.0) for name, own in zip(names, plain, strict=True)]
+            )
+    return markers, axes_of(str(content.get("axes", "x, y, z")), beside, "recording")

@@ -23,9 +23,10 @@ from calmotion.recordings import (
     SensorRecording,
     hash_of,
 )
-from calmotion.support import TIME_UNITS, TimeColumn, counters, nearest, read_toml, time_column
+from calmotion.support import TIME_UNITS, TimeColumn, counters, nearest, time_column
 
 from .columns import UNITS, column_of, increasing, read_columns, unit_of
+from .maps import map_of, noise_in, positive, refuse_other_entries
 
 TIME = "time_s"
 SUFFIXES: Mapping[str, tuple[str, int]] = {
@@ -66,9 +67,8 @@ def read_table(request: RecordingRequest, map_file: str) -> SensorRecording:
             remedy=f"Name the file alone: --recording {file}",
         )  # fmt: skip
     columns, degrees = read_columns(file)
-    beside = f"{os.path.splitext(file)[0]}.toml"
-    given = map_file or (beside if os.path.isfile(beside) else "")
-    channels, notes = _mapped(file, columns, given) if given else _named(file, columns, degrees)
+    content, beside = map_of(file, map_file, (), EXAMPLE)
+    channels, notes = _named(file, columns, degrees) if content is None else _mapped(file, columns, content, beside)
     if not channels:
         raise ShotError(
             "the recording has no channel", path=file, found=", ".join(list(columns)[:12]),
@@ -126,15 +126,10 @@ def _named(file: str, columns: Mapping[str, Array], degrees: bool) -> tuple[list
     return channels, notes
 
 
-def _mapped(file: str, columns: Mapping[str, Array], map_file: str) -> tuple[list[Channel], list[str]]:
+def _mapped(
+    file: str, columns: Mapping[str, Array], content: Mapping[str, Any], map_file: str
+) -> tuple[list[Channel], list[str]]:
     """Channels of a table by its map."""
-    try:
-        content = read_toml(map_file)
-    except (OSError, ValueError) as error:
-        found = error.strerror if isinstance(error, OSError) else error
-        raise ShotError(
-            "the map of the recording cannot be read", path=map_file, found=found, remedy=EXAMPLE
-        ) from error
     times, name = _times(columns, content, file, map_file)
     keep = increasing(times, file, name)
     tables = content.get("channel", [])
@@ -143,12 +138,7 @@ def _mapped(file: str, columns: Mapping[str, Array], map_file: str) -> tuple[lis
     channels: list[Channel] = []
     for number, table in enumerate(tables):
         place = f"channel[{number}]"
-        for key in table:
-            if key not in KNOWN:
-                raise ShotError(
-                    "a channel has no such entry", path=map_file, attribute=f"{place}.{key}",
-                    remedy=f"{nearest(key, KNOWN)}Use {', '.join(KNOWN)}",
-                )  # fmt: skip
+        refuse_other_entries(table, map_file, f"{place}.", KNOWN)
         kind, path, given = table.get("kind"), table.get("prim"), table.get("columns")
         if not isinstance(kind, str) or kind not in COMPONENTS:
             raise ShotError(
@@ -170,7 +160,7 @@ def _mapped(file: str, columns: Mapping[str, Array], map_file: str) -> tuple[lis
             )  # fmt: skip
         unit = unit_of(str(table.get("unit", DEFAULT_UNIT[kind])), FITTING[kind], map_file, f"{place}.unit")
         values = unit * np.stack([column_of(columns, str(column), file) for column in given], axis=1)
-        made = _channel(kind, str(path), times, values, keep, _noise(table, unit, map_file, place))
+        made = _channel(kind, str(path), times, values, keep, noise_in(table, unit, map_file, f"{place}."))
         low_pass = _low_pass(table.get("low_pass"), map_file, f"{place}.low_pass")
         channels += [replace(own, to=str(ends[-1][1]) if kind == STRAIN else "", low_pass=low_pass) for own in made]
     return channels, _notes(file, keep)
@@ -185,27 +175,11 @@ def _times(columns: Mapping[str, Array], content: Mapping[str, Any], file: str, 
             remedy='Write [time] with column = "t" and unit = "ms", or with rate = 1000.0 (samples a second)',
         )  # fmt: skip
     if "rate" in table:
-        rate = table["rate"]
-        if isinstance(rate, bool) or not isinstance(rate, (int, float)) or not rate > 0.0:
-            raise ShotError(
-                "must be a number of samples a second", path=map_file, attribute="time.rate", found=rate,
-                remedy="Write it in Hz, such as 1000.0",
-            )  # fmt: skip
-        return np.arange(len(next(iter(columns.values())))) / float(rate), "time.rate"
+        problem, remedy = "must be a number of samples a second", "Write it in Hz, such as 1000.0"
+        rate = positive(table["rate"], map_file, "time.rate", problem, remedy)
+        return np.arange(len(next(iter(columns.values())))) / rate, "time.rate"
     name = str(table.get("column", TIME))
     return unit_of(str(table.get("unit", "s")), TIMES, map_file, "time.unit") * column_of(columns, name, file), name
-
-
-def _noise(table: Mapping[str, Any], unit: float, map_file: str, place: str) -> float | None:
-    noise = table.get("noise")
-    if noise is None:
-        return None
-    if isinstance(noise, bool) or not isinstance(noise, (int, float)) or not 0.0 < noise < np.inf:
-        raise ShotError(
-            "must be the standard deviation of the noise, in the unit of the channel", path=map_file,
-            attribute=f"{place}.noise", found=noise, remedy="Write a positive number, or leave it out",
-        )  # fmt: skip
-    return unit * float(noise)
 
 
 def _low_pass(given: object, map_file: str, place: str) -> LowPass | None:
@@ -217,17 +191,13 @@ def _low_pass(given: object, map_file: str, place: str) -> LowPass | None:
     if given is None:
         return None
     numbers = given if isinstance(given, dict) and {"frequency"} <= set(given) <= {"frequency", "damping"} else {"": 0}
-    if any(isinstance(x, bool) or not isinstance(x, (int, float)) or not 0.0 < x < np.inf for x in numbers.values()):
-        raise ShotError(
-            "a filter has a frequency in Hz and, of second order, a damping", path=map_file, attribute=place,
-            found=given, remedy="Write low_pass = { frequency = 2.0, damping = 0.9 }, without damping of first order",
-        )  # fmt: skip
-    return LowPass(*(None if x is None else float(x) for x in (numbers["frequency"], numbers.get("damping"))))  # type: ignore[arg-type]
+    problem = "a filter has a frequency in Hz and, of second order, a damping"
+    remedy = "Write low_pass = { frequency = 2.0, damping = 0.9 }, without damping of first order"
+    found = {name: positive(value, map_file, place, problem, remedy) for name, value in numbers.items()}
+    return LowPass(found["frequency"], found.get("damping"))
 
 
-def _channel(
-    kind: str, path: str, times: Array, values: Array, keep: np.ndarray, sigma: float | None
-) -> list[Channel]:  # fmt: skip
+def _channel(kind: str, path: str, times: Array, values: Array, keep: np.ndarray, sigma: float | None) -> list[Channel]:
     """The channel of the rows that hold a sample of it; none where there is no sample."""
     rows = keep & np.isfinite(values).any(axis=1)
     return [Channel(kind, path, times[rows], values[rows], sigma)] if rows.any() else []
