@@ -1,7 +1,6 @@
 """Which further sensor tells what the recordings do not tell, against a calibration that has it."""
 
 import numpy as np
-import pytest
 from calmotion.recordings import ANGLE, MARKER
 from calmotion_plugins.calibration.identification.advice import IDENTIFIABLE, advised
 from recorded import only, problem_of
@@ -27,15 +26,3 @@ def test_what_is_told_needs_no_advice(recorded_shot, recordings):
     H, z = information(problem)
     told = np.sqrt(np.diag(np.linalg.inv(H)))[:3] < IDENTIFIABLE
     assert set(advised(problem, H, z)).isdisjoint(np.flatnonzero(told)) and told.any()
-
-
-def test_without_a_linearisation_there_is_none(recorded_shot, recordings):
-    problem = problem_of(recorded_shot, only(recordings, MARKER))
-    assert advised(problem, np.eye(3), np.zeros(3)) == {}
-
-
-@pytest.mark.parametrize("kind", ["marker", "accelerometer", "angle", "effort"])
-def test_every_kind_of_sensor_has_words(kind):
-    from calmotion_plugins.calibration.identification.advice import Advice
-
-    assert Advice(kind, "/Arm/Load", 0.1).sentence.startswith(("a", "the"))

@@ -51,12 +51,6 @@ def test_the_clock_is_that_of_the_robot_which_is_most_like_the_recording(shot, r
         assert clock_of(recording, shot.character, [unlike, signals]) == right
 
 
-def test_the_parameters_are_clocks_places_and_biases(measurement):
-    kinds = [p.kind for p in measurement.parameters]
-    assert kinds == ["clock_offset", "clock_drift", "place", "place", "place", "clock_offset", "clock_drift",
-                     "bias", "bias", "bias", "clock_offset", "clock_drift"]  # fmt: skip
-
-
 def test_derivatives_are_those_of_what_is_predicted(measurement, signals):
     x = 0.1 * np.arange(1.0, len(measurement.parameters) + 1.0)
     for sensor in measurement.sensors:

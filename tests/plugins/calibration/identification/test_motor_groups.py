@@ -9,11 +9,10 @@ from calmotion.model.run import RunSettings
 from calmotion.recordings import ANGLE, Channel, SensorRecording
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion_plugins.calibration.identification.calibrate import CalibrationSettings, calibrate_shot
-from calmotion_plugins.calibration.identification.motor_groups import grouped, of_each_motor
-from calmotion_plugins.calibration.identification.parameters import Parameter, robot_parameters
+from calmotion_plugins.calibration.identification.motor_groups import grouped
+from calmotion_plugins.calibration.identification.parameters import robot_parameters
 from calmotion_plugins.calibration.identification.robots import robot_at, robot_with
 from calmotion_plugins.calibration.identification.signals import signals_of
-from calmotion_plugins.calibration.model.estimates import Estimate
 
 KINDS = ("position_gain", "velocity_gain", "encoder_offset")
 PATHS = ("/Arm/Shoulder", "/Arm/Elbow")
@@ -40,14 +39,6 @@ def test_one_parameter_stands_for_all_motors_of_its_type(shot):
     other = dataclasses.replace(shot.character.motors[1], kind="y")
     character = dataclasses.replace(shot.character, motors=(shot.character.motors[0], other))
     assert grouped(alone, character) == alone
-
-
-def test_each_motor_has_an_estimate_and_the_covariance_stays_positive():
-    delay = Parameter("delay", "/a", 0.01, 0.005, "s", -1, False, 0.0, (("/b", 0.02),))
-    row = Estimate("delay", "/a", -1, "s", 0.01, 0.005, 0.013, 0.001, False, True)
-    rows, covariance = of_each_motor((delay,), (row,), np.array([[1e-6]]))
-    assert [(r.path, r.nominal, r.value) for r in rows] == [("/a", 0.01, 0.013), ("/b", 0.02, pytest.approx(0.023))]
-    assert covariance == pytest.approx(np.full((2, 2), 1e-6), rel=1e-5) and np.linalg.eigvalsh(covariance).min() > 0.0
 
 
 def test_a_calibration_finds_the_shared_gain(shot):

@@ -7,7 +7,7 @@ import pytest
 from calmotion import ShotError
 from calmotion.model.motor import DRIVE, SERVO, Rotor
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion_plugins.calibration.identification.parameters import Parameter, robot_parameters
+from calmotion_plugins.calibration.identification.parameters import robot_parameters
 from calmotion_plugins.calibration.model.estimates import ROBOT_KINDS
 
 
@@ -20,14 +20,6 @@ def with_motor(shot, **values):
     first, second = shot.character.motors
     motors = (dataclasses.replace(first, **values), second)
     return compile_shot(dataclasses.replace(shot.character, motors=motors), shot.animation, shot.bodies)
-
-
-def test_a_factor_is_searched_by_its_logarithm_and_an_offset_as_it_is():
-    factor, offset = Parameter("modulus", "/m", 2e9, 0.3), Parameter("delay", "/j", 0.01, 0.005, "s", -1, False, 0.0)
-    assert factor.value(-1.0) == pytest.approx(2e9 * np.exp(-0.3)) and factor.least == -np.inf
-    assert offset.value(offset.least) == 0.0 and offset.least == pytest.approx(-2.0)
-    for p in (factor, offset):
-        assert p.slope(0.7) == pytest.approx((p.value(0.7 + 1e-6) - p.value(0.7 - 1e-6)) / 2e-6, rel=1e-6)
 
 
 def test_parameters_are_those_of_the_materials_and_the_payload(shot):

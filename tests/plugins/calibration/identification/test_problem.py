@@ -27,15 +27,3 @@ def test_differences_are_derivatives(problem):
         wide, narrow = difference(12.0 * DIFFERENCE), difference(6.0 * DIFFERENCE)
         exact = narrow + (narrow - wide) / 3.0  # Richardson: the error is of fourth order
         assert np.linalg.norm(jacobian[:, k] - exact) < 2e-3 * np.linalg.norm(exact)
-
-
-def test_simulations_are_not_repeated_where_only_the_measurement_changes(problem):
-    z = np.zeros(len(problem.parameters) + len(problem.measurement.parameters))
-    problem.residuals(z)
-    before = problem.simulations
-    other = z.copy()
-    other[-1] = 1.0
-    problem.residuals(other)
-    assert problem.simulations == before
-    assert problem.with_measurement(problem.measurement).residuals(z) is not None
-    assert problem.simulations == before

@@ -92,19 +92,3 @@ def test_shots_that_loop_are_refused_and_those_that_end_in_motion_are_known(anim
     assert ends_at_rest(animation)
     moving = Track(animation.frame_times, np.sin(animation.frame_times))
     assert not ends_at_rest(Animation(animation.frame_times, (moving,), (moving,)))
-
-
-def test_a_robot_whose_target_has_no_direction_any_more_cannot_be_simulated(shot, monkeypatch):
-    """Bodies that are bent beyond their model: as a robot that a search tries, it is passed over."""
-    from calmotion.multibody.failure import SimulationFailure
-    from calmotion_plugins.calibration.identification import signals
-
-    def bent(*arguments, **named):
-        run = run_forward(*arguments, **named)
-        run.target_rotations[5, 0] = np.nan
-        return run
-
-    run_forward = signals.run_forward
-    monkeypatch.setattr(signals, "run_forward", bent)
-    with pytest.raises(SimulationFailure):
-        signals_of(robot_with(shot, {}), OPTIONS)

@@ -9,7 +9,7 @@ from calmotion.model import Animation, Track
 from calmotion.model.character import SurfaceMesh
 from calmotion.model.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion_plugins.calibration.identification.excitation.clearance import FAR, Clearance, Points
+from calmotion_plugins.calibration.identification.excitation.clearance import Clearance
 
 OPTIONS = RunSettings(step=1 / 240, pre_roll=0.0)
 GAP = 0.03  # of bracket and hand in the first pose
@@ -101,14 +101,3 @@ def test_a_robot_that_moves_freely_is_not_watched(arm, animation, bodies):
     tracks = (Track(times, np.zeros(25)),)
     found = Clearance(compile_shot(loose, Animation(times, tracks, tracks), bodies), OPTIONS)
     assert not found.watches and found.pairs == () and len(found.together) == 1
-
-
-def test_points_cover_a_surface(arm):
-    body = dataclasses.replace(arm.bodies[2], surfaces=(box("/Arm/Hand/palm", (0.0, 0.0, 0.0), (0.3, 0.2, 0.1)),))
-    points = Points.of(body)
-    rng = np.random.default_rng(0)
-    surface = rng.uniform((0.0, 0.0, 0.0), (0.3, 0.2, 0.1), (2000, 3))
-    axis = rng.integers(0, 3, 2000)
-    surface[np.arange(2000), axis] = rng.integers(0, 2, 2000) * np.array([0.3, 0.2, 0.1])[axis]
-    assert points.tree.query(surface)[0].max() <= points.between < 0.01
-    assert Points.of(arm.bodies[2]) is None and FAR > points.between

@@ -7,7 +7,6 @@ import pytest
 from calmotion.errors import ShotError
 from calmotion.model.run import RunSettings
 from calmotion.recordings import ACCELEROMETER, EFFORT
-from calmotion_plugins.calibration.identification.excitation import design
 from calmotion_plugins.calibration.identification.excitation.design import ExcitationSettings, excite_shot
 from calmotion_plugins.calibration.identification.excitation.waveforms import bounds_of, family_of
 from calmotion_plugins.calibration.model.excitation import PlannedSensor
@@ -88,16 +87,3 @@ def test_a_torque_that_even_small_motions_exceed_is_refused(limited):
     shot = limited.with_character(dataclasses.replace(limited.character, motors=motors))
     with pytest.raises(ShotError, match="no test motion keeps all limits"):
         excite_shot(shot, dataclasses.replace(SETTINGS, tries=3), RunSettings())
-
-
-def test_motions_in_which_bodies_come_too_near_do_not_count(limited, monkeypatch):
-    asked = []
-    monkeypatch.setattr(design.Clearance, "kept", lambda self, shot: bool(asked.append(shot)))
-    with pytest.raises(ShotError, match="almost touch"):
-        excite_shot(limited, dataclasses.replace(SETTINGS, tries=3), RunSettings())
-    excursions = [
-        np.abs(shot.animation.current[0].values - shot.animation.current[0].values[0]).max() for shot in asked
-    ]
-    # the chirp and the motions with which the searches end, made smaller and smaller
-    assert len(asked) == (1 + design.SEARCHES) * design.TIMES
-    assert np.allclose(np.array(excursions[1 : design.TIMES]) / excursions[: design.TIMES - 1], design.LESS)

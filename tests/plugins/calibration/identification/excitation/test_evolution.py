@@ -16,11 +16,3 @@ def test_a_bowl_is_searched_to_its_middle_with_as_many_values_as_asked_for():
     assert len(asked) == 600
     assert np.array_equal(found, min(asked, key=lambda pair: pair[0])[1])
     assert found == pytest.approx(middle, abs=0.1)
-
-
-def test_the_first_points_have_nothing_to_do_with_one_another():
-    asked = []
-    least_point(lambda point: float(asked.append(point) or len(asked)), 6, 1000, np.random.default_rng(0))
-    first = np.array(asked[:300])
-    assert np.abs(np.corrcoef(first[1:, 0], first[:-1, 0])[0, 1]) < 0.2
-    assert np.abs(first[:, 3:]).max() <= np.pi < 1.1 * np.abs(first[:, 3:]).max()

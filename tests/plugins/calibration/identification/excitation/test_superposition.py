@@ -7,7 +7,7 @@ import pytest
 from calmotion.model import Animation, Track
 from calmotion.model.run import RunSettings
 from calmotion.recordings import ACCELEROMETER, ANGLE, MARKER, Channel, SensorRecording
-from calmotion_plugins.calibration.identification.excitation.superposition import AROUND, SHAPE, Superposition, _heights
+from calmotion_plugins.calibration.identification.excitation.superposition import Superposition
 from calmotion_plugins.calibration.identification.excitation.waveforms import bounds_of, family_of
 from calmotion_plugins.calibration.identification.measurement import Measurement
 from calmotion_plugins.calibration.identification.parameters import robot_parameters
@@ -83,10 +83,3 @@ def test_a_motor_that_may_not_move_has_no_response(family, problem):
     found = Superposition(still, problem).jacobian(family.tones_of(np.zeros(family.size)))
     again = Superposition(still, problem).jacobian(np.tile(family.start, (len(family.times), 1)))
     assert np.all(np.isfinite(found)) and np.array_equal(found, again)
-
-
-def test_pulses_add_up_to_a_motion(family):
-    offsets = family.tones_of(np.ones(family.size)) - family.start
-    heights = np.pad(_heights(offsets), ((AROUND, AROUND), (0, 0)))
-    total = np.stack([np.convolve(column, SHAPE, mode="same") for column in heights.T], axis=1)[AROUND:-AROUND]
-    assert total == pytest.approx(offsets, abs=2e-3 * np.abs(offsets).max())
