@@ -17,7 +17,20 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 DOCS = REPOSITORY / "docs"
 PAGES = DOCS / "tutorials"
 FOLLOWED = ("usd", "urdf", "skinned_character", "calibration", "two_workers", "puppeteer")
-HOW_TO = ("arduino", "phone", "weights", "remaining_error", "offline_or_live")
+HOW_TO = ("arduino", "phone", "weights", "remaining_error", "offline_or_live", "slow_motors", "diagnose")
+# What newcomers want to do, and the page that is enough for it: all of them are followed below.
+TASKS = {
+    "see it work, and show it in a browser": "./quickstart",
+    "make a robot of a URDF calm": "tutorials/urdf",
+    "make a robot in USD calm": "tutorials/usd",
+    "make a robot of a skinned character": "tutorials/skinned_character",
+    "play the result on an Arduino": "how_to/arduino",
+    "say which target counts when": "how_to/weights",
+    "find out why error remains": "how_to/remaining_error",
+    "keep slow motors within their limits": "how_to/slow_motors",
+    "find out what shakes": "how_to/diagnose",
+    "make the model fit the robot": "tutorials/calibration",
+}
 
 
 def script(page: str) -> str:
@@ -58,7 +71,21 @@ def errors_of(printed: str) -> list[tuple[float, float]]:
     return [(float(before), float(after)) for before, after in found]
 
 
-@pytest.mark.parametrize("page", [*FOLLOWED, *(f"how_to/{page}" for page in HOW_TO)])
+def linked(page: Path) -> set[Path]:
+    """The pages that a page leads to."""
+    targets = re.findall(r"\]\(([\w./-]+\.md)", page.read_text())
+    return {path for target in targets if (path := (page.parent / target).resolve()).is_file()}
+
+
+@pytest.mark.parametrize("page", TASKS.values(), ids=TASKS)
+@pytest.mark.parametrize("front", [REPOSITORY / "README.md", DOCS / "index.md"], ids=lambda front: front.name)
+def test_a_task_of_a_newcomer_is_found_in_two_clicks_and_followed(page, front):
+    first = linked(front)
+    assert (DOCS / f"{page}.md").resolve() in first.union(*map(linked, first))
+    assert f'follow("{page.removeprefix("tutorials/")}", ' in Path(__file__).read_text()
+
+
+@pytest.mark.parametrize("page", [*FOLLOWED, "./quickstart", *(f"how_to/{page}" for page in HOW_TO)])
 def test_the_commands_of_a_page_are_accepted(page, capsys):
     from calmotion.cli.commands.table import all_commands
     from calmotion.cli.main import build_parser
@@ -90,6 +117,32 @@ def test_the_page_on_blender_names_what_the_extension_shows():
     of_others = {"Animation", "Armatures", "Scripting", "Run Script", "Compress"}
     named = set(re.findall(r"\*([A-Z][\w ()]+)\*", text)) - of_others
     assert len(named) >= 4 and named <= shown
+
+
+@pytest.mark.long
+def test_the_quickstart(tmp_path):
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work" / "samples").symlink_to(REPOSITORY / "samples")
+    printed = follow("./quickstart", tmp_path)
+    assert errors_of(printed) == [pytest.approx((58.17, 1.41), abs=0.02)]
+    assert "4.657 Hz" in printed and (tmp_path / "work" / "build" / "calm.html").stat().st_size > 500_000
+
+
+@pytest.mark.long
+def test_slow_motors_get_the_time_that_the_page_says(tmp_path):
+    printed = follow("how_to/slow_motors", tmp_path)
+    for line in re.search(r"```text\n(The performance .*?)```", (DOCS / "how_to/slow_motors.md").read_text(), re.S)[
+        1
+    ].splitlines():
+        assert line in printed
+    assert (tmp_path / "work" / "calmotion_demo" / "slow" / "tempo.png").is_file()
+
+
+def test_the_loop_of_the_page_is_what_shakes(tmp_path):
+    follow("how_to/diagnose", tmp_path)
+    first = json.loads((tmp_path / "work" / "diagnosis.json").read_text())["causes"][0]
+    assert first["cause"] == "servo_gains" and first["share"] > 0.9
+    assert "rings at 5" in (tmp_path / "work" / "diagnosis.html").read_text()
 
 
 @pytest.mark.long

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import rerun.blueprint as rrb
-from calmotion.model import Animation, Character, Motor, Result, measure_of
+from calmotion.model import Animation, Character, Motor, Result, Simulation, measure_of
 from calmotion.views import choose_viewpoint, eye_that_sees, moving_cloud, near_scenery, sample_motion
 
 from .colors import BACKGROUND, Style
@@ -30,10 +30,10 @@ def make_blueprint(character: Character, animation: Animation, result: Result, s
     """The views that fit what the result holds; `scale` is the deviation of the strongest color [m]."""
     optimized = result.after is not None
     eye = choose_eye(character, animation, result)
-    legend = f"green: intended; orange: {1e3 * scale:.3g} mm off"
-    views = [spatial_view(f"As animated ({legend})", INPUT, eye)]
-    if optimized:
-        views.append(spatial_view(f"Optimised ({legend})", OPTIMIZED, eye))
+    legend = f"green: intended, orange: {1e3 * scale:.3g} mm off"
+    views = [spatial_view(f"As animated{_farthest(result.before)} ({legend})", INPUT, eye)]
+    if result.after is not None:
+        views.append(spatial_view(f"Optimised{_farthest(result.after)} (colours as beside)", OPTIMIZED, eye))
     tabs = [plot("Position error [mm]", "errors/position_mm")]
     if any(target.rotation_weight > 0.0 for target in character.targets):
         tabs.append(plot("Rotation error [deg]", "errors/rotation_deg"))
@@ -62,6 +62,12 @@ def make_blueprint(character: Character, animation: Animation, result: Result, s
         rrb.TimePanel(state="collapsed", timeline=TIME, loop_mode="all"),
         auto_views=False,
     )
+
+
+def _farthest(run: Simulation) -> str:
+    """The largest error of a target, for a title; nothing without targets."""
+    errors = run.position_errors[run.motion.judged]
+    return f": targets up to {1e3 * float(errors.max()):.3g} mm off" if errors.size else ""
 
 
 def choose_eye(character: Character, animation: Animation, result: Result) -> rrb.EyeControls3D:
