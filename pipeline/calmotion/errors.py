@@ -75,7 +75,6 @@ def failure_of_machine(error: BaseException, short: bool = False) -> ShotError |
     """The error that a user sees where memory or files of the machine failed; None for any other exception.
 
     Args:
-        error: The exception.
         short: Whether memory was short: libraries then raise anything.
     """
     if isinstance(error, ShotError):

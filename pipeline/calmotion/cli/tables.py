@@ -79,7 +79,6 @@ def print_table(
 
     Args:
         console: Where it is printed.
-        title: Of the table.
         columns: Heads of the columns.
         rows: Cells.
         texts: The first so many columns are text, and the others numbers.

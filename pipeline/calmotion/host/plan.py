@@ -61,7 +61,6 @@ def make_plan(
     """Choose the operators that the wanted types need, and order them.
 
     Args:
-        operators: All there are.
         given: Types whose values are known already.
         wanted: Types that must come out.
         optional: Types that are made where some operator can.

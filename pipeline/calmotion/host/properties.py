@@ -151,7 +151,6 @@ def values_of(properties: Iterable[Property], given: Mapping[str, object], place
     """Defaults, replaced by what was given.
 
     Args:
-        properties: The declarations.
         given: Name to string or typed value.
         place: Idname of the operator, for messages.
 

@@ -83,7 +83,6 @@ def quantity_of(value: float | str | None, unit: str, name: str = "") -> float |
         value: A number, or a text with a unit. A bare length in a text is refused, as in the command line: most are
             meant in millimetres.
         unit: `m`, `s` or `rad`.
-        name: Of the argument.
 
     Raises:
         SettingError: It is neither, not finite, or a text that does not fit.

@@ -32,7 +32,6 @@ def lowest_by_lanczos(
     Args:
         K, M: Sparse symmetric, shape [n, n], M positive definite.
         count: Number of pairs; with `below` the least number.
-        shift: Of the solver.
         solver: Of K + shift M.
         below: All eigenvalues up to this one are computed, and one above it.
         most: Largest number of pairs.

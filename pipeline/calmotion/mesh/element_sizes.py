@@ -99,7 +99,6 @@ def element_size(shape: Shape, accuracy: float = ACCURACY, max_nodes: int = MAX_
     one element across its thickness, a stubby link three, a plate elements longer than it is thick.
 
     Args:
-        shape: Of the body.
         accuracy: Relative error of the first frequencies.
         max_nodes: The size never falls below that which takes so many nodes.
     """
@@ -133,8 +132,6 @@ def envelope(element_size: float, diagonal: float, shape: Shape, triangles: int,
     Args:
         element_size: [m].
         diagonal: Of the body's bounding box [m].
-        shape: Of the body.
-        triangles: Of the surface.
         attempt: 0 first; halved for each further one, since the volume was off.
     """
     simple = _SIMPLE if element_size < _SHELL * shape.thickness else _FLAT

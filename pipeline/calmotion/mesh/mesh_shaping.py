@@ -50,7 +50,6 @@ def shaped(mesh: FEMesh, body: Body, surface: Surface, attachments: Sequence[Att
     Args:
         mesh: Whose elements were made for the surface.
         body: With `flexible` settings.
-        surface: The surface.
         attachments: Frames of the joints and targets of the body; without any, nothing is cut.
     """
     points, tets, rims = with_rims(mesh.points, mesh.tets, body, attachments, surface)

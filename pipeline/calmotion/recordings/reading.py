@@ -30,7 +30,6 @@ def read_recordings(host: Host, names: Sequence[str], settings: Settings) -> tup
     Args:
         host: With the readers.
         names: FILE or FILE@/PRIM of each.
-        settings: Of the readers.
 
     Raises:
         SettingError: There are none, one is named twice, or no reader reads it.

@@ -65,8 +65,6 @@ def ratio_of_parts(mesh: QuadraticMesh, material: ElasticMaterial, modes: Array)
     Each part is weighted by its share of the strain energy, and the lowest modes by the same.
 
     Args:
-        mesh: Of the body.
-        material: Of the body.
         modes: Ascending, shape [n, 3, r].
 
     Source: Ungar and Kerwin 1962, Loss factors of viscoelastic systems in terms of energy concepts.

@@ -25,7 +25,6 @@ def frequency_errors(
     """Lowest elastic frequencies of a mesh, and the estimated relative error of each.
 
     Args:
-        model: Its matrices.
         material: Material of the matrices.
         count: Number of elastic frequencies; the six rigid modes of a free body are not counted.
         clamped: Clamped nodes; None for a free body, which has no singularity at the edge of a clamp.

@@ -52,7 +52,6 @@ def load_direction_envelope(load_envelope: LoadEnvelope, angle: float, size: flo
     loads out of the plane.
 
     Args:
-        load_envelope: Of the rigid robot.
         angle: Largest rotation about any axis [rad].
         size: Of the body, the lever arm of forces [m].
     """

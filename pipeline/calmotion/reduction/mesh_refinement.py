@@ -226,7 +226,6 @@ def bisected_to(mesh: FEMesh, indicators: Array, nodes: int, share: float) -> FE
     Args:
         mesh: To refine.
         indicators: Part of each element in the error, shape [m].
-        nodes: Of the quadratic tetrahedra.
         share: Of the error in the elements that are bisected at a time.
     """
     points, tets = mesh.points, mesh.tets
@@ -242,7 +241,6 @@ def root_at(attachments: Sequence[AttachmentFrame], carrier: Frame | None) -> in
     """Index of the attachment frame of the joint to the parent, None without one.
 
     Args:
-        attachments: Of a body.
         carrier: Frame of that joint on the body.
     """
     if carrier is None:

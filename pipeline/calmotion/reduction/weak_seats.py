@@ -35,7 +35,6 @@ def weak_patch(
 
     Args:
         model: Full model.
-        material: Of its matrices.
         radii: Of the root patch, and of each moving patch [m].
         omega_squared, patch_motion: As of `shares_of_patches`.
     """
@@ -58,7 +57,6 @@ def shares_of_patches(
 
     Args:
         radii: Of the root patch, and of each moving patch [m].
-        material: Of the body.
         omega_squared: Of its linear modes [1/s^2], shape [r].
         patch_motion: Motion of the moving patches in them, shape [p, 6, r].
 
@@ -77,9 +75,7 @@ def weak_seat_note(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFra
     """What a body would do with half the radius of a seat; empty where that matters little, or is as someone said.
 
     Args:
-        mesh: Of the body.
         body: With `flexible` settings.
-        attachments: Its attachment frames.
         weak: Index of that of the seat.
     """
     settings, at = body.flexible, attachments[weak]

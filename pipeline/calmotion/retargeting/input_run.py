@@ -25,7 +25,6 @@ def with_input_resolved(result: Result, shot: CompiledShot, options: RunSettings
     input's own error; its instants are those of the search. As the search had it where finer steps fail.
 
     Args:
-        result: Of the search.
         shot: With the tracks of the input.
         options: Of a run whose step is chosen.
     """

@@ -105,7 +105,6 @@ def estimated_bodies(
     A body that an earlier run has meshed is as it was then.
 
     Args:
-        character: The character.
         progress: Called with a fraction and the body at hand.
 
     Returns:

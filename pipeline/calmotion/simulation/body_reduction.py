@@ -73,7 +73,6 @@ class BodyReduction:
         Args:
             tolerance: As of `bodies`.
             wanted: Relative error of the stiffness that the mesh of a body may have, by body.
-            max_nodes: Of the quadratic tetrahedra of a body.
             progress: Called with a fraction and the body at hand.
             keeps: As of `MeshController`; with `finer`, elements that the user chose are refined as well.
 
@@ -111,13 +110,7 @@ class BodyReduction:
 def load_envelopes(
     character: Character, animation: Animation, meshes: FEMeshes | None, options: RunSettings
 ) -> tuple[LoadEnvelope, ...] | None:
-    """Loads on each body in a shot; None without flexible bodies, or where a rigid robot cannot follow it.
-
-    Args:
-        character, animation: The shot.
-        meshes: Of its flexible bodies.
-        options: Of the run.
-    """
+    """Loads on each body in a shot; None without flexible bodies, or where a rigid robot cannot follow it."""
     if len(animation.frame_times) < 2 or not any(body.simulated_flexible for body in character.bodies):
         return None
     try:

@@ -100,7 +100,6 @@ def compile_shot(
     Asking for it raises ShotError where a joint or a loop is not supported, or a flexible body is not reduced.
 
     Args:
-        character: The character.
         animation: Its motors' tracks and moving roots.
         bodies: One for each body of the character; None where all are rigid.
     """

@@ -98,7 +98,6 @@ def limited_values(model: Model, names: Collection[str], curves: Curves, run: Fo
     Args:
         names: Which, of `kinds_of_limits`.
         curves: Of the motors, as simulated.
-        run: The simulation.
     """
     performed = PerformedCurves(model, curves, run)
     return {name: kinds_of_limits()[name].values(performed) for name in names}

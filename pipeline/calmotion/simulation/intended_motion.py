@@ -53,7 +53,6 @@ def static_motion(
     """The animation with the sag of each pose: the flexible robot in static equilibrium at every judged instant.
 
     Args:
-        model: The flexible character.
         rigid: Its rigid motion, kept where nothing is judged.
         angles: Of the motors, shape [T, M].
         judged: Shape [T].

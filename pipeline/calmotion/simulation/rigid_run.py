@@ -39,8 +39,6 @@ def shot_load_envelopes(
         character: The bodies; flexible ones count with the mass of their mesh.
         animation: Tracks of the motors, and moving roots.
         grid: Time grid of the shot, pre-roll included.
-        tree: Of the character.
-        meshes: Of the flexible bodies.
 
     Returns:
         One for each body of the character; interfaces in the order of the joints of `body_anchors`.

@@ -146,9 +146,6 @@ def kernel_key(package: Path) -> str:
     That is the sources of all kernels, of the modules that these import, since constants are compiled in, and of those
     that compile, with their options; the optimisation level; and the versions of numba, llvmlite and Python. numba
     itself tells processors apart.
-
-    Args:
-        package: The folder of the package.
     """
     kernels = [path for path in package.rglob("*.py") if _KERNEL.search(path.read_bytes())]
     support = package / "support"

@@ -34,7 +34,6 @@ def too_large(path: str, factor: float) -> str:
     """Why a file is not read: its content would not fit into the free memory; empty where it does or there is none.
 
     Args:
-        path: The file.
         factor: Memory that its content takes, by the size of the file.
     """
     try:

@@ -139,7 +139,6 @@ def run_limited(command: list[str], folder: Path, processor_s: float, clock_s: f
 
     Args:
         command: Of the process, which reads nothing; its output is not kept.
-        folder: Its working folder.
         processor_s, clock_s: Time after which it is ended [s].
 
     Raises:

@@ -32,7 +32,6 @@ def run_operator(
 
     Args:
         host: A host with the operator's plugin.
-        idname: The operator.
         values: The values it requires, and those it may use.
         settings: Idname -> property -> value.
 

@@ -94,7 +94,6 @@ def clock_of(stage: Usd.Stage, sample_codes: Array) -> Clock:
     not a frame, and USD's fallback of 24 frames per second holds.
 
     Args:
-        stage: The Usd.Stage.
         sample_codes: Time codes of the samples of all motors.
 
     Raises:

@@ -19,7 +19,6 @@ def refuse_place(path: str, named_by: str, attribute: str = "") -> None:
     Args:
         path: As it is authored or resolved.
         named_by: The layer or prim that names it.
-        attribute: Of the prim.
 
     Raises:
         ShotError: It is one.
@@ -36,7 +35,6 @@ def refuse_special(path: str, named_by: str = "") -> None:
     """Refuse a named pipe, a socket or a device in place of a layer: USD would wait for it for ever.
 
     Args:
-        path: The file.
         named_by: The layer that names it; empty for the shot itself.
 
     Raises:

@@ -48,7 +48,6 @@ def with_places(messages: Iterable[str], stage: Usd.Stage, prims: Iterable[Usd.P
     Args:
         messages: Those of `quiet`.
         stage: The stage that they are about.
-        prims: All of its prims.
     """
     places = list(prims) if messages else []
     return [(_place(message, stage, places), f"USD reports: {message}") for message in messages]

@@ -34,7 +34,6 @@ def masked(stage: Usd.Stage, muted: Iterable[str] = ()) -> Usd.Stage:
     """The part of a stage that a reader of characters looks at; the stage itself where it is not large.
 
     Args:
-        stage: A composed stage.
         muted: Identifiers of layers that it mutes.
     """
     from pxr import Usd

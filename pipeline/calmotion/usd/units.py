@@ -105,7 +105,6 @@ def other_units(stage: Usd.Stage, prims: Iterable[Usd.Prim]) -> list[ShotError]:
     """Units of layers with some prims that are not those of the stage, which USD takes from its root layer alone.
 
     Args:
-        stage: A composed stage.
         prims: Those of bodies; others that are not valid are passed over.
 
     Returns:

@@ -67,7 +67,6 @@ def outlines(seen: Visible, count: int, part: IntArray, found: Marks) -> None:
     """Where the character is, and where another surface of it, or none, is above or left of a pixel.
 
     Args:
-        seen: The pose.
         count: Surfaces of the character; those from this number on are scenery.
         part: First row, first column, and the ends of rows and columns that are looked at.
         found: The sum of `BODY` and `EDGE`, where each holds.

@@ -145,10 +145,8 @@ def world_points(body: Body, index: int, skin: Skin | None, motion: Motion, row:
     """World positions of the points of each surface of a body at one row of a motion.
 
     Args:
-        body: The body.
         index: Its index in the character.
         skin: Its skin, or None.
-        motion: The motion.
         row: Row of the motion.
 
     Returns:

@@ -19,7 +19,6 @@ def error_spectrum(motion: Motion, reference: Motion, target: int) -> tuple[Arra
 
     Args:
         motion: A simulated motion of equal steps.
-        reference: The intended motion.
         target: Index of the target.
 
     Returns:

@@ -39,7 +39,6 @@ def choose_viewpoint(character: Character, skins: tuple[Skin | None, ...], motio
     The front of a character is the side of its targets. Up is opposite to gravity.
 
     Args:
-        character: The character.
         skins: One for each body.
         motion: The motion to show.
     """

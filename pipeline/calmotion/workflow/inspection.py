@@ -131,7 +131,6 @@ def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]
     """The object of `inspect --json`; SI units and radians, as the names of the keys say.
 
     Args:
-        run: The run.
         settings: Settings of operators that were given to it.
     """
     character, animation, provenance = run.data[Character], run.data[Animation], run.data[Provenance]

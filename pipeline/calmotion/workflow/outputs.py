@@ -89,7 +89,6 @@ def refuse_layers(shot: str, provenance: Provenance, character: Character | None
     """Refuse outputs that are layers or meshes of the shot, as soon as these are known.
 
     Args:
-        shot: Its file.
         provenance: With its layers.
         character: With the mesh files of its bodies, where it was read.
         files: Files that are written, by their options.

@@ -82,8 +82,6 @@ def value_of(run: Run, kind: type[T], problems: Sequence[Problem] = ()) -> T:
     """The value of a type that a run has made.
 
     Args:
-        run: The run.
-        kind: The type.
         problems: What went wrong in the run, where that is known already.
 
     Raises:

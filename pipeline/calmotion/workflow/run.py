@@ -282,7 +282,6 @@ def again(outcome: Outcome, wanted: type[T], *values: object, settings: Settings
     """One more value from what a run has made.
 
     Args:
-        outcome: The run.
         wanted: Type of the value; it is made anew, also where the run had made one.
         values: Given instead of the run's values of the same types.
         settings: Settings of operators, stronger than the shot's.

@@ -151,7 +151,6 @@ def print_run(report: dict[str, Any], console: Console, verbose: bool = False) -
     """The report of `simulate` or `optimize`: the answer, the files, what needs attention, and the simplifications.
 
     Args:
-        report: The report.
         console: Where it is printed.
         verbose: Whether the search, the steps, the error budget and the notes are printed as well.
     """

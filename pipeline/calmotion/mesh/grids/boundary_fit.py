@@ -54,7 +54,6 @@ def heights(corners: Array, surface: NearbyTriangles) -> tuple[Array, Array, Arr
 
     Args:
         corners: Of the triangles [m], shape [t, 3, 3], outward.
-        surface: The surface.
 
     Returns:
         Heights above the centers of `PARTS` [m], shape [t, p], NaN where the surface is farther than its reach; unit

@@ -53,7 +53,6 @@ def element_masses(filling: Filling, shapes: Array, exact: Array) -> Array:
     """Mass matrices of ten-node tetrahedra relative to that of their volume in the body's material, shape [e, 10, 10].
 
     Args:
-        filling: Of the elements.
         shapes: The ten shape functions at the places of the makeup, shape [p, 10].
         exact: The matrix of a homogeneous element of volume and density 1, shape [10, 10].
     """

@@ -37,7 +37,6 @@ def skin_share(points: Array, tets: IntArray, core: Core) -> SkinShare:
     Args:
         points: Corners [m], shape [n, 3].
         tets: Shape [e, 4], positive volumes.
-        core: Of the part.
     """
     corners = points[tets]
     volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0

@@ -176,7 +176,6 @@ def nodes_of_area(
     would change the stiffness of the body.
 
     Args:
-        mesh: Of the body.
         candidates: Surface nodes to choose from.
         center: [m], shape [3].
         radius: [m].

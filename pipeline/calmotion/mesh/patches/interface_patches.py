@@ -91,7 +91,6 @@ def interface_patches(
     other patches surface is left (`balls_between`).
 
     Args:
-        mesh: Of the body.
         attachments: All attachment frames; those of kind `point` are ignored.
         radius: Radius of the patches [m]; negative: chosen for each attachment frame (`automatic_radius`).
         body: Prim path of the body, for errors.

@@ -36,7 +36,6 @@ def cut_at(position: Array, cut: Sequence[CutPatch], size: float) -> CutPatch | 
 
     Args:
         position: Of the frame [m], shape [3].
-        cut: All such patches of the body.
         size: Of the body [m].
     """
     return next((patch for patch in cut if np.linalg.norm(patch.origin - position) < SAME * size), None)

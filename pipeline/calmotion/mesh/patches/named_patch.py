@@ -20,7 +20,6 @@ def named_patch(mesh: QuadraticMesh, triangles: Array) -> IntArray:
     patch may be empty.
 
     Args:
-        mesh: Of the body.
         triangles: Corners [m], shape [k, 3, 3], body frame, outward.
     """
     distance = _DISTANCE * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))

@@ -55,7 +55,6 @@ def inside(corners: Array, center: Array, radius: float) -> BoolArray:
 
     Args:
         corners: [m], shape [k, 3, 3].
-        center, radius: Of the sphere.
     """
     far = np.linalg.norm(corners - center, axis=2).max(axis=1)
     edge = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
@@ -113,7 +112,6 @@ def _divided(points: Array, tets: IntArray, ends: IntArray, part: Array) -> tupl
     """Some of the edges divided, among them the longest: no two of one tetrahedron.
 
     Args:
-        points, tets: The mesh.
         ends: Edges, shape [k, 2].
         part: Where each is divided, from its first end.
     """

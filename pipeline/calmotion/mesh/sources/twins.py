@@ -93,7 +93,6 @@ def moved(mesh: FEMesh, isometry: Isometry, index: int, path: str) -> FEMesh:
     """A mesh after an isometry, as that of another body.
 
     Args:
-        mesh: Of a twin.
         isometry: From the twin to the body.
         index: Of the body in its character.
         path: Prim path of the twin, for the message.

@@ -76,7 +76,6 @@ def filled(
         index: Of the body in its character.
         body: For errors.
         solid: Closed.
-        shape: Of the solid.
         size: Edge length [m].
         time: Processor time of the body.
         use_cache: Whether the cache folder is used.

@@ -193,9 +193,7 @@ def _limited(command: list[str], folder: Path, time: ProcessorTime, size: str, p
     """Exit status and standard error of a process with what is left of the processor time.
 
     Args:
-        command: Of the process.
         folder: Its working folder; fTetWild writes a file into it.
-        time: Of the body.
         size: Of the surface, for errors.
         path: Prim path of the body.
     """

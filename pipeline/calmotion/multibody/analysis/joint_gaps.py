@@ -33,8 +33,6 @@ def first_open_joint(
     """The widest joint at the first instant at which one is open by more than is allowed; None where none ever is.
 
     Args:
-        system: The compiled system.
-        trajectory: Its simulation.
         angles: Angle [rad] (or length [m]) of each joint, shape [T, J].
         allowed: Largest gap of positions [m].
         workspace: Scratch of this system.

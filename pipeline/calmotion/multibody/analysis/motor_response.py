@@ -27,7 +27,6 @@ def motor_responses(
     It calls the kernels of statics, which are compiled already, one instant at a time.
 
     Args:
-        rigid: The rigid model.
         c, q: Its poses, shapes [T, B, 3], [T, B, 4].
         joint_angles: Of its joints, shape [T, J].
         motors: Which motors, shape [m].

@@ -34,7 +34,6 @@ class RigidResponse:
         for a preconditioner.
 
         Args:
-            rigid: The rigid model.
             c, q: Its poses, shapes [T, B, 3], [T, B, 4].
             joint_angles: Of its joints, shape [T, J].
             motors: Those that may change, shape [m].

@@ -98,7 +98,6 @@ def simulate(
     """Simulate the system from static equilibrium, or from a state that is given.
 
     Args:
-        system: The compiled system.
         start: Where the search for the equilibrium starts (the rigid pose); not changed.
         angles, rates: Angle [rad] (or length [m]) and rate of each joint's motor, shape [T, J].
         h: Time step [s].

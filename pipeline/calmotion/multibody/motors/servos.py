@@ -98,7 +98,6 @@ def servo_rows(
     """Adds the motor's torque and the friction to the row of the rotor, and their derivatives to K, P, D and on_rotor.
 
     Args:
-        angle, rate: The command.
         gamma: 1, or 0 where the system rests: nothing then depends on velocities.
         Vd: Accelerations, shape [B, N].
     """

@@ -57,7 +57,6 @@ def embed(mesh: QuadraticMesh, points: Array) -> Embedding:
     """Embed points in a mesh.
 
     Args:
-        mesh: Of the body.
         points: [m], shape [k, 3], body frame; inside or outside.
     """
     from skfem import ElementTetP2

@@ -51,7 +51,6 @@ def deflection_under(
     """The deflection of a body.
 
     Args:
-        model, basis: The body.
         second_order: Derivatives of its first modes, by St. Venant and Kirchhoff's law; these are counted.
         material: Elastic constants.
         load_envelope: Its loads in this shot.

@@ -34,7 +34,6 @@ def large_deflection(
     Args:
         model: Full model.
         support: Its root patch and moving patches.
-        basis: Its linear modes.
         material: Elastic constants.
         law: `stvk` or `neohookean`.
         load_envelope: Its loads in this shot, one row for each moving patch; None when they are not known.

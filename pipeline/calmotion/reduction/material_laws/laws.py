@@ -112,7 +112,6 @@ def reduced_by_law(
         settings: Its law, and the material of its elements.
         load_envelope: Its loads in this shot; None when they are not known.
         tolerance: [m].
-        path: Its prim path.
 
     Raises:
         ShotError: The body is too soft for any of the laws, or they cannot be evaluated accurately.

@@ -42,7 +42,6 @@ def bands_of(cells: Cells, root: BoolArray) -> Bands:
     """The sections of a body.
 
     Args:
-        cells: Of it.
         root: Cells that are held, at least one, shape [n].
     """
     from scipy.sparse.csgraph import dijkstra

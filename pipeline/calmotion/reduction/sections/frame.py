@@ -60,8 +60,6 @@ def frame_of(cells: Cells, bands: Bands, material: ElasticMaterial, mass: float 
     """The frame of a body.
 
     Args:
-        cells, bands: Of it.
-        material: Its own.
         mass: That is stated [kg]; None: that of volume and density.
     """
     section, count = bands.section, len(bands.width)

@@ -35,10 +35,6 @@ def held_cells(
     """Which cells an attachment frame holds, at least one, shape [n].
 
     Args:
-        cells: Of the body.
-        outside: Of the body.
-        attachments: All of its frames.
-        number: Of the frame.
         radius: Given [m]; negative: measured.
     """
     attachment = attachments[number]

@@ -98,7 +98,6 @@ class LinearProblem:
         """The rigid robot's Gauss-Newton matrix, or a better one, inverted over the entries that are not fixed.
 
         Args:
-            sharpened: The better one.
             limits, values: Limits and the values of their quantities, which say which of them act; None: those here.
         """
         limits, values = limits or self.limits, values or self.limited

@@ -47,8 +47,6 @@ def pose(
     Args:
         prepared: The shot on its time grid.
         curves: The animator's curves on the grid.
-        intended: The intended motion of the targets.
-        options: Of the run.
 
     Raises:
         ShotError: No motor may change, or options contradict each other.

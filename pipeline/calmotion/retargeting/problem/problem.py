@@ -70,7 +70,6 @@ class RetargetProblem:
         """The problem of one robot.
 
         Args:
-            model: The flexible character.
             objective: Errors at its targets.
             world: Moving roots.
             grid, curves, space, limits, continuous: As of the class.

@@ -79,7 +79,6 @@ def response_gram(robots: Sequence[LinearRobot], space: OffsetSpace) -> Array:
 
     Args:
         robots: Whose linearisations can be blocked.
-        space: The n unknowns.
     """
     gram = np.zeros((space.size, space.size))
     for robot in robots:

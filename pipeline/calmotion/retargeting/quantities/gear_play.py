@@ -107,7 +107,6 @@ def gear_play(
     """The terms of the motors that have play.
 
     Args:
-        model: The robot.
         play: Of all motors [rad or m], shape [M].
         efforts: That their gears transmit with the curves of the input, shape [T, M].
         h: Step [s].

@@ -40,7 +40,6 @@ def errors_on(
         shot: With the animator's curves as the intended ones.
         options: With the time step.
         curves: Tracks of all motors, by the name of the curves.
-        scenarios: The robots.
         progress: Called with a fraction and a message.
 
     Returns:

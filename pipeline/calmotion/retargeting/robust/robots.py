@@ -67,10 +67,7 @@ def robots_of(
     """The robots of scenarios, the nominal one first, which perform the curves of a problem.
 
     Args:
-        prepared: The shot of the problem.
         problem: For the nominal robot.
-        scenarios: The robots.
-        options: Of the run.
     """
     return [_robot(prepared, problem, scenario, options) for scenario in scenarios]
 

@@ -170,7 +170,6 @@ def scaled_body(body: ReducedBody, material: ElasticMaterial, modulus: float, da
     """A flexible body of another modulus and damping.
 
     Args:
-        body: The body.
         material: Its material: a damping ratio keeps its value when the modulus changes, Rayleigh coefficients keep
             theirs.
         modulus: Factor of Young's modulus.

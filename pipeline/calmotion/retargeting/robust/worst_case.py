@@ -191,7 +191,6 @@ def power_mean(problem: RetargetProblem, order: int, factors: Array) -> PowerMea
 
     Args:
         problem: Of the robots, the nominal one first.
-        order: Of the mean.
         factors: With which errors of the nominal robot's positions count, shape [K].
     """
     quadrature, weights = problem.grid.quadrature, problem.objective.weights

@@ -24,8 +24,6 @@ def search_rows(
 
     Args:
         problem: On the final knots.
-        curves: Of all motors.
-        options: Of the run.
         idle_gain_m: Gain that idle motors would bring [m]; None where there are none.
     """
     tolerance = tolerance_of(character, options.tolerance)

@@ -60,7 +60,6 @@ def refuse_open_chains(
 
     Args:
         character: Its `simulated_flexible` bodies are those that give way.
-        model: The rigid robot.
         tolerance: At the targets [m]; None: that of the shot.
 
     Raises:
@@ -80,10 +79,8 @@ def refuse_open_failure(
     """Refuse motors that contradict each other so much that the rigid robot cannot be simulated.
 
     Args:
-        model: The rigid robot.
         angles: Of its joints, shape [T, J].
         world: Moving roots, see `roots.sample_roots`.
-        failure: Of its simulation.
 
     Raises:
         ShotError: The joint that stays open, the motors of its chain, and the time.
@@ -109,7 +106,6 @@ def open_joints(
 
     Args:
         gap: The largest [m].
-        integrator: Its name.
         step: [s].
         path: Of the first joint that does, or of the character.
         time: At which that begins [s]; None where it is not known.

@@ -115,7 +115,6 @@ def refuse_half_turns(character: Character, grid: TimeGrid, angles: Array) -> No
 
     Args:
         character: With the motors.
-        grid: The steps.
         angles: Of the motors, shape [T, M].
 
     Raises:

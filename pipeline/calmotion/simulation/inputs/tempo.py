@@ -61,7 +61,6 @@ def needed_tempo(
     Args:
         times: Of the animation [s], shape [T], at equal distances.
         values: Of the motors [rad or m], shape [T, M].
-        limits: Of the motors.
         efforts: Of the rigid robot at the same instants; None where none is limited.
         fastest: Least stretch, below 1 where parts may be faster than they are animated.
     """

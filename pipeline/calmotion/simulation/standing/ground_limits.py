@@ -77,7 +77,6 @@ def ground_limits(
 
     Args:
         angles, rates: The animator's, shape [T, M].
-        before: The simulation of the input.
 
     Raises:
         SimulationFailure: The rigid robot cannot follow its motors.

@@ -26,7 +26,6 @@ def animation_codes(attribute: Usd.Attribute, parts: int = 3) -> list[float]:
     USD does not count splines among time samples. Empty where nothing animates the attribute.
 
     Args:
-        attribute: The Usd.Attribute.
         parts: Into which each interval between two knots is divided; with three, any curve between equal knots shows.
     """
     codes = list(attribute.GetTimeSamples())
@@ -55,7 +54,6 @@ def refuse_moving(reading: Reading, fixed: dict[Usd.Prim, str], others: list[Usd
     """Refuse animated bodies that a joint fixes to the world; note where other transforms are animated.
 
     Args:
-        reading: The stage.
         fixed: Prims of the bodies with a joint to the world, and the path of that joint.
         others: Prims of the other bodies.
 
@@ -217,7 +215,6 @@ def tempo_of(clock: Clock, pairs: Array | None) -> tuple[TimeMap | None, Clock]:
     """The tempo that pairs of time codes mean, and the clock of the performance.
 
     Args:
-        clock: Of the animation.
         pairs: Shape [n, 2]; None: it is performed at its own tempo.
     """
     if pairs is None:

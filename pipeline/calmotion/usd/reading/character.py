@@ -78,7 +78,6 @@ def read_skeleton(
     """Find the bodies, joints and motors of the character; bodies without connection to a motor or target are skipped.
 
     Args:
-        clock: The clock of the shot.
         still: Whether a character without animation is accepted.
         given: Joints whose tracks are given beside the shot.
         measured: Prims at which sensors measured.

@@ -82,7 +82,6 @@ def warn_of_units(reading: Reading, path: str, character: Character, resting: Se
 
     Args:
         path: Prim that stands for the robot.
-        character: The robot.
         resting: Paths of bodies that are fixed to the world, whose masses nothing shows.
     """
     from pxr import UsdGeom

@@ -24,8 +24,6 @@ def provenance_of(path: str, stage: Usd.Stage, clock: Clock, earlier: tuple[str,
 
     Args:
         path: Its file, as it was given.
-        stage: Its stage.
-        clock: Its clock.
         earlier: Identifiers of the layers of ours that it carries.
     """
     from pxr import UsdGeom
@@ -58,7 +56,6 @@ def notes_of_results(composed: Usd.Stage, path: str, earlier: Sequence[str], inp
 
     Args:
         composed: The stage with them.
-        path: Its file.
         earlier: Identifiers of the layers of results.
         inputs: What the shot without them is composed from.
     """

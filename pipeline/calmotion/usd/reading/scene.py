@@ -30,7 +30,6 @@ def gravity(reading: Reading, bodies: Sequence[str] = ()) -> Array:
     one counts which the bodies name as their `physics:simulationOwner`.
 
     Args:
-        reading: The stage.
         bodies: Paths of the bodies.
 
     Raises:
@@ -77,7 +76,6 @@ def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
     """The settings of CalmRetargetAPI on the character's root or the nearest prim above it.
 
     Args:
-        reading: The stage.
         root: Path of the deepest prim that holds the whole character.
 
     Raises:

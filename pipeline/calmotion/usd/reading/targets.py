@@ -33,7 +33,6 @@ def target_prims(reading: Reading, measured: Sequence[str] = ()) -> list[tuple[A
     no transform, is kept as a problem of the reading.
 
     Args:
-        reading: The stage.
         measured: Paths of prims at which sensors measured: they are targets as well.
     """
     found = []
@@ -94,8 +93,6 @@ def read_target(reading: Reading, prim: Usd.Prim, body: int, pose: Pose) -> Targ
     """An authored target.
 
     Args:
-        reading: The stage.
-        prim: Its prim.
         body: Index of its body.
         pose: World pose of that body, stage units.
 
@@ -130,8 +127,6 @@ def default_targets(bodies: Sequence[Body], joints: Sequence[Joint], ends: Seque
     The leaf of a lever with a push rod is the rod, which shows nothing of how the lever bends.
 
     Args:
-        bodies: The bodies.
-        joints: The joints of the character.
         ends: Indices of the leaf bodies.
     """
     lasting = [joint for joint in joints if joint.contact is None]
@@ -179,13 +174,7 @@ def _stand_without(body: int, ends: Sequence[int], joints: Sequence[Joint]) -> b
 
 
 def outermost_target(body: Body, index: int, joints: Sequence[Joint]) -> Target:
-    """The target of a leaf body where none is authored: its point farthest from the joints that carry it.
-
-    Args:
-        body: The body.
-        index: Its index.
-        joints: The joints of the character.
-    """
+    """The target of a leaf body where none is authored: its point farthest from the joints that carry it."""
     origins = _anchors(index, joints)
     center = np.mean(origins, axis=0) if origins else np.zeros(3)
     points = [s.points for s in body.surfaces if s.visible] or [s.points for s in body.surfaces]

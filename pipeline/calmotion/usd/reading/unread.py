@@ -24,7 +24,6 @@ def unread_attributes(stage: Usd.Stage, declared: bool = False) -> Iterator[Shot
     """Attributes in the namespace calm: that are not read, as warnings.
 
     Args:
-        stage: The shot.
         declared: Also those that are read though the schema that declares them is not applied.
     """
     owners = _owners()
@@ -116,9 +115,7 @@ def tell_what_is_not_used(reading: Reading, bodies: Iterable[Usd.Prim], joints: 
     """Note attributes of the character's bodies and joints that have a value and no effect.
 
     Args:
-        reading: The stage.
         bodies: Prims of its bodies.
-        joints: Its joints.
     """
     for prim in bodies:
         _tell(reading, prim, "", OF_BODIES)

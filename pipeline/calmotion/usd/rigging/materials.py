@@ -16,9 +16,7 @@ def author_material(stage: Usd.Stage, path: str, material: Material, units: Stag
 
     Args:
         stage: Where it is authored.
-        path: Its prim path.
         material: The material, SI.
-        units: Of the stage.
     """
     from pxr import Sdf, UsdPhysics, UsdShade
 

@@ -35,9 +35,7 @@ def bake_bodies(
     Args:
         layer: The Sdf.Layer to write to.
         stage: The shot, layers of ours muted.
-        character: The character.
         motion: What to bake.
-        clock: The clock of the shot.
         meters: Metres per unit of the stage.
         changed: Whether bodies that move, relative to their parent prim, as they are animated are left out.
 

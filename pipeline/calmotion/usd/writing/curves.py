@@ -87,11 +87,8 @@ def author_curves(
     """Author each curve as an over with time samples, degrees or stage length.
 
     Args:
-        layer: The Sdf.Layer.
-        character, animation: The shot.
         curves: Those to write.
         samples_per_second: Their density [1/s]; None: at the frames, and between where the animation needs them.
-        clock: The clock of the shot.
         meters: Metres in the stage's unit of length.
 
     Returns:

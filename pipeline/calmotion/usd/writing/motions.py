@@ -31,7 +31,6 @@ def simulated_motion(motion: Motion, times: Array) -> BakedMotion:
     """Pick steps of a simulation, such as its frames; a run that was interrupted gives those that it reached.
 
     Args:
-        motion: The motion.
         times: Of the steps to pick [s], shape [f].
 
     Raises:

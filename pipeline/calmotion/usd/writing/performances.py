@@ -25,7 +25,6 @@ def write_performance(
 
     Args:
         output: Layer to write.
-        provenance: Of the shot.
         character: Of the shot; a motor that follows another one has no curve of its own.
         motion: Times [s] after the first frame, shape [f], and values of its motors [rad or m], shape [f, M], which are
             written to their drives; None keeps the shot's own.

@@ -26,7 +26,6 @@ def write_root(layer: str, provenance: Provenance, role: str) -> str:
 
     Args:
         layer: The layer of overs, already written.
-        provenance: The shot.
         role: The role of that layer, `stages.CURVES`, `stages.MOTION` or `stages.CALIBRATION`.
 
     Returns:

@@ -25,9 +25,7 @@ def author_map(layer: Sdf.Layer, character: str, tempo: TimeMap, clock: Clock) -
     """Author the map of times on the character's root.
 
     Args:
-        layer: The Sdf.Layer.
         character: Path of the root.
-        tempo, clock: Of the performance.
     """
     from pxr import Gf, Sdf, Vt
 
@@ -45,9 +43,7 @@ def author_scene(
     there. What the layer has already, and transforms of prims that it moves, are left.
 
     Args:
-        layer: The Sdf.Layer.
         stage: The shot, layers of ours muted.
-        tempo, clock: Of the performance.
         frame_times: Its frames [s].
         within: Path of the prim below which all is authored; `/` for the whole stage.
 

@@ -37,12 +37,10 @@ def author_skeletons(
     What the motors cannot follow of a joint is kept: its rotation L becomes D(new) D(old)^T L.
 
     Args:
-        layer: The Sdf.Layer.
         stage: The shot, layers of ours muted.
         character, animation: The shot as read.
         curves: Those to write, all of motors whose source is a skeleton.
         times: Of the samples [s].
-        clock: The clock of the shot.
 
     Returns:
         Path of each attribute that was written, with its number of samples.

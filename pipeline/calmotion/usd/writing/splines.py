@@ -43,9 +43,7 @@ def author_splines(
     """Author each curve as an over with a spline, degrees or stage length; one of a shot that loops repeats itself.
 
     Args:
-        layer: The Sdf.Layer.
         curves: Those to write.
-        clock: The clock of the shot.
         meters: Metres in the stage's unit of length.
 
     Returns:

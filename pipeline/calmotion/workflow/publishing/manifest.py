@@ -36,7 +36,6 @@ def manifest_of(result: SimulationResult, folder: str | os.PathLike[str]) -> dic
 
     Args:
         result: Of `simulate` or `optimize`.
-        folder: Of the manifest.
     """
     from calmotion.model import Provenance
     from calmotion.model.run import Source
@@ -144,7 +143,6 @@ def changed_files(manifest: Mapping[str, Any], folder: str | os.PathLike[str]) -
 
     Args:
         manifest: See `read_manifest`.
-        folder: Of the manifest.
     """
     found = []
     for kind, remedy in (

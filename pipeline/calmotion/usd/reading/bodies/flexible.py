@@ -101,8 +101,6 @@ def print_of(reading: Reading, prim: Usd.Prim, wall: float, section: str) -> tup
     """The wall of a hollow body [m], -1 for a solid one, and the core of a printed one.
 
     Args:
-        reading: Of the shot.
-        prim: The flexible body.
         wall: `calm:flexible:wallThickness` [m]; -1: not authored. With infill it is the skin.
         section: `calm:flexible:section`.
 
@@ -148,10 +146,7 @@ def with_parts(
     volume, and Rayleigh coefficients of the body's material.
 
     Args:
-        reading: Of the shot.
-        body_prim: The flexible body.
         material: Bound to it, or to the first mesh below it.
-        shapes: Its geometry.
 
     Raises:
         ShotError: A value of a material is out of range, or the body is printed with infill as well.

@@ -33,8 +33,6 @@ def interfaces_of(
     A subset names its joint by the relationship `calm:interface:joint`, or by having the joint's name.
 
     Args:
-        reading: The stage.
-        body_prim: The body's prim.
         pose: Its pose, stage units.
         joints: Prim paths of the joints that touch the body.
 

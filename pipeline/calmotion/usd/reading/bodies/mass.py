@@ -34,10 +34,7 @@ def mass_of(reading: Reading, prim: Usd.Prim, pose: Pose, shapes: list[Shape]) -
     authored of them on the body overrides that.
 
     Args:
-        reading: The stage.
-        prim: The body's prim.
         pose: Its pose, stage units.
-        shapes: Its geometry.
 
     Returns:
         SI, body frame; None where nothing in the shot gives the body a mass.

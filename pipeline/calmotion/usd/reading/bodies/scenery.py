@@ -30,10 +30,6 @@ def scenery_of(reading: Reading, bodies: Sequence[Body]) -> tuple[SurfaceMesh, .
 
     A prim that cannot be read is left out: scenery never makes a shot fail. Animated prims, skinned characters and
     point instances are left out as well.
-
-    Args:
-        reading: The stage.
-        bodies: The bodies of the robot.
     """
     from pxr import Tf
 

@@ -47,8 +47,6 @@ def shapes_of(reading: Reading, body_prim: Usd.Prim, pose: Pose) -> list[Shape]:
     """The geometry below a body, up to bodies nested in it.
 
     Args:
-        reading: The stage.
-        body_prim: The body's prim.
         pose: Its pose, stage units.
 
     Raises:

@@ -40,7 +40,6 @@ def expanded(
     """Joints, with hinges and sliders in place of those with several free directions.
 
     Args:
-        reading: The stage.
         joints: As read.
         poses: World poses of the bodies, stage units; those of the parts between are added.
 

@@ -29,7 +29,6 @@ def tell_what_is_elsewhere(reading: Reading, joints: Sequence[JointPrim], poses:
     """Warn of the joint whose frames are farthest apart at the transforms of its bodies.
 
     Args:
-        reading: The stage.
         joints: Of the character, those that close chains and those of several axes too.
         poses: Of the bodies, stage units.
     """
@@ -91,7 +90,6 @@ def refuse_held_twice(prims: Mapping[str, Usd.Prim], joints: Sequence[JointPrim]
 
     Args:
         prims: Of the bodies, by path.
-        joints: Of the robot.
         stiff: Paths of the joints that leave nothing free: with motors that follow their curves exactly.
 
     Raises:
@@ -135,9 +133,7 @@ def refuse_lost_bodies(reading: Reading, bodies: list[str], joints: Sequence[Joi
     """Refuse a joint that closes a chain on such a prim; note one that carries the robot.
 
     Args:
-        reading: The stage.
         bodies: Paths of the bodies.
-        joints: Of the robot.
 
     Raises:
         ShotError: There is one.

@@ -91,8 +91,6 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
     """A joint of the stage.
 
     Args:
-        reading: The stage.
-        prim: The joint's prim.
         poses: World pose of each body by path, stage units.
 
     Returns:

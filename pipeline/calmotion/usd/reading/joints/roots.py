@@ -42,10 +42,8 @@ def moving_frames(
     """Motion of the world-side frames of the joints that the shot moves.
 
     Args:
-        reading: The stage.
         joints: All joints of the character, in its order.
         poses: Poses of the bodies where the joints were read, stage units.
-        clock: Of the shot.
 
     Raises:
         ShotError: A transform that has no rigid pose.

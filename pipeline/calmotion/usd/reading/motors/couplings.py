@@ -61,7 +61,6 @@ def coupled_joint(
     """The joint that a coupling names.
 
     Args:
-        prim: The coupling.
         attribute: The relationship that names the joint.
         among: Joints of the right kind, by path.
         other: Path of the other coupled joint, empty where it is not known yet.
@@ -94,7 +93,6 @@ def rack_coupling(
     """What a rack and pinion couples: length = ratio angle [m/rad].
 
     Args:
-        reading: The stage.
         prim: The rack and pinion joint.
         hinges, slides: Revolute and prismatic joints of the character, by path.
 
@@ -145,8 +143,6 @@ def gears_of_joints(reading: Reading, joints: Sequence[JointPrim], driven: Colle
     """The gears of joints that gears or racks couple to driven ones, by path; those of a train follow one another.
 
     Args:
-        reading: The stage.
-        joints: Of the character.
         driven: Paths of those that are motors or follow one.
 
     Raises:

@@ -117,7 +117,6 @@ def read_drives(
     moves freely.
 
     Args:
-        joints: The joints of the character.
         root: Path of the character, for the message.
         posed: Joints whose bodies the shot moves relative to each other, by their transforms; where there are any, the
             motors that hold still are read from the bodies as well.
@@ -218,8 +217,6 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
     """The motor of a drive, limits in SI.
 
     Args:
-        drive: The drive.
-        index: Of its joint.
         motors: Index of each motor, by the path of its joint.
 
     Raises:

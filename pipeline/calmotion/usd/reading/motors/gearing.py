@@ -39,9 +39,7 @@ def read_gear(joint: JointPrim, kinds: dict[str, str], units: StageUnits) -> Gea
     """The gear of a joint; None where it has none.
 
     Args:
-        joint: The joint.
         kinds: Kind of every joint, by path.
-        units: Of the stage.
 
     Raises:
         ShotError: It is geared to itself, to something that is no joint with one angle or length, or by a ratio that

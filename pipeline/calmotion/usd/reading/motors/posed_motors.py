@@ -50,9 +50,7 @@ def pose_codes(stage: Usd.Stage, joints: Sequence[JointPrim], clock: Clock, part
     body has any.
 
     Args:
-        stage: The shot.
         joints: Joints whose bodies are looked at.
-        clock: The clock of the shot.
         parts: Into which frames are divided where splines pose a body: their curvature jumps at knots, so that a cubic
             through the frames alone is another motion.
     """

@@ -32,7 +32,6 @@ def read_spline(attribute: Usd.Attribute, clock: Clock, reading: Reading, to_si:
 
     Args:
         attribute: The drive's target position, degrees or stage length.
-        clock: The clock of the shot.
         reading: Receives notes and warnings for the user.
         to_si: Radians, or metres, in its unit.
 
@@ -169,7 +168,6 @@ def read_track(attribute: Usd.Attribute, clock: Clock, reading: Reading, to_si: 
 
     Args:
         attribute: The drive's target position, degrees or stage length.
-        clock: The clock of the shot.
         reading: Receives notes and warnings for the user.
         to_si: Radians, or metres, in its unit.
 

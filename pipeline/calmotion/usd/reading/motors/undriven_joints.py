@@ -39,8 +39,6 @@ def note_or_refuse_no_motors(reading: Reading, joints: Sequence[JointPrim], root
     """Note that nothing drives a character, or refuse it: at rest it hangs, and a shot of that has no motion.
 
     Args:
-        joints: All of the character.
-        root: Its path.
         passive: Whether it may be without motors.
 
     Raises:
