@@ -10,10 +10,10 @@ from calmotion.workflow.commands import rig as rig
 from calmotion.workflow.commands import simulate as simulate
 from calmotion.workflow.commands import verify as verify
 from calmotion.workflow.inspection import Inspection as Inspection
+from calmotion.workflow.manifest import publishing_problems as publishing_problems
+from calmotion.workflow.manifest import write_manifest as write_manifest
 from calmotion.workflow.problems import Cancelled as Cancelled
 from calmotion.workflow.problems import RunError as RunError
-from calmotion.workflow.publishing.gate import publishing_problems as publishing_problems
-from calmotion.workflow.publishing.manifest import write_manifest as write_manifest
 from calmotion.workflow.results import MotorMotion as MotorMotion
 from calmotion.workflow.results import OptimizationResult as OptimizationResult
 from calmotion.workflow.results import RobotMotion as RobotMotion

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import calmotion as cm
 import pyblish.api
-from calmotion.workflow.publishing.manifest import read_manifest
+from calmotion.workflow.manifest import read_manifest
 
 FAMILY = "calmotion.result"
 

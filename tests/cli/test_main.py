@@ -17,9 +17,9 @@ from calmotion.errors import ShotError
 from calmotion.host.discovery import find_in_folder
 from calmotion.host.registry import Host
 from calmotion.model import Animation, Character, InputLayer, ModeTable, Provenance, Result
-from calmotion.model.budget import MESH, BudgetEntry
 from calmotion.model.outputs import WrittenLayer
 from calmotion.model.run import OutputPaths, RunSettings, Source
+from calmotion.model.tolerance import MESH, BudgetEntry
 from calmotion.tolerance.reduced_bodies import ReducedBodies
 from fakes import host_of, operator
 from one_hinge import ONE_HINGE

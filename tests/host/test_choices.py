@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from calmotion.host import PluginState, SettingError, open_host
-from calmotion.host.choices import FILE_NAME, choose, configuration_folder, disabled_plugins
+from calmotion.host.settings import FILE_NAME, choose, configuration_folder, disabled_plugins
 
 
 @pytest.fixture

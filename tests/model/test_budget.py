@@ -1,7 +1,7 @@
 """The verdict on a result: kept or not, and because of what."""
 
 import pytest
-from calmotion.model.budget import MEASURED, MESH, REDUCTION, SEARCH, STEP, BudgetEntry, verdict_on
+from calmotion.model.tolerance import MEASURED, MESH, REDUCTION, SEARCH, STEP, BudgetEntry, verdict_on
 
 
 def budget(**estimates):

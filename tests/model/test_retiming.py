@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion.model import Animation, FreeTrack, MovingFrame, Track, WeightTrack
-from calmotion.model.curves import held_curve, root_at
-from calmotion.model.retiming.performance import retimed
-from calmotion.model.retiming.tempo import TimeMap
+from calmotion.model.curves import held_curve, retimed, root_at
+from calmotion.model.tempo import TimeMap
 from scipy.spatial.transform import Rotation
 
 FRAMES = np.arange(25) / 24.0

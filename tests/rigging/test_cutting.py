@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.rigging.cutting import cut_skin
+from calmotion.rigging.links import cut_skin
 from calmotion.usd.reading.bodies.moments import is_closed, surface_moments
 from tubes import tube
 

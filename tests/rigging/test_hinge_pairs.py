@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.rigging.hinge_pairs import derivatives, hinge_pair, residuals
-from calmotion.rigging.hinge_rows import follow
+from calmotion.rigging.hinge_rows import derivatives, follow, hinge_pair, residuals
 from scipy.spatial.transform import Rotation
 
 TIMES = np.linspace(0.0, 2.0, 60)

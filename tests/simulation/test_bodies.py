@@ -8,7 +8,7 @@ from calmotion.model.run import RunSettings
 from calmotion.multibody.model.model import body_anchors
 from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction import reduce as finite_elements
-from calmotion.reduction.full_order.full_models import FullModels
+from calmotion.reduction.full_models import FullModels
 from calmotion.simulation.bodies import full_model_of, reduce_bodies
 from calmotion.simulation.body_reduction import load_envelopes
 from calmotion.testing import beam_arm, fresh_cache, quintic, shot_of

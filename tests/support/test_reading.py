@@ -8,13 +8,12 @@ import pytest
 from calmotion import ShotError
 from calmotion.catalogs.materials import read_materials
 from calmotion.host import SettingError
-from calmotion.host.choices import FILE_NAME as DISABLED
-from calmotion.host.choices import configuration_folder, disabled_plugins
 from calmotion.host.errors import PluginError
 from calmotion.host.manifest import FILE_NAME as MANIFEST
 from calmotion.host.manifest import read_manifest
-from calmotion.host.settings import read_settings_file
-from calmotion.support.reading import read_toml
+from calmotion.host.settings import FILE_NAME as DISABLED
+from calmotion.host.settings import configuration_folder, disabled_plugins, read_settings_file
+from calmotion.support.foreign_files import read_toml
 
 
 def disabled(folder):

@@ -1,7 +1,7 @@
 """Hashes of sources: they change with every module that is imported, directly or not."""
 
 import pytest
-from calmotion.support.caching.sources import PACKAGE, digest_of, source_digest, with_imports
+from calmotion.support.caching.bundled_kernels import PACKAGE, digest_of, source_digest, with_imports
 
 
 @pytest.fixture

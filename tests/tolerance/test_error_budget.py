@@ -4,9 +4,9 @@ import dataclasses
 
 import pytest
 from calmotion.model import ModelChoice, ModelChoices
-from calmotion.model.budget import CHOICES, MESH, REDUCTION, SEARCH, STEP, SUBSPACE, verdict_on
 from calmotion.model.model_choice import with_choices
 from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import CHOICES, MESH, REDUCTION, SEARCH, STEP, SUBSPACE, verdict_on
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.error_budget import with_budget

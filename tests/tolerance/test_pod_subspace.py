@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.model import Track
-from calmotion.model.budget import SUBSPACE
-from calmotion.model.retiming.performance import retimed
-from calmotion.model.retiming.tempo import TimeMap
+from calmotion.model.curves import retimed
 from calmotion.model.run import RunSettings
+from calmotion.model.tempo import TimeMap
+from calmotion.model.tolerance import SUBSPACE
 from calmotion.simulation.bodies import with_elasticity
 from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.simulation.compiled_shot import compile_shot

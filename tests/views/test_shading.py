@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import synthetic
-from calmotion.views.shading import split_at_creases
+from calmotion.views.raster import split_at_creases
 
 
 def test_a_box_has_three_normals_at_each_corner_and_keeps_its_shape():

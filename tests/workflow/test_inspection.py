@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from calmotion.cli.reports.inspection import _solid_row
 from calmotion.model import Body, ElasticMaterial, FEMesh, FlexibleSettings, Frame
-from calmotion.model.materials.parts import Part
-from calmotion.model.meshes import MeshQuality
+from calmotion.model.meshes import MeshQuality, Part
 from calmotion.workflow.inspection import _body
 from one_hinge import ONE_HINGE
 

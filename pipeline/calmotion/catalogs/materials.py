@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from calmotion.errors import ShotError, raise_all
-from calmotion.support.caching.cache_folder import configuration_folder
+from calmotion.support.caching.caches import configuration_folder
+from calmotion.support.foreign_files import read_toml
 from calmotion.support.naming import nearest
-from calmotion.support.reading import read_toml
 
 TABLE = Path(__file__).with_suffix(".toml")
 USERS_FILE = "materials.toml"  # in the configuration folder

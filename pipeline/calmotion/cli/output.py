@@ -18,8 +18,8 @@ from calmotion.errors import ShotError, each, failure_of_machine
 from calmotion.host import Host
 from calmotion.support.memory import was_short
 from calmotion.support.naming import as_written
-from calmotion.workflow.json_values import plain
 from calmotion.workflow.problems import Problem, RunError
+from calmotion.workflow.report import plain
 
 if TYPE_CHECKING:
     from rich.console import Console

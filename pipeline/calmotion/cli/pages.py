@@ -14,8 +14,8 @@ from calmotion.cli.tables import with_texts
 from calmotion.host import Host
 from calmotion.model.outputs import PageContent, Section, TextTable
 from calmotion.support.naming import as_written
+from calmotion.workflow.manifest import origin_of
 from calmotion.workflow.outputs import write_page
-from calmotion.workflow.publishing.manifest import origin_of
 
 NAMED = 3  # files in a title
 Printed = Mapping[str, Callable[[dict[str, Any], Console], None]]

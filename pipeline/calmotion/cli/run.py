@@ -86,7 +86,7 @@ def run_once(
     if args.html:
         report["html"] = _page(result, report, args.html)
     if args.manifest and not result.problems and not result.interrupted:
-        from calmotion.workflow.publishing.manifest import write_manifest
+        from calmotion.workflow.manifest import write_manifest
 
         report["manifest"] = write_manifest(result, args.manifest)
     return result, report
@@ -97,7 +97,7 @@ def _page(result: SimulationResult, report: dict[str, Any], path: str) -> str:
     from calmotion.cli.pages import sections_of
     from calmotion.cli.reports.run import SECTIONS
     from calmotion.model.outputs import PageContent
-    from calmotion.workflow.publishing.manifest import origin_of_run
+    from calmotion.workflow.manifest import origin_of_run
 
     title = f"{report['command']} {os.path.basename(result.shot.path)}"
     return result.write_page(path, PageContent(title, sections_of(report, SECTIONS), origin_of_run(result)))

@@ -14,6 +14,9 @@ from calmotion.host.operators import registration as registration
 from calmotion.host.plan import Plan as Plan
 from calmotion.host.properties import Property as Property
 from calmotion.host.properties import PropertyValues as PropertyValues
+from calmotion.host.properties import has_no_unit as has_no_unit
+from calmotion.host.properties import parse_quantity as parse_quantity
+from calmotion.host.properties import quantity_of as quantity_of
 from calmotion.host.registry import Host as Host
 from calmotion.host.registry import Plugin as Plugin
 from calmotion.host.registry import PluginState as PluginState
@@ -26,7 +29,4 @@ from calmotion.host.settings import Settings as Settings
 from calmotion.host.settings import merge as merge
 from calmotion.host.settings import read_assignment as read_assignment
 from calmotion.host.settings import read_settings_file as read_settings_file
-from calmotion.host.units import has_no_unit as has_no_unit
-from calmotion.host.units import parse_quantity as parse_quantity
-from calmotion.host.units import quantity_of as quantity_of
 from calmotion.support.naming import nearest as nearest

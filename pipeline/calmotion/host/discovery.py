@@ -15,9 +15,9 @@ from types import ModuleType
 
 import calmotion_plugins
 
-from calmotion.host.choices import disabled_plugins
 from calmotion.host.errors import PluginError, SettingError
 from calmotion.host.manifest import FILE_NAME, CommandEntry, Manifest, check_requirements, read_manifest
+from calmotion.host.settings import disabled_plugins
 from calmotion.version import __version__
 
 ENTRY_POINT_GROUP = "calmotion.plugins"

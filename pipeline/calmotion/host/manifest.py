@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from calmotion.host.errors import PluginError
-from calmotion.support.reading import read_toml
+from calmotion.support.foreign_files import read_toml
 
 FILE_NAME = "plugin.toml"
 _TEXTS = ("id", "version", "name", "tagline", "maintainer", "license", "calmotion")

@@ -10,7 +10,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from calmotion.host.choices import disabled_plugins
 from calmotion.host.discovery import Location, discover, import_plugin
 from calmotion.host.errors import PluginError, SettingError
 from calmotion.host.manifest import Manifest, check_requirements, read_manifest
@@ -18,7 +17,7 @@ from calmotion.host.operators import Operator, check_operator
 from calmotion.host.plan import Plan, make_plan
 from calmotion.host.properties import PropertyValues, values_of
 from calmotion.host.run import Reuse, Run
-from calmotion.host.settings import Settings
+from calmotion.host.settings import Settings, disabled_plugins
 from calmotion.support import interrupts
 from calmotion.support.naming import nearest
 from calmotion.version import __version__

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from calmotion.host.errors import PluginError
 from calmotion.host.operators import NotAsked, Operator, Record, RunContext
-from calmotion.host.plan import Plan
-from calmotion.host.polling import can_check, find_rivals, poll, will_run
+from calmotion.host.plan import Plan, can_check, find_rivals, poll, will_run
 from calmotion.host.properties import PropertyValues
 from calmotion.support import interrupts
 from calmotion.support.memory import RESERVE, peak_memory, require_address_space

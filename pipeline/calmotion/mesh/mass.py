@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calmotion.arrays import Array, Indices, IntArray
-from calmotion.mesh.parts.makeup import Makeup
+from calmotion.mesh.parts import Makeup
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.model.character import Body, MassProperties, SurfaceMesh
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.cells import CORNERS, TRIANGLES, tets_of, triangles_of
+from calmotion.mesh.quadratic import CORNERS, TRIANGLES, tets_of, triangles_of
 from calmotion.model import SurfaceMesh, TetGeometry
 from calmotion.support.foreign_files import refuse_lfs_pointers
 from calmotion.support.memory import too_large

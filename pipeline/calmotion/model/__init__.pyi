@@ -6,7 +6,6 @@ from calmotion.model.animation import MotorTracks as MotorTracks
 from calmotion.model.animation import MovingFrame as MovingFrame
 from calmotion.model.animation import Track as Track
 from calmotion.model.animation import WeightTrack as WeightTrack
-from calmotion.model.budget import verdict_on as verdict_on
 from calmotion.model.character import WORLD as WORLD
 from calmotion.model.character import Body as Body
 from calmotion.model.character import Character as Character
@@ -80,11 +79,10 @@ from calmotion.model.result import ModeTable as ModeTable
 from calmotion.model.result import Motion as Motion
 from calmotion.model.result import MotorCurve as MotorCurve
 from calmotion.model.result import Result as Result
+from calmotion.model.result import Retimed as Retimed
 from calmotion.model.result import Simplification as Simplification
 from calmotion.model.result import Simulation as Simulation
 from calmotion.model.result import Skin as Skin
-from calmotion.model.retiming.retimed import Retimed as Retimed
-from calmotion.model.retiming.tempo import TempoSettings as TempoSettings
 from calmotion.model.run import LONG_SHOT as LONG_SHOT
 from calmotion.model.run import SHAPERS as SHAPERS
 from calmotion.model.run import InputLayer as InputLayer
@@ -95,7 +93,9 @@ from calmotion.model.run import RunSettings as RunSettings
 from calmotion.model.run import SearchRecord as SearchRecord
 from calmotion.model.run import Source as Source
 from calmotion.model.table import columns as columns
+from calmotion.model.tempo import TempoSettings as TempoSettings
 from calmotion.model.tolerance import reach as reach
 from calmotion.model.tolerance import tolerance_of as tolerance_of
+from calmotion.model.tolerance import verdict_on as verdict_on
 from calmotion.model.uncertainty import Robustness as Robustness
 from calmotion.model.uncertainty import RobustSettings as RobustSettings

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray
-from calmotion.model.retiming.tempo import TimeMap
+from calmotion.model.tempo import TimeMap
 
 
 @dataclass(frozen=True, eq=False)

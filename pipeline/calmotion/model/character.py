@@ -13,10 +13,9 @@ import numpy as np
 
 from calmotion.arrays import Array, IntArray
 from calmotion.model.animation import Contact
-from calmotion.model.materials.parts import Part
-from calmotion.model.materials.printed import Core
+from calmotion.model.meshes import Core, Part
 from calmotion.model.motor import PRESCRIBED, Motor
-from calmotion.model.retiming.tempo import TempoSettings
+from calmotion.model.tempo import TempoSettings
 from calmotion.model.uncertainty import Uncertainty
 
 WORLD = -1

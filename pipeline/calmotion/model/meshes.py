@@ -1,10 +1,68 @@
-"""Finite-element meshes of the flexible bodies."""
+"""Finite-element meshes of the flexible bodies, and what these are made of: a printed part, an assembly."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from calmotion.arrays import Array, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of a body, such as an insert or a shell, with its own material.
+
+    Attributes:
+        path: Prim path of its surface.
+        material: Prim path of its material.
+        points: Of its surface [m], shape [n, 3], body frame.
+        triangles: Shape [m, 3], outward; nearly closed is enough.
+        modulus: Its Young's modulus over that of the material of the body.
+        density: Its density over that of the material of the body.
+        damping: Its fraction of critical damping.
+    """
+
+    path: str
+    material: str
+    points: np.ndarray
+    triangles: np.ndarray
+    modulus: float
+    density: float
+    damping: float
+
+
+LINE_WIDTH = 0.45e-3  # of a printed line by a nozzle of 0.4 mm, as slicers set it [m]
+PERIMETERS = 2  # of a print whose shot does not tell
+
+
+@dataclass(frozen=True)
+class Core:
+    """What is inside the skin of a printed part, homogenised.
+
+    Attributes:
+        skin: Thickness of the solid skin [m].
+        infill: Share of the core that is material; its density over that of the skin.
+        stiffness: Its Young's modulus over that of the skin; Poisson's ratio is the same.
+    """
+
+    skin: float
+    infill: float
+    stiffness: float
+
+
+def core_of(infill: float, skin: float) -> Core:
+    """The core of a print.
+
+    Args:
+        infill: Share of the core that is material, between 0 and 1, exclusively.
+        skin: Thickness of its skin [m].
+
+    Source: the Hashin-Shtrikman bound of isotropic plane lattices, E = E_s f / (3 - 2 f), in Bendsoe and Sigmund 1999,
+    Material interpolation schemes in topology optimization; triangulated lattices reach it (f / 3 at low densities:
+    Gibson and Ashby 1997, Cellular Solids). Patterns that bend are softer, down to f^2 of open foams.
+    """
+    return Core(skin, infill, infill / (3.0 - 2.0 * infill))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from calmotion.model.budget import CHOICES
 from calmotion.model.character import Character
 from calmotion.model.result import Result, Simplification
 from calmotion.model.run import RunSettings, Source
+from calmotion.model.tolerance import CHOICES
 
 # What can be forced on or off.
 KINDS = ("bodies", "turning", "loops", "modes", "directions", "elasticity", "motors")

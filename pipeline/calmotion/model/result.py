@@ -8,11 +8,27 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model.animation import Animation
-from calmotion.model.budget import BudgetEntry
+from calmotion.model.character import Character
 from calmotion.model.limits.use import LimitUse
-from calmotion.model.retiming.retimed import Retimed
 from calmotion.model.run import SearchRecord
+from calmotion.model.tempo import TempoReport
+from calmotion.model.tolerance import BudgetEntry
 from calmotion.model.uncertainty import Robustness
+
+
+@dataclass(frozen=True, eq=False)
+class Retimed:
+    """An animation at the tempo that was found for it.
+
+    Attributes:
+        animation: At that tempo, which it has.
+        character: Whose contacts come and go at that tempo.
+        report: What the tempo costs.
+    """
+
+    animation: Animation
+    character: Character
+    report: TempoReport
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from calmotion.model.budget import SEARCH_SHARE
-from calmotion.model.retiming.tempo import TempoSettings
+from calmotion.model.tempo import TempoSettings
+from calmotion.model.tolerance import SEARCH_SHARE
 from calmotion.model.uncertainty import RobustSettings
 
 

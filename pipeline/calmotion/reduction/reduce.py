@@ -11,10 +11,10 @@ from calmotion.errors import ShotError
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, InterfacePatch, interface_patches
 from calmotion.mesh.quadratic import QuadraticMesh
 from calmotion.mesh.tetrahedra import surface_area
-from calmotion.model.budget import REDUCTION
 from calmotion.model.character import DEFAULT_TOLERANCE, Body, ElasticMaterial, SurfaceMesh
 from calmotion.model.meshes import FEMesh
 from calmotion.model.result import Simplification
+from calmotion.model.tolerance import REDUCTION
 from calmotion.reduction.basis.craig_bampton import Basis, reduced_basis
 from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.damping import damped, ratio_of_parts

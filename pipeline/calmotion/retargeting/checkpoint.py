@@ -17,7 +17,7 @@ import numpy as np
 from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.support.caching.sources import source_digest
+from calmotion.support.caching.bundled_kernels import source_digest
 from calmotion.support.caching.verified_files import DamagedFileError, read_arrays, write_arrays
 
 # A point belongs to the code that computed it.

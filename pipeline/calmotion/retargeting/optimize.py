@@ -21,13 +21,13 @@ from calmotion.retargeting.avoided_reversals import play_of, with_reversals
 from calmotion.retargeting.checkpoint import Checkpoint, problem_key
 from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.kept_feet import with_kept_feet
+from calmotion.retargeting.left_out import search_rows
 from calmotion.retargeting.problem.limit_costs import limit_costs
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem, with_first_penalty
 from calmotion.retargeting.robust.robots import robots_of
 from calmotion.retargeting.search import RetargetSearch
-from calmotion.retargeting.search_memory import SearchMemory
-from calmotion.retargeting.simplification.report_rows import search_rows
+from calmotion.retargeting.search_progress import SearchMemory
 from calmotion.retargeting.solver.gauss_newton import Search
 from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.compiled_shot import CompiledShot

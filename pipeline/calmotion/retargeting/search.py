@@ -13,17 +13,21 @@ from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import goal_of
 from calmotion.retargeting.checkpoint import Checkpoint, StoredPoint
 from calmotion.retargeting.feasible_start import on_sufficient_knots, onto_limits, with_moving_end, with_possible_limits
+from calmotion.retargeting.left_out import (
+    FINER,
+    PRUNED,
+    block_energies,
+    first_change,
+    idle_gain,
+    idle_motors,
+    negligible_coefficients,
+)
 from calmotion.retargeting.problem.adaptive_knots import converted, refined_breaks
 from calmotion.retargeting.problem.linear_problem import LinearProblem
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.posing import locked_coefficients
 from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
-from calmotion.retargeting.search_memory import SearchMemory
-from calmotion.retargeting.search_progress import SearchProgress
-from calmotion.retargeting.simplification.first_change import first_change
-from calmotion.retargeting.simplification.idle_motors import idle_gain, idle_motors
-from calmotion.retargeting.simplification.pruning import block_energies, negligible_coefficients
-from calmotion.retargeting.simplification.report_rows import FINER, PRUNED
+from calmotion.retargeting.search_progress import SearchMemory, SearchProgress
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.retargeting.solver.recycling import Recycled

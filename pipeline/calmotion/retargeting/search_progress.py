@@ -1,9 +1,18 @@
-"""How far a search is, from the gains that it predicted: their number of iterations is not known before."""
+"""How far a search is, and the memory that it takes."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calmotion.arrays import IntArray
+from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.solver.gauss_newton import Search
+from calmotion.retargeting.solver.preconditioner import Sharpened
+from calmotion.retargeting.solver.recycling import Recycled
 
 FIRST_RATIO = 0.3  # of the gain after the first iteration to the one before it, until it is known
 PASS = 0.7  # share of a minimisation in what is left: others, on finer knots, may follow
@@ -68,3 +77,33 @@ class SuccessiveSearches:
     def ended(self) -> None:
         """The search has ended."""
         self._before += SEARCH * (1.0 - self._before)
+
+
+@dataclass(frozen=True, eq=False)
+class SearchMemory:
+    """The end of a search.
+
+    Attributes:
+        breaks, motors: Of its unknowns.
+        recycled: Directions of its linear systems.
+        sharpened: Preconditioner by the responses of the flexible robot, with their point; None where it had none.
+    """
+
+    breaks: IntArray
+    motors: IntArray
+    recycled: Recycled
+    sharpened: Sharpened | None
+
+    @classmethod
+    def of(cls, problem: RetargetProblem, search: Search) -> SearchMemory:
+        """What the search of a problem leaves."""
+        return cls(problem.space.basis.breaks, problem.space.motors, search.recycled, search.sharpened)
+
+    def begun(self, problem: RetargetProblem, search: Search) -> Search:
+        """A search that has not begun, with what fits its problem."""
+        space = problem.space
+        if not np.array_equal(self.motors, space.motors) or not np.array_equal(self.breaks, space.basis.breaks):
+            return search
+        if self.recycled.p.shape[1] != len(search.x):
+            return search
+        return replace(search, recycled=self.recycled, sharpened=self.sharpened)

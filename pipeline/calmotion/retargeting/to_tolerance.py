@@ -18,10 +18,10 @@ from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.parallel import at_once
 from calmotion.retargeting.found_curves import best_so_far
 from calmotion.retargeting.input_run import with_input_resolved
+from calmotion.retargeting.left_out import JOINING_GAIN
 from calmotion.retargeting.optimize import optimize_shot, refuse_other_integrators
 from calmotion.retargeting.robust.retarget import retarget_robustly
 from calmotion.retargeting.search_progress import SuccessiveSearches
-from calmotion.retargeting.simplification.idle_motors import JOINING_GAIN
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.open_chains import refused_gap
 from calmotion.simulation.simulate import Progress

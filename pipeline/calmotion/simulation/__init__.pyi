@@ -19,12 +19,11 @@ from calmotion.simulation.forward import run_forward as run_forward
 from calmotion.simulation.inputs.contacts import sample_world as sample_world
 from calmotion.simulation.inputs.curves import AT_REST as AT_REST
 from calmotion.simulation.inputs.curves import Curves as Curves
+from calmotion.simulation.inputs.curves import coupling_of as coupling_of
+from calmotion.simulation.inputs.curves import leaders as leaders
 from calmotion.simulation.inputs.curves import needed_pre_roll as needed_pre_roll
 from calmotion.simulation.inputs.curves import sample_curves as sample_curves
 from calmotion.simulation.inputs.curves import sample_tracks as sample_tracks
-from calmotion.simulation.inputs.excerpts import busiest as busiest
-from calmotion.simulation.inputs.gearing import coupling_of as coupling_of
-from calmotion.simulation.inputs.gearing import leaders as leaders
 from calmotion.simulation.inputs.roots import root_tracks as root_tracks
 from calmotion.simulation.inputs.roots import sample_roots as sample_roots
 from calmotion.simulation.inputs.shapers import best_delay as best_delay
@@ -37,6 +36,7 @@ from calmotion.simulation.inputs.tempo import TempoLimits as TempoLimits
 from calmotion.simulation.inputs.tempo import needed_tempo as needed_tempo
 from calmotion.simulation.inputs.time_grid import MAX_STEP as MAX_STEP
 from calmotion.simulation.inputs.time_grid import TimeGrid as TimeGrid
+from calmotion.simulation.inputs.time_grid import busiest as busiest
 from calmotion.simulation.inputs.time_grid import over_grid as over_grid
 from calmotion.simulation.inputs.time_grid import pre_roll_weights as pre_roll_weights
 from calmotion.simulation.intended_motion import rigid_motion as rigid_motion

@@ -22,7 +22,7 @@ from calmotion.reduction.reduced_body import ReducedBody
 
 if TYPE_CHECKING:
     from calmotion.mesh.patches.interface_patches import AttachmentFrame
-    from calmotion.reduction.full_order.full_models import FullModels, Member
+    from calmotion.reduction.full_models import FullModels, Member
     from calmotion.reduction.reduce import LinearModes
 
 Found = TypeVar("Found")
@@ -64,7 +64,7 @@ def reduce_bodies(
     members = {index: full_model_of(character, mesh_of[index], anchors[index]) for index in flexible}
     models = full
     if flexible:
-        from calmotion.reduction.full_order.full_models import FullModels
+        from calmotion.reduction.full_models import FullModels
 
         models = models or FullModels(keeps=False)
         models.expect(members.values())
@@ -208,7 +208,7 @@ def _materials(character: Character) -> dict[int, ElasticMaterial]:
 
 def full_model_of(character: Character, mesh: FEMesh, anchors: BodyAnchors) -> Member:
     """What the full model of a flexible body is made of."""
-    from calmotion.reduction.full_order.full_models import Member
+    from calmotion.reduction.full_models import Member
 
     body = character.bodies[mesh.body]
     return Member(mesh, body, fem_anchors(character, body, anchors), anchors.root)

@@ -20,7 +20,7 @@ from calmotion.simulation.preparation import grid_of
 from calmotion.simulation.rigid_run import shot_load_envelopes
 
 if TYPE_CHECKING:
-    from calmotion.reduction.full_order.full_models import FullModels
+    from calmotion.reduction.full_models import FullModels
 
 
 class BodyReduction:
@@ -59,7 +59,7 @@ class BodyReduction:
 
     def _models(self) -> FullModels | None:
         if self._full is None and self._repeats and self.meshes is not None:
-            from calmotion.reduction.full_order.full_models import FullModels
+            from calmotion.reduction.full_models import FullModels
 
             self._full = FullModels(keeps=True)
         return self._full

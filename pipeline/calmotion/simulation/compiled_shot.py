@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from calmotion.model import Animation, Character, Track
 
 if TYPE_CHECKING:
-    from calmotion.model.retiming.retimed import Retimed
+    from calmotion.model.result import Retimed
     from calmotion.multibody.model.model import Model
     from calmotion.multibody.model.topology import Tree
     from calmotion.reduction.reduced_body import ReducedBody

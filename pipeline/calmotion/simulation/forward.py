@@ -14,8 +14,7 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.runs import frames_in, from_rest
 from calmotion.simulation.cyclic import SteadyState
-from calmotion.simulation.inputs.curves import Curves
-from calmotion.simulation.inputs.delays import CommandDelay
+from calmotion.simulation.inputs.curves import CommandDelay, Curves
 
 
 @dataclass(frozen=True, eq=False)

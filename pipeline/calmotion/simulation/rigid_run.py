@@ -9,7 +9,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.mesh.mass import mass_of_tets
-from calmotion.mesh.parts.makeup import makeup_of
+from calmotion.mesh.parts import makeup_of
 from calmotion.model import Animation, Character, FEMeshes
 from calmotion.model.character import with_ideal_motors
 from calmotion.multibody.analysis import kinematics

@@ -18,7 +18,7 @@ from calmotion.multibody.sensitivity.periodic import Monodromy, periodic_adjoint
 from calmotion.multibody.sensitivity.tangent import tangent
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import ForwardRun, followed, run_forward
-from calmotion.simulation.inputs.delays import CommandDelay
+from calmotion.simulation.inputs.curves import CommandDelay
 
 
 def compile_kernels(

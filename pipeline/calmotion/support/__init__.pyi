@@ -1,6 +1,6 @@
 """Public names of `calmotion.support`: each is imported when it is first used."""
 
-from calmotion.support.caching.cache_folder import cache_folder as cache_folder
+from calmotion.support.caching.caches import cache_folder as cache_folder
 from calmotion.support.compilation import compiling as compiling
 from calmotion.support.compilation import kernel_folder as kernel_folder
 from calmotion.support.files import is_own as is_own
@@ -10,6 +10,8 @@ from calmotion.support.files import replaced as replaced
 from calmotion.support.files import temporary_folder as temporary_folder
 from calmotion.support.files import try_writing as try_writing
 from calmotion.support.files import write_text as write_text
+from calmotion.support.foreign_files import read_text as read_text
+from calmotion.support.foreign_files import read_toml as read_toml
 from calmotion.support.foreign_files import refuse_lfs_pointers as refuse_lfs_pointers
 from calmotion.support.foreign_files import remedy_for as remedy_for
 from calmotion.support.interrupts import answer as answer
@@ -24,8 +26,6 @@ from calmotion.support.operating_system import PIPES as PIPES
 from calmotion.support.operating_system import locked as locked
 from calmotion.support.operating_system import processors as processors
 from calmotion.support.operating_system import use_processors as use_processors
-from calmotion.support.reading import read_text as read_text
-from calmotion.support.reading import read_toml as read_toml
 from calmotion.support.time_columns import TIME_UNITS as TIME_UNITS
 from calmotion.support.time_columns import TimeColumn as TimeColumn
 from calmotion.support.time_columns import counters as counters

@@ -1,13 +1,42 @@
-"""Files that others name: those of other kinds in the place of a shot, a motion or settings, and places that are never
-opened because a shot names them."""
+"""Texts that users name: never a file for whose content a reader would wait for ever."""
 
 from __future__ import annotations
 
 import os
+import tomllib
 from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 
 from calmotion.errors import ShotError
+from calmotion.support.files import refuse_special
 from calmotion.support.operating_system import SHARED_MEMORY, SYSTEM_FOLDERS
+
+
+def read_text(path: str | Path) -> str:
+    """The content of a UTF-8 text file.
+
+    Raises:
+        OSError: It cannot be read, or is a named pipe, a socket or a device.
+        UnicodeDecodeError: It is not UTF-8.
+    """
+    refuse_special(path)
+    return Path(path).read_text(encoding="utf-8")
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """The tables of a TOML file.
+
+    Raises:
+        OSError: It cannot be read, or is a named pipe, a socket or a device.
+        ValueError: It is not UTF-8, not TOML, or nested too deeply.
+    """
+    text = read_text(path)
+    try:
+        return tomllib.loads(text.removeprefix("\ufeff"))  # which editors of Windows write
+    except RecursionError:
+        raise ValueError("its values are nested too deeply") from None
+
 
 _HEAD = 4096  # bytes that tell the kind of a file
 _LFS = b"version https://git-lfs.github.com/spec/"  # first line of a pointer (git-lfs, docs/spec.md)

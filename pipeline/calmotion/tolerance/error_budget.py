@@ -5,8 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from calmotion.model import Character, Result, Simplification
-from calmotion.model.budget import CHOICES, MESH, REDUCTION, SEARCH, SEARCH_SHARE, STEP, SUBSPACE, BudgetEntry
-from calmotion.model.tolerance import tolerance_of
+from calmotion.model.tolerance import (
+    CHOICES,
+    MESH,
+    REDUCTION,
+    SEARCH,
+    SEARCH_SHARE,
+    STEP,
+    SUBSPACE,
+    BudgetEntry,
+    tolerance_of,
+)
 from calmotion.tolerance import reduction as converged_reduction
 from calmotion.tolerance import simulation as simulate_to_tolerance
 from calmotion.tolerance import step_choice

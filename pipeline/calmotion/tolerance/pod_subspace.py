@@ -18,10 +18,10 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.model import Animation, Character, Simplification, Track
-from calmotion.model.budget import SUBSPACE
 from calmotion.model.character import FlexibleSettings
 from calmotion.model.model_choice import OFF, ON
 from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import SUBSPACE
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.reduction.subspace import principal_subspace, projected_body
 from calmotion.simulation.compiled_shot import CompiledShot

@@ -13,10 +13,9 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model import Accuracy, Animation, Character, MotorCurve, Result, Simplification, Track
-from calmotion.model.budget import STEP, SUBSPACE
 from calmotion.model.curves import optimized_curve
 from calmotion.model.run import RunSettings
-from calmotion.model.tolerance import tolerance_of
+from calmotion.model.tolerance import STEP, SUBSPACE, tolerance_of
 from calmotion.multibody.parallel import at_once
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.simulation.bodies import mode_tables

@@ -34,7 +34,7 @@ from calmotion.usd.reading.motors.driven_motors import actuated_joints as actuat
 from calmotion.usd.reading.shot import read_shot as read_shot
 from calmotion.usd.rigging import RigOptions as RigOptions
 from calmotion.usd.rigging import rig_shot as rig_shot
-from calmotion.usd.rigging.materials import author_material as author_material
+from calmotion.usd.rigging.layer import author_material as author_material
 from calmotion.usd.schemas import is_applied as is_applied
 from calmotion.usd.stages import CALIBRATION as CALIBRATION
 from calmotion.usd.stages import METADATA_KEY as METADATA_KEY
@@ -53,7 +53,7 @@ from calmotion.usd.writing import sampled_at_frames as sampled_at_frames
 from calmotion.usd.writing import write_result as write_result
 from calmotion.usd.writing.metadata import author_origin as author_origin
 from calmotion.usd.writing.metadata import author_stage_metadata as author_stage_metadata
-from calmotion.usd.writing.performances import write_performance as write_performance
 from calmotion.usd.writing.root import refuse_layers_of as refuse_layers_of
 from calmotion.usd.writing.root import relative_asset as relative_asset
+from calmotion.usd.writing.root import write_performance as write_performance
 from calmotion.usd.writing.root import write_root as write_root

@@ -1,16 +1,83 @@
-"""The files that a shot names, refused before they are opened where they are no files or lie where none are opened."""
+"""Value clips of a layer: the files that they name, which USD opens while it composes a stage."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import glob
+import math
+import os
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 from calmotion.errors import ShotError
 from calmotion.support.files import is_special
 from calmotion.support.foreign_files import forbidden_place, refuse_lfs_pointers
-from calmotion.usd.clips import clip_assets
 
 if TYPE_CHECKING:
     from pxr import Sdf
+
+MOST_CLIPS = 100_000  # of one template: USD looks for each of them
+CLIPS, _VARIANT_SETS, _CHILDREN = "clips", "variantSetNames", "primChildren"  # metadata of a prim
+
+
+def clip_assets(layer: Sdf.Layer) -> list[str]:
+    """Asset paths of the clips and manifests that the prims of a layer name, and of the files that templates match.
+
+    Raises:
+        ShotError: A template asks for more clips than anybody has.
+    """
+    found: list[str] = []
+    for prim in _with_clips(layer.pseudoRoot):
+        sets = prim.GetInfo(CLIPS)
+        for one in sets.values() if isinstance(sets, Mapping) else ():
+            if isinstance(one, Mapping):
+                found += _named(one)
+                found += _matched(one, layer, str(prim.path))
+    return [name for name in dict.fromkeys(found) if name]
+
+
+def _with_clips(prim: Sdf.PrimSpec) -> Iterator[Sdf.PrimSpec]:
+    """The prims below one that have clips, those in variants as well; of hundreds of thousands in a second."""
+    waiting = list(prim.nameChildren.values())
+    while waiting:
+        one = waiting.pop()
+        if one.HasInfo(CLIPS):
+            yield one
+        # asking for children and sets themselves takes several times as long as all else
+        if one.HasInfo(_CHILDREN):
+            waiting += one.nameChildren.values()
+        if one.HasInfo(_VARIANT_SETS):
+            for variants in one.variantSets.values():
+                waiting += [variant.primSpec for variant in variants.variants.values()]
+
+
+def _named(clips: Mapping[str, Any]) -> list[str]:
+    assets = clips.get("assetPaths")
+    listed = list(assets) if isinstance(assets, Iterable) else []
+    return [asset.path for asset in (*listed, clips.get("manifestAssetPath")) if hasattr(asset, "path")]
+
+
+def _matched(clips: Mapping[str, Any], layer: Sdf.Layer, path: str) -> list[str]:
+    """The files in the place of a template, such as `./clip.###.usd`."""
+    template = clips.get("templateAssetPath")
+    if not isinstance(template, str) or not template:
+        return []
+    given = [clips.get(f"template{name}") for name in ("StartTime", "EndTime", "Stride")]
+    numbers = [float(number) for number in given if isinstance(number, (int, float))]
+    if len(numbers) == len(given):
+        start, end, stride = numbers
+        count = (end - start) / stride if stride > 0.0 else math.inf
+        if not count <= MOST_CLIPS:
+            raise ShotError(
+                "its template of value clips asks for too many files",
+                path=path,
+                attribute=CLIPS,
+                found=f"from {start:g} to {end:g} in steps of {stride:g}",
+                remedy=f"Correct templateStartTime, templateEndTime and templateStride (at most {MOST_CLIPS:,} clips)",
+            )
+    pattern = re.sub("#+", "*", glob.escape(template))
+    folder = os.path.dirname(layer.realPath)
+    return [os.path.join(folder, name) for name in glob.glob(pattern, root_dir=folder or None)]
 
 
 def refuse_place(path: str, named_by: str, attribute: str = "") -> None:

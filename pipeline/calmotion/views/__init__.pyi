@@ -9,6 +9,7 @@ from calmotion.views.playback import modes_of as modes_of
 from calmotion.views.playback import relative_poses as relative_poses
 from calmotion.views.playback import sample_motion as sample_motion
 from calmotion.views.raster import rasterize as rasterize
+from calmotion.views.raster import split_at_creases as split_at_creases
 from calmotion.views.rendering import Camera as Camera
 from calmotion.views.rendering import Mask as Mask
 from calmotion.views.rendering import Model as Model
@@ -22,7 +23,6 @@ from calmotion.views.rendering import pose as pose
 from calmotion.views.rendering import prepare as prepare
 from calmotion.views.rendering import see as see
 from calmotion.views.rendering import with_picture as with_picture
-from calmotion.views.shading import split_at_creases as split_at_creases
 from calmotion.views.spectrum import error_spectrum as error_spectrum
 from calmotion.views.spectrum import highest_frequency as highest_frequency
 from calmotion.views.style import AFTER as AFTER

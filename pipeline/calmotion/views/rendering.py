@@ -13,8 +13,7 @@ from calmotion.model.character import Character
 from calmotion.model.result import Motion, Skin
 from calmotion.views.painting import LEVELS, Light, Marks, Visible, develop, mark, outlines
 from calmotion.views.playback import deformed_points, modes_of, rotation_matrices
-from calmotion.views.raster import Hits, rasterize
-from calmotion.views.shading import split_at_creases
+from calmotion.views.raster import Hits, rasterize, split_at_creases
 from calmotion.views.viewpoint import Viewpoint
 
 Pixels = NDArray[np.uint8]  # sRGB, shape [height, width, 3]

@@ -2,7 +2,10 @@
 
 from calmotion.workflow.commands import optimize as optimize
 from calmotion.workflow.commands import simulate as simulate
-from calmotion.workflow.json_values import plain as plain
+from calmotion.workflow.manifest import changed_files as changed_files
+from calmotion.workflow.manifest import origin_of as origin_of
+from calmotion.workflow.manifest import read_manifest as read_manifest
+from calmotion.workflow.manifest import sha256_of as sha256_of
 from calmotion.workflow.outputs import prepare_page as prepare_page
 from calmotion.workflow.outputs import refuse_layers as refuse_layers
 from calmotion.workflow.outputs import refuse_overwriting as refuse_overwriting
@@ -11,10 +14,7 @@ from calmotion.workflow.outputs import write_page as write_page
 from calmotion.workflow.problems import Cancelled as Cancelled
 from calmotion.workflow.problems import problems_of as problems_of
 from calmotion.workflow.problems import value_of as value_of
-from calmotion.workflow.publishing.manifest import changed_files as changed_files
-from calmotion.workflow.publishing.manifest import origin_of as origin_of
-from calmotion.workflow.publishing.manifest import read_manifest as read_manifest
-from calmotion.workflow.publishing.manifest import sha256_of as sha256_of
+from calmotion.workflow.report import plain as plain
 from calmotion.workflow.results import OptimizationResult as OptimizationResult
 from calmotion.workflow.results import SimulationResult as SimulationResult
 from calmotion.workflow.run import Hooks as Hooks

@@ -79,7 +79,7 @@ class Inspection:
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints; empty where the shot could not be read."""
-        from calmotion.workflow.json_values import plain
+        from calmotion.workflow.report import plain
 
         report = inspect_report(self._run, self._settings) if all(self._run.get(kind) for kind in _CONTENTS) else {}
         if self.findings is not None:

@@ -9,8 +9,16 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import Character, Motion
 from calmotion.model.character import WORLD
-from calmotion.simulation.standing.held_feet import HeldFoot, held_feet, unlike_ground
-from calmotion.simulation.standing.soles import STANDS, centres_of_pressure, margins, points_of, sole_of
+from calmotion.simulation.standing.held_feet import (
+    STANDS,
+    HeldFoot,
+    centres_of_pressure,
+    held_feet,
+    margins,
+    points_of,
+    sole_of,
+    unlike_ground,
+)
 
 _STILL = 1e-6  # a base that moves by more does not stand [m]
 

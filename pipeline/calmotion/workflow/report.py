@@ -1,8 +1,9 @@
-"""What a run reports: the object of `--json`, from the values of `calmotion.model`."""
+"""Values as JSON can hold them."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -10,14 +11,14 @@ import numpy as np
 
 from calmotion.host import OperatorResult, Run
 from calmotion.model import Character, LimitUse, ModelChoices, Provenance, Result, Simplification
-from calmotion.model.budget import Verdict, verdict_on
 from calmotion.model.character import motors_give
 from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.model.limits.use import is_exceeded
 from calmotion.model.motor import measure_of
 from calmotion.model.outputs import CsvFile, Figures, Recording, Rig, Verification, Video, WrittenLayer
-from calmotion.model.retiming.retimed import Retimed
+from calmotion.model.result import Retimed
 from calmotion.model.run import Source
+from calmotion.model.tolerance import Verdict, verdict_on
 from calmotion.support.memory import peak_memory
 from calmotion.version import __version__
 from calmotion.workflow.reactions import contact_rows, reaction_rows
@@ -31,6 +32,19 @@ from calmotion.workflow.targets import (
     still_targets,
     target_errors,
 )
+
+
+def plain(value: Any) -> Any:
+    """`value` as JSON can hold it: NumPy as Python, and null for what is not a finite number."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
 
 
 def left_out_row(row: Simplification) -> dict[str, Any]:

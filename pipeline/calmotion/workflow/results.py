@@ -180,8 +180,7 @@ class SimulationResult:
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints: plain values, keys as in the USD contract."""
-        from calmotion.workflow.json_values import plain
-        from calmotion.workflow.report import run_report
+        from calmotion.workflow.report import plain, run_report
 
         report: dict[str, Any] = plain(
             run_report(self._outcome.run, self._character, self.result, self._command, self._outcome.total_wall_s)

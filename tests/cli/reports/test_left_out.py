@@ -2,7 +2,7 @@
 
 import io
 
-from calmotion.cli.reports.left_out import print_left_out
+from calmotion.cli.reports.limits import print_left_out
 from calmotion.cli.tables import console_on
 
 

@@ -33,7 +33,7 @@ from calmotion.model import (
     Target,
     Track,
 )
-from calmotion.model.retiming.tempo import Stretch, TempoReport, TimeMap
+from calmotion.model.tempo import Stretch, TempoReport, TimeMap
 
 LENGTH = 0.5
 FRAME_RATE = 24.0

@@ -11,7 +11,7 @@ from calmotion.simulation.preparation import prepare
 from calmotion.simulation.report import performed_motion
 from calmotion.usd.reading import read_shot
 from calmotion.usd.reading.skeletons import bound_skeletons
-from calmotion.usd.writing.motions import simulated_motion
+from calmotion.usd.writing.bake import simulated_motion
 from pxr import Usd, UsdGeom
 
 

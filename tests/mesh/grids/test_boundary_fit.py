@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.mesh.grids.boundary_fit import fitted
+from calmotion.mesh.mesh_shaping import fitted
 from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles
 from calmotion.mesh.tetrahedra import surface_volume, tet_volumes
 from round_bars import LENGTH, RADIUS, bar_surface, coarse_bar

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 from calmotion.mesh import tetrahedra as t
-from calmotion.mesh.grids.contacts import without_contacts
+from calmotion.mesh.tetrahedra import without_contacts
 
 
 def joined(helpers, *places):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from calmotion.mesh.grids.slit_closing import CLOSED, closed_slits
+from calmotion.mesh.grids import CLOSED, closed_slits
 from calmotion.mesh.surfaces.closed_surfaces import boundary_walks
 from calmotion.mesh.tetrahedra import surface_volume
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from calmotion.mesh.grids.winding import wound
+from calmotion.mesh.grids import wound
 from calmotion.mesh.surfaces.closed_surfaces import winding_number
 
 BALL = trimesh.creation.icosphere(subdivisions=2, radius=0.05)

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from calmotion.mesh.tetrahedralize import filling, tetwild
 from calmotion.model import FEMesh, MassProperties, TetGeometry
-from calmotion.model.materials.parts import Part
-from calmotion.model.materials.printed import core_of
-from calmotion.model.meshes import MeshQuality
+from calmotion.model.meshes import MeshQuality, Part, core_of
 from calmotion.tolerance.meshes import accurate_mesh, body_mesh
 from mesher_links import box, link, run, surface
 

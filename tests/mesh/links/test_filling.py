@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.errors import ShotError
-from calmotion.mesh.grids.contacts import without_contacts
 from calmotion.mesh.repair import closed_solid
 from calmotion.mesh.sources import choice
+from calmotion.mesh.tetrahedra import without_contacts
 from calmotion.mesh.tetrahedralize import filling as filling_module
 from calmotion.mesh.tetrahedralize import tetwild
 from mesher_links import box, link, run, surface

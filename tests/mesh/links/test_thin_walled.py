@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.model import Frame
-from calmotion.model.materials.printed import core_of
+from calmotion.model.meshes import core_of
 from calmotion.reduction.discretization_error import frequency_errors
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.tolerance.meshes import body_mesh

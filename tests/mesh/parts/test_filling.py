@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.model.character import ElasticMaterial
-from calmotion.model.materials.parts import Part
-from calmotion.model.materials.printed import Core, core_of
+from calmotion.model.meshes import Core, Part, core_of
 from calmotion.reduction.basis.natural_modes import clamped_modes
 from calmotion.reduction.damping import ratio_of_parts
 from calmotion.reduction.discretization_error import frequency_errors

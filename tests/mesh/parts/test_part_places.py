@@ -2,10 +2,9 @@
 
 import numpy as np
 import trimesh
-from calmotion.mesh.parts.part_places import holders, part_of_places
-from calmotion.mesh.parts.print_core import places_of
+from calmotion.mesh.parts import holders, part_of_places, places_of
 from calmotion.mesh.tetrahedra import tet_volumes
-from calmotion.model.materials.parts import Part
+from calmotion.model.meshes import Part
 
 
 def part(mesh, name):

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from calmotion.mesh.mass import mass_of_tets
-from calmotion.mesh.parts.makeup import makeup_of
-from calmotion.mesh.parts.print_core import skin_share
+from calmotion.mesh.parts import makeup_of, skin_share
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.model.character import ElasticMaterial
-from calmotion.model.materials.printed import Core
+from calmotion.model.meshes import Core
 
 SIZE = np.array([0.2, 0.02, 0.03])
 

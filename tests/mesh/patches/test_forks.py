@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.mesh.patches.cut_patches import with_rims
-from calmotion.mesh.patches.forks import bores, other_cheek
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
+from calmotion.mesh.patches.seats import bores, other_cheek
 from calmotion.mesh.tetrahedra import surface_area
 from calmotion.model import Frame
 from calmotion.testing import host_with

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from calmotion.mesh.patches.cut_patches import with_rims
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches
-from calmotion.mesh.patches.just_reached import just_reached
+from calmotion.mesh.patches.sphere_cut import just_reached
 from calmotion.mesh.quadratic import quadratic_mesh
 from calmotion.mesh.tetrahedra import surface_area
 from calmotion.model import Body, FlexibleSettings, Frame

@@ -1,7 +1,7 @@
 """The law of the infill of printed parts."""
 
 import pytest
-from calmotion.model.materials.printed import core_of
+from calmotion.model.meshes import core_of
 
 
 def test_the_core_is_as_stiff_as_triangulated_lattices_and_solid_at_the_end():

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.model.run import RunSettings
-from calmotion.multibody.analysis.motor_response import motor_responses
-from calmotion.multibody.analysis.rigid_response import RigidResponse
+from calmotion.multibody.analysis.rigid_response import RigidResponse, motor_responses
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.kernels.markers import WORLD_MARKER
 from calmotion.multibody.model.model import rigid_model

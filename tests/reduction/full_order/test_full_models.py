@@ -10,7 +10,7 @@ import pytest
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.tetrahedra import measure_quality
 from calmotion.model import Body, FEMesh, FlexibleSettings, MassProperties
-from calmotion.reduction.full_order.full_models import FullModels, Member
+from calmotion.reduction.full_models import FullModels, Member
 
 
 @pytest.fixture

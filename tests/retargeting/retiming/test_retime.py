@@ -9,8 +9,8 @@ import pytest
 from calmotion.errors import ShotError
 from calmotion.model.curves import commanded_curves, held_curve
 from calmotion.model.limits.use import LimitUse
-from calmotion.model.retiming.tempo import TempoSettings
 from calmotion.model.run import RunSettings
+from calmotion.model.tempo import TempoSettings
 from calmotion.retargeting.retiming.retime import optimize_with_tempo, told_between
 from calmotion.retargeting.retiming.rigid_robot import tempo_input
 from calmotion.retargeting.retiming.settings import pinned_times, refuse_tempo

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.model.retiming.tempo import TempoSettings
+from calmotion.model.tempo import TempoSettings
 from calmotion.retargeting.retiming.program import Path, TempoProgram
 from calmotion.retargeting.retiming.splines import StretchBasis
 from calmotion.retargeting.retiming.tempo import TempoInput, find_tempo

@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 from calmotion.model import Animation, FreeTrack, Track
 from calmotion.model.run import RunSettings
+from calmotion.retargeting.left_out import first_change
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem.offset_basis import basis_on
 from calmotion.retargeting.search import RetargetSearch
-from calmotion.retargeting.simplification.first_change import first_change
 from calmotion.simulation.compiled_shot import compile_shot
 from posed import ignore_progress, jerking, make_problem
 

@@ -8,8 +8,8 @@ from calmotion.model.model_choice import ON
 from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
 from calmotion.retargeting import to_tolerance
+from calmotion.retargeting.left_out import idle_motors
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.retargeting.simplification.idle_motors import idle_motors
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.body_reduction import load_envelopes

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.simulation.inputs.delays import CommandDelay
+from calmotion.simulation.inputs.curves import CommandDelay
 
 H = 0.01
 

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from calmotion.model import Animation, Track
 from calmotion.model.curves import held_curve
-from calmotion.simulation.inputs.excerpts import busiest, later
+from calmotion.simulation.inputs.time_grid import busiest, later
 
 
 def _animated(jerk_at):

@@ -11,8 +11,7 @@ from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem.posing import pose
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.inputs.gearing import coupling_of, leaders
+from calmotion.simulation.inputs.curves import coupling_of, leaders, sample_curves
 from calmotion.simulation.preparation import prepare
 from calmotion.simulation.simulate import intended_motion
 

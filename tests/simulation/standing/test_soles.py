@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from calmotion.model import Body, Frame, SurfaceMesh
-from calmotion.simulation.standing.soles import centres_of_pressure, margins, points_of, sole_of
+from calmotion.simulation.standing.held_feet import centres_of_pressure, margins, points_of, sole_of
 
 UP = np.array([0.0, 0.0, 1.0])
 CORNERS = np.array([[x, y, z] for z in (0.0, 0.3) for y in (-0.05, 0.05) for x in (-0.1, 0.1)])

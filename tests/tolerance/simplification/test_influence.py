@@ -9,7 +9,7 @@ from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.kinematics import rigid_poses, target_frames
 from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation import rigid_run
-from calmotion.simulation.inputs.gearing import leaders
+from calmotion.simulation.inputs.curves import leaders
 from calmotion.simulation.preparation import grid_of
 from calmotion.simulation.rigid_run import rigid_bodies
 from calmotion.tolerance.simplification.influence import influence

@@ -11,8 +11,7 @@ from calmotion.usd import gf
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import read_shot
 from calmotion.usd.transforms import rotation_from_quaternion
-from calmotion.usd.writing.bake import bake_bodies, bake_points
-from calmotion.usd.writing.motions import BakedMotion
+from calmotion.usd.writing.bake import BakedMotion, bake_bodies, bake_points
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 from small_shots import ELBOW, FORE, UPPER, Scale, box, write_arm
 

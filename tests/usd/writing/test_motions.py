@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from calmotion.model import Motion
-from calmotion.usd.writing.motions import simulated_motion
+from calmotion.usd.writing.bake import simulated_motion
 
 
 def motion(times: np.ndarray) -> Motion:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from calmotion.model.curves import held_curve
 from calmotion.usd.reading.shot import read_shot
-from calmotion.usd.writing.performances import write_performance
+from calmotion.usd.writing.root import write_performance
 from small_shots import HAND, Scale, make_target, write_arm
 
 

@@ -7,10 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 import small_shots as shots
-from calmotion.model.curves import held_curve
-from calmotion.model.retiming.performance import retimed
-from calmotion.model.retiming.retimed import Retimed
-from calmotion.model.retiming.tempo import TempoReport, TimeMap
+from calmotion.model.curves import held_curve, retimed
+from calmotion.model.result import Retimed
+from calmotion.model.tempo import TempoReport, TimeMap
 from calmotion.usd.reading import read_shot
 from calmotion.usd.writing import WriteOptions, write_result
 from performing import result_with

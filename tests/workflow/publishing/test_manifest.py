@@ -5,7 +5,7 @@ import json
 import calmotion as cm
 import pytest
 from calmotion.model.run import OutputPaths
-from calmotion.workflow.publishing.manifest import changed_files, read_manifest, sha256_of
+from calmotion.workflow.manifest import changed_files, read_manifest, sha256_of
 from one_hinge import ONE_HINGE
 
 

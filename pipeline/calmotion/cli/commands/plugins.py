@@ -159,7 +159,7 @@ def choose_plugin(args: argparse.Namespace, output: Output) -> int:
         SettingError: There is no plugin of this id, or the choice cannot be saved.
     """
     from calmotion.host import SettingError, nearest, open_host
-    from calmotion.host.choices import choose, disabled_plugins
+    from calmotion.host.settings import choose, disabled_plugins
 
     if args.id not in disabled_plugins():
         known = [plugin.id for plugin in open_host(args.plugins).plugins]

@@ -9,8 +9,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from calmotion.cli.quantities import angle, counted, frequency, length
-from calmotion.cli.reports.left_out import print_left_out
-from calmotion.cli.reports.limits import print_limits, print_tempo
+from calmotion.cli.reports.limits import print_left_out, print_limits, print_tempo
 from calmotion.cli.reports.run import print_notes
 from calmotion.cli.reports.verdict import NOTHING_SHAKES
 from calmotion.cli.tables import print_table, say

@@ -11,8 +11,7 @@ from rich.console import Console
 
 from calmotion.cli.quantities import about, angle, length
 from calmotion.cli.reports.feet import print_contacts, print_support
-from calmotion.cli.reports.left_out import print_left_out
-from calmotion.cli.reports.limits import print_limits, print_retiming
+from calmotion.cli.reports.limits import print_left_out, print_limits, print_retiming
 from calmotion.cli.reports.verdict import (
     is_optimized,
     is_still,

@@ -10,7 +10,7 @@ from rich.console import Console
 from calmotion.cli.quantities import about, counted, length
 from calmotion.cli.reports.limits import print_reason
 from calmotion.cli.tables import say
-from calmotion.model.budget import CHOICES, MEASURED, MESH, REDUCTION, STEP, SUBSPACE
+from calmotion.model.tolerance import CHOICES, MEASURED, MESH, REDUCTION, STEP, SUBSPACE
 from calmotion.support.naming import distinct_names
 
 # What helps where an entry of the error budget is too large.

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from calmotion.arrays import Array, Indices, IntArray
-from calmotion.mesh.patches.just_reached import just_reached
+from calmotion.mesh.patches.sphere_cut import just_reached
 from calmotion.mesh.quadratic import QuadraticMesh
 from calmotion.mesh.surfaces.distances import closest_on_triangles, meets_plane, ray_length, triangle_parts
 from calmotion.mesh.tetrahedra import part_of_each

@@ -12,8 +12,7 @@ from calmotion.errors import ShotError
 from calmotion.mesh.bisection import bisected
 from calmotion.mesh.patches.automatic_patch import Skin
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, InterfacePatch, interface_patches
-from calmotion.mesh.patches.just_reached import just_reached
-from calmotion.mesh.patches.sphere_cut import cut, inside
+from calmotion.mesh.patches.sphere_cut import cut, inside, just_reached
 from calmotion.mesh.quadratic import quadratic_mesh
 from calmotion.mesh.surfaces.distances import triangle_parts
 from calmotion.mesh.tetrahedra import boundary_triangles, corner_keys, surface_area

@@ -19,10 +19,9 @@ from calmotion.mesh.patches.automatic_patch import (
     radius_alike,
 )
 from calmotion.mesh.patches.contact_place import contact_place
-from calmotion.mesh.patches.forks import other_cheek
 from calmotion.mesh.patches.joint_places import TIE, Ball, balls_between, cut_at, nearest_apart, reached_by, within
 from calmotion.mesh.patches.named_patch import named_patch
-from calmotion.mesh.patches.seats import seat_radius
+from calmotion.mesh.patches.seats import other_cheek, seat_radius
 from calmotion.mesh.quadratic import QuadraticMesh
 from calmotion.mesh.surfaces.distances import closest_on_triangles
 from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles

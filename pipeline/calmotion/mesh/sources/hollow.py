@@ -8,8 +8,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.mesh.grids.level_sets import grid_about, zero_surface
-from calmotion.mesh.grids.winding import wound
+from calmotion.mesh.grids import grid_about, wound, zero_surface
 from calmotion.mesh.repair.closed_solid import Solid
 from calmotion.mesh.repair.closing import Part, connected_pieces
 from calmotion.mesh.repair.uniting import NotManifold, manifold_of, part_of, without_detail

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.mesh.grids.slit_closing import CLOSED, closed_slits
+from calmotion.mesh.grids import CLOSED, closed_slits
 from calmotion.mesh.repair.closing import Part, concatenated, connected_pieces
 from calmotion.mesh.repair.uniting import NotManifold, manifold_of, part_of, without_detail
 from calmotion.mesh.sources.bridges import NARROW

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calmotion.arrays import Array, Indices
+from calmotion.mesh.surfaces.distances import solid_angles
 from calmotion.mesh.surfaces.orientation import directed_edges
-from calmotion.mesh.surfaces.solid_angles import solid_angles
 from calmotion.mesh.tetrahedra import surface_area
 
 # Number of triangles, and of places, below which each is counted; distance from which a group counts as a dipole, of

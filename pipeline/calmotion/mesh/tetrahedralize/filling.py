@@ -9,7 +9,6 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.mesh.element_sizes import Shape, envelope, expected_nodes, smallest_size
-from calmotion.mesh.grids.contacts import without_contacts
 from calmotion.mesh.repair.closed_solid import Solid, simplified
 from calmotion.mesh.surfaces.closed_surfaces import enclosed_volume
 from calmotion.mesh.surfaces.decimation import decimated
@@ -19,6 +18,7 @@ from calmotion.mesh.tetrahedra import (
     measure_quality,
     oriented_tets,
     tet_volumes,
+    without_contacts,
     without_unused_points,
 )
 from calmotion.mesh.tetrahedralize.tetwild import DENSE, MORE_TIME, REMEDY, OutOfTime, ProcessorTime, tetrahedralize

@@ -24,7 +24,7 @@ from calmotion.reduction.basis.residual_flexibility import (
 )
 from calmotion.reduction.basis.static_loads import ACCELERATIONS, peak_loads, unit_accelerations
 from calmotion.reduction.elements.assembly import FEModel
-from calmotion.reduction.elements.rigid_patch import rigid_patch
+from calmotion.reduction.elements.patch_rotation import rigid_patch
 from calmotion.reduction.load_envelope import LoadEnvelope, load_direction_envelope
 
 __all__ = ["Basis", "mode_signs", "reduced_basis", "rigid_patch"]

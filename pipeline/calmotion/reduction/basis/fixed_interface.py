@@ -16,7 +16,7 @@ from calmotion.reduction.basis.natural_modes import lowest_modes, vector_mass
 from calmotion.reduction.basis.residual_flexibility import residual_vectors
 from calmotion.reduction.basis.static_loads import ACCELERATIONS, UNIFORM, unit_accelerations
 from calmotion.reduction.elements.assembly import FEModel
-from calmotion.reduction.elements.rigid_patch import rigid_patch
+from calmotion.reduction.elements.patch_rotation import rigid_patch
 
 _DEPENDENT = 1e-12  # mass of a combination of columns of unit mass below which they are linearly dependent
 _FEWEST = 4  # least number of fixed-interface modes: two bending pairs, or bending and twist of a plate

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.arrays import Array, IntArray
-from calmotion.mesh.parts.filling import Filling, element_masses, filling_of
-from calmotion.mesh.parts.makeup import makeup_of
+from calmotion.mesh.parts import Filling, element_masses, filling_of, makeup_of
 from calmotion.mesh.quadratic import QuadraticMesh, quadratic_mesh
 from calmotion.mesh.tetrahedra import tet_volumes, without_unused_points
 from calmotion.model.character import ElasticMaterial

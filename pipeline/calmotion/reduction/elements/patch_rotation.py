@@ -16,7 +16,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from calmotion.arrays import Array, IntArray
-from calmotion.reduction.elements.rigid_patch import rigid_patch
 
 # Stiffness of the springs over Young's modulus times the cube of the patch's radius, of plane patches and of others, in
 # reductions to a millimetre. With the first the bending compliance of a link with an end face is 2e-5 too large; deep
@@ -158,3 +157,12 @@ def spring_rows(roots: Array, second_order: Array, rotation: Array, directions: 
     pairs[:, first == second] *= 0.5  # u_k u_l stands for both orders, u_k^2 for one
     entries = np.concatenate([strain, pairs], axis=1)[:, :, _ROWS, _COLUMNS]
     return np.asarray((roots @ np.swapaxes(entries, 1, 2)).reshape(6 * p, entries.shape[1]))
+
+
+def rigid_patch(nodes: Array, center: Array) -> Array:
+    """Displacement of nodes for a unit translation and a unit small rotation about `center`, shape [k, 3, 6]."""
+    motion = np.zeros((len(nodes), 3, 6))
+    motion[:, :, :3] = np.eye(3)
+    for axis in range(3):
+        motion[:, :, 3 + axis] = np.cross(np.eye(3)[axis], nodes - center)
+    return motion

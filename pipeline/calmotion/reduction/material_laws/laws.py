@@ -6,9 +6,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from calmotion.model.budget import REDUCTION
 from calmotion.model.character import FlexibleSettings
 from calmotion.model.result import Simplification
+from calmotion.model.tolerance import REDUCTION
 from calmotion.reduction.basis.craig_bampton import Basis
 from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.elements.assembly import FEModel

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray, Indices
-from calmotion.mesh.grids.winding import projected_area, ray_crossing
-from calmotion.mesh.parts.part_places import holders
+from calmotion.mesh.grids import projected_area, ray_crossing
+from calmotion.mesh.parts import holders
 from calmotion.model.character import FlexibleSettings
 from calmotion.support.compilation import kernel
 

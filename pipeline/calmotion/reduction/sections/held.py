@@ -9,9 +9,9 @@ import numpy as np
 from calmotion.arrays import Array, BoolArray, Indices
 from calmotion.mesh.patches.automatic_patch import least_radius
 from calmotion.mesh.patches.contact_place import contact_place
-from calmotion.mesh.patches.forks import other_cheek
 from calmotion.mesh.patches.interface_patches import LEAST, AttachmentFrame, Place, carries
-from calmotion.mesh.patches.just_reached import just_reached
+from calmotion.mesh.patches.seats import other_cheek
+from calmotion.mesh.patches.sphere_cut import just_reached
 from calmotion.mesh.surfaces.distances import closest_on_triangles
 from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles
 from calmotion.reduction.sections.cells import Cells

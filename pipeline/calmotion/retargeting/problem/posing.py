@@ -21,8 +21,7 @@ from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on, uniform_breaks
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.simulation.inputs.curves import Curves, sample_tracks
-from calmotion.simulation.inputs.gearing import coupling_of, leaders
+from calmotion.simulation.inputs.curves import Curves, coupling_of, leaders, sample_tracks
 from calmotion.simulation.inputs.tempo import TEMPO_LIMITS
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.preparation import Prepared

@@ -17,12 +17,11 @@ from scipy.interpolate import CubicSpline
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Result, Track
-from calmotion.model.curves import Sample, commanded_curves
+from calmotion.model.curves import Sample, commanded_curves, retimed, with_contacts_at
 from calmotion.model.limits.use import LimitUse
-from calmotion.model.retiming.performance import retimed, with_contacts_at
-from calmotion.model.retiming.retimed import Retimed
-from calmotion.model.retiming.tempo import TimeMap
+from calmotion.model.result import Retimed
 from calmotion.model.run import RunSettings
+from calmotion.model.tempo import TimeMap
 from calmotion.retargeting.input_run import with_input_resolved
 from calmotion.retargeting.retiming.program import NOTICED
 from calmotion.retargeting.retiming.rigid_robot import tempo_input

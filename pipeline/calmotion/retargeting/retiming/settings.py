@@ -6,7 +6,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.model import Animation, Character
-from calmotion.model.retiming.tempo import TempoSettings
+from calmotion.model.tempo import TempoSettings
 
 
 def pinned_times(text: str, start: float, per_second: float) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ from scipy.interpolate import BSpline
 from scipy.sparse import csr_matrix, diags, eye_array
 
 from calmotion.arrays import Array
-from calmotion.model.retiming.tempo import TimeMap
+from calmotion.model.tempo import TimeMap
 
 DEGREE = 2
 INSTANTS = np.linspace(1e-6, 1.0 - 1e-6, 5)  # of an interval, where limits are kept: jerks jump at knots

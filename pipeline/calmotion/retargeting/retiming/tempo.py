@@ -11,7 +11,7 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model.curves import Sample
 from calmotion.model.outputs import Tempo
-from calmotion.model.retiming.tempo import Stretch, TempoReport, TempoSettings, TimeMap
+from calmotion.model.tempo import Stretch, TempoReport, TempoSettings, TimeMap
 from calmotion.retargeting.retiming.program import NOTICED, WITHIN, Duration, Path, TempoProgram
 from calmotion.retargeting.retiming.splines import StretchBasis
 from calmotion.simulation.inputs.tempo import MotorEfforts, TempoLimits, needed_tempo

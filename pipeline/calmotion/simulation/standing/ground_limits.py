@@ -25,7 +25,7 @@ from calmotion.multibody.model.phases import RESTARTED, held_contacts
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.simulator import Simulator
-from calmotion.simulation.standing.soles import outline, points_of, sole_of, vertical, weight_of
+from calmotion.simulation.standing.held_feet import outline, points_of, sole_of, vertical, weight_of
 
 SLOW = 5e-3  # speed of a foot that lands softly enough for all [m/s]
 SIDES = 8  # of the pyramid inside of a cone of friction

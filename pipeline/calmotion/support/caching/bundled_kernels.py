@@ -1,15 +1,12 @@
-"""Compiled kernels that a platform wheel brings, so that an installation compiles nothing.
-
-`make wheel` compiles them for a baseline processor, and a kernel that is in no cache of the user is looked up here. It
-is taken where the processor has all features for which it was compiled, and numba is the version that compiled it;
-otherwise it is compiled, as with any other wheel. The folder is part of the installation and as trustworthy as its
-source; files are verified against damage all the same.
-"""
+"""Compiled kernels that a platform wheel brings, and hashes of the sources that they must not outlive."""
 
 from __future__ import annotations
 
+import hashlib
 import pickle
-from functools import cached_property
+import re
+from collections.abc import Iterable
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +15,55 @@ import numba
 from calmotion.support.caching.verified_files import DamagedFileError, read_verified, sealed
 
 PACKAGE = Path(__file__).parents[2]
+_IMPORT = re.compile(
+    rb"^[ \t]*(?:from (calmotion[\w.]*) import (\([^)]*\)|[^\n]*)|import (calmotion[\w.]*))", re.MULTILINE
+)
+_NAME = re.compile(rb"\w+")
+
+
+@cache
+def source_digest(*rooms: str) -> str:
+    """Hash of all modules in some folders of the package, such as `multibody`; cached in the process."""
+    paths = [path for room in rooms for path in sorted((PACKAGE / room).rglob("*.py"))]
+    return digest_of(paths)
+
+
+def digest_of(paths: Iterable[Path]) -> str:
+    """Hash of the names and contents of some files, in their order."""
+    digest = hashlib.sha256()
+    for path in paths:
+        content = path.read_bytes()
+        digest.update(f"{path.name} {len(content)}\n".encode())
+        digest.update(content)
+    return digest.hexdigest()
+
+
+def with_imports(paths: Iterable[Path], root: Path = PACKAGE.parent) -> list[Path]:
+    """Some modules and all modules of the package that they import, directly or not, sorted.
+
+    Args:
+        paths: Files below `root`.
+        root: The folder that holds the package.
+    """
+    found: set[Path] = set()
+    queue = list(paths)
+    while queue:
+        path = queue.pop()
+        if path in found:
+            continue
+        found.add(path)
+        for source, names, plain in _IMPORT.findall(path.read_bytes()):
+            module = (source or plain).decode()
+            candidates = [module, *(f"{module}.{name.decode()}" for name in _NAME.findall(names))]
+            queue += [file for name in candidates for file in _files_of(root, name)]
+    return sorted(found)
+
+
+def _files_of(root: Path, module: str) -> list[Path]:
+    place = root.joinpath(*module.split("."))
+    return [file for file in (place.with_suffix(".py"), place / "__init__.py") if file.is_file()]
+
+
 FOLDER = PACKAGE / "bundled" / "kernels"
 
 

@@ -15,11 +15,10 @@ from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.mesh.tetrahedralize.filling import INTERSECTS, MAX_VOLUME_ERROR, filled
 from calmotion.mesh.tetrahedralize.tetwild import ProcessorTime
 from calmotion.model import Body, Character, FEMesh, Frame
-from calmotion.model.materials.parts import Part
-from calmotion.model.meshes import MeshQuality
+from calmotion.model.meshes import MeshQuality, Part
 
 if TYPE_CHECKING:
-    from calmotion.mesh.parts.makeup import Makeup
+    from calmotion.mesh.parts import Makeup
     from calmotion.mesh.patches.interface_patches import AttachmentFrame
     from calmotion.tolerance.meshes.options import MeshOptions, Volume
 
@@ -100,7 +99,7 @@ def mass_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
 
 def makeup_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
     """Message about what a body of several materials is taken for, and about a stated mass that is not that of it."""
-    from calmotion.mesh.parts.makeup import makeup_of
+    from calmotion.mesh.parts import makeup_of
 
     makeup = None if body.flexible is None else makeup_of(mesh.points, mesh.tets, body.flexible.material)
     if body.flexible is None or makeup is None:

@@ -11,7 +11,6 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.mesh.element_sizes import MAX_NODES, element_size, shape_of
-from calmotion.mesh.grids.contacts import without_contacts
 from calmotion.mesh.mass import mass_of_solid
 from calmotion.mesh.mesh_file import read_mesh_file
 from calmotion.mesh.sources.beam import equivalent_beam
@@ -25,6 +24,7 @@ from calmotion.mesh.tetrahedra import (
     oriented_tets,
     refuse_bad_neighbours,
     welded_tets,
+    without_contacts,
     without_unused_points,
 )
 from calmotion.mesh.tetrahedralize.filling import filled, refuse_loose_parts, refuse_too_many

@@ -17,8 +17,8 @@ from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.model.limits.use import is_exceeded
 from calmotion.model.outputs import ExceededLimits
 from calmotion.model.run import RunSettings
-from calmotion.multibody.analysis.motor_response import motor_responses
 from calmotion.multibody.analysis.reactions import reactions
+from calmotion.multibody.analysis.rigid_response import motor_responses
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, body_anchors, rigid_body

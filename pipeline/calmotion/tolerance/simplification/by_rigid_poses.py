@@ -16,7 +16,7 @@ from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.kinematics import target_frames
 from calmotion.multibody.model.model import body_anchors, rigid_body
 from calmotion.multibody.model.topology import Tree, chain_members
-from calmotion.simulation.inputs.gearing import leaders
+from calmotion.simulation.inputs.curves import leaders
 from calmotion.simulation.preparation import grid_of
 from calmotion.simulation.rigid_run import RigidPoses, rigid_poses
 from calmotion.tolerance.simplification.influence import NOTHING, influence

@@ -7,7 +7,7 @@ import numpy as np
 from calmotion.arrays import Array, IntArray
 from calmotion.model import Character
 from calmotion.multibody.analysis.rigid_response import RigidResponse
-from calmotion.simulation.inputs.gearing import coupling_of
+from calmotion.simulation.inputs.curves import coupling_of
 from calmotion.simulation.rigid_run import RigidPoses
 
 INSTANTS = 24  # at which the robot is looked at: a motor has no say at all of them only where it never has

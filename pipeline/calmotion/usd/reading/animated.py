@@ -9,7 +9,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model.retiming.tempo import TimeMap
+from calmotion.model.tempo import TimeMap
 from calmotion.usd.clock import Clock
 from calmotion.usd.gf import matrix
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of

@@ -11,7 +11,7 @@ import numpy as np
 
 from calmotion.errors import raise_all
 from calmotion.model import Animation, Character, MotorTracks, MovingFrame, Provenance, Track
-from calmotion.model.retiming.performance import retimed, with_contacts_at
+from calmotion.model.curves import retimed, with_contacts_at
 from calmotion.support.naming import as_written, grouped_notes
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock, clock_of, still_clock

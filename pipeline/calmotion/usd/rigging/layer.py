@@ -1,4 +1,4 @@
-"""The robot of a skeleton: bodies, joints, motors and targets, authored with UsdPhysics."""
+"""Materials of robots, authored with the schemas that the reader takes them from."""
 
 from __future__ import annotations
 
@@ -15,15 +15,38 @@ from calmotion.rigging.links import Link, tip_of
 from calmotion.usd import gf
 from calmotion.usd.reading.bodies.moments import surface_moments
 from calmotion.usd.reading.skeletons import BoundSkeleton
-from calmotion.usd.rigging.materials import author_material
 from calmotion.usd.stages import RIG
 from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
-from calmotion.usd.units import units_of
+from calmotion.usd.units import StageUnits, units_of
 from calmotion.usd.writing.metadata import author_origin, author_stage_metadata
 from calmotion.usd.writing.root import relative_asset
 
 if TYPE_CHECKING:
-    from pxr import Usd, UsdPhysics
+    from pxr import Usd, UsdPhysics, UsdShade
+
+
+def author_material(stage: Usd.Stage, path: str, material: Material, units: StageUnits) -> UsdShade.Material:
+    """Define an elastic material.
+
+    Args:
+        stage: Where it is authored.
+        material: The material, SI.
+    """
+    from pxr import Sdf, UsdPhysics, UsdShade
+
+    shader = UsdShade.Material.Define(stage, path)
+    prim = shader.GetPrim()
+    UsdPhysics.MaterialAPI.Apply(prim).CreateDensityAttr(material.density / units.density(1.0))
+    prim.AddAppliedSchema("PhysicsVolumeDeformableMaterialAPI")
+    prim.AddAppliedSchema("CalmDampingAPI")
+    for name, value in (
+        ("physics:youngsModulus", material.youngs_modulus / units.pressure(1.0)),
+        ("physics:poissonsRatio", material.poissons_ratio),
+        ("calm:damping:ratio", material.damping_ratio),
+    ):
+        prim.CreateAttribute(name, Sdf.ValueTypeNames.Float, custom=False).Set(value)
+    return shader
+
 
 _STILL = 1e-6  # a root whose matrix changes by less, relative to its size, does not move
 _SERVO = 0.1  # radius of gyration of a servo, over the size of the link that it turns

@@ -1,21 +1,61 @@
-"""Baking a motion: body transforms, and the points of deformed meshes, as time samples that any viewer shows."""
+"""The motion that is baked: the predicted one at the frames, or that of a rigid robot with the written curves."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.model import Character, Skin
+from calmotion.model import Character, Motion, Skin
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
 from calmotion.usd.transforms import Pose, pose_from_matrix, rotation_from_quaternion
 from calmotion.usd.writing.curves import attribute_spec
-from calmotion.usd.writing.motions import BakedMotion
 
 if TYPE_CHECKING:
     from pxr import Sdf, Usd
+
+
+@dataclass(frozen=True, eq=False)
+class BakedMotion:
+    """Poses at the frames that were reached.
+
+    Attributes:
+        times: [s], shape [f].
+        positions: [m], shape [f, B, 3].
+        rotations: Unit quaternions, shape [f, B, 4].
+        elastic: Elastic coordinates of each body, shape [f, r_b]; None for a rigid motion.
+    """
+
+    times: Array
+    positions: Array
+    rotations: Array
+    elastic: tuple[Array, ...] | None
+
+
+def simulated_motion(motion: Motion, times: Array) -> BakedMotion:
+    """Pick steps of a simulation, such as its frames; a run that was interrupted gives those that it reached.
+
+    Args:
+        times: Of the steps to pick [s], shape [f].
+
+    Raises:
+        ValueError: A time is no step, which the time grid rules out for frames.
+    """
+    reached = times[times <= motion.times[-1] + 1e-9]
+    step = float(motion.times[1] - motion.times[0])
+    indices = np.round((reached - motion.times[0]) / step).astype(int)
+    if len(reached) == 0 or np.max(np.abs(motion.times[indices] - reached)) > 1e-3 * step:
+        raise ValueError("the frames of the shot are not steps of the simulation")
+    return BakedMotion(
+        reached,
+        motion.positions[indices],
+        motion.rotations[indices],
+        tuple(u[indices] for u in motion.elastic),
+    )
+
 
 _EQUAL = 1e-6  # of matrices, over the size of their entries: what single precision leaves
 _OP = "xformOp:transform:calmotion"  # a name of our own: never the type of an op that the shot has

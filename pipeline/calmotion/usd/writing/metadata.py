@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.model import Character, Provenance, Result
-from calmotion.model.budget import verdict_on
+from calmotion.model.tolerance import verdict_on
 from calmotion.usd import gf
 from calmotion.usd.stages import METADATA_KEY
 from calmotion.version import __version__

@@ -13,7 +13,7 @@ from calmotion.usd import stages
 from calmotion.usd.clock import Clock
 from calmotion.usd.layers import refuse_input_as_output, write_layer
 from calmotion.usd.reading.motors.tracks import MOST as MAX_SAMPLES
-from calmotion.usd.writing import bake, metadata, motions
+from calmotion.usd.writing import bake, metadata
 from calmotion.usd.writing.curves import author_curves, ensure_drives, sample_times, with_authored
 from calmotion.usd.writing.root import keeps_earlier_curves, root_path, write_root
 from calmotion.usd.writing.scene import author_map, author_scene
@@ -247,7 +247,7 @@ def _tracks(shot: _Shot, source: str) -> list[Track]:
     return [t for motor, t in zip(shot.character.motors, shot.animation.tracks, strict=True) if motor.source == source]
 
 
-def _performed(shot: _Shot, result: Result) -> motions.BakedMotion:
+def _performed(shot: _Shot, result: Result) -> bake.BakedMotion:
     """The rigid robot at the frames; at all steps where its bodies are animated between frames, by splines or by denser
     samples: read back at the frames alone, it would move otherwise than it was simulated."""
     if result.performed is None:
@@ -260,7 +260,7 @@ def _performed(shot: _Shot, result: Result) -> motions.BakedMotion:
     times = shot.animation.frame_times
     if len(with_authored(times, _tracks(shot, "bodies"))) > len(times):
         times = result.performed.times[result.performed.judged]
-    return motions.simulated_motion(result.performed, times)
+    return bake.simulated_motion(result.performed, times)
 
 
 def _bake(layer: Sdf.Layer, shot: _Shot, result: Result, options: WriteOptions) -> dict[str, int]:
@@ -275,7 +275,7 @@ def _bake(layer: Sdf.Layer, shot: _Shot, result: Result, options: WriteOptions) 
     if options.bake == "motors":
         motion = _performed(shot, result)
     else:
-        motion = motions.simulated_motion((result.after or result.before).motion, shot.animation.frame_times)
+        motion = bake.simulated_motion((result.after or result.before).motion, shot.animation.frame_times)
     written = bake.bake_bodies(layer, shot.stage, shot.character, motion, shot.clock, shot.meters)
     if options.bake == "simulated":
         points = bake.bake_points(layer, shot.stage, shot.character, result.skins, motion, shot.clock, shot.meters)

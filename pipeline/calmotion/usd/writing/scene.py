@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.model.retiming.tempo import TimeMap
+from calmotion.model.tempo import TimeMap
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated import MAP
 from calmotion.usd.reading.context import prims_of

@@ -8,7 +8,7 @@ import pytest
 from calmotion.cli.main import build_parser
 from calmotion.errors import ShotError
 from calmotion.support.files import write_text
-from calmotion.workflow.publishing.manifest import FORMAT, sha256_of
+from calmotion.workflow.manifest import FORMAT, sha256_of
 from calmotion_plugins.shows.batch.jobs import Job, forget, is_done, jobs_for, mark_done
 
 

@@ -12,8 +12,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.mesh.tetrahedra import surface_volume
 from calmotion.model import ElasticMaterial, FlexibleSettings
-from calmotion.model.materials.parts import Part
-from calmotion.model.materials.printed import LINE_WIDTH, PERIMETERS, Core, core_of
+from calmotion.model.meshes import LINE_WIDTH, PERIMETERS, Core, Part, core_of
 from calmotion.usd import schemas
 from calmotion.usd.dependencies import refuse_place
 from calmotion.usd.dialects import number_of, number_or

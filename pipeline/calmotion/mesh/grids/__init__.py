@@ -1,1 +1,0 @@
-"""What a grid or its points tell of a solid and of the tetrahedra that fill it."""

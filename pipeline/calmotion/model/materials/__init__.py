@@ -1,1 +1,0 @@
-"""What flexible bodies are made of."""

@@ -1,1 +1,0 @@
-"""The tempo of a performance, and an animation at a tempo."""

@@ -1,0 +1,165 @@
+"""What a search leaves out: motors that do nothing, offsets that change nothing, and how a report tells it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from calmotion.arrays import Array, BoolArray, IntArray
+from calmotion.model import Character, MotorCurve, Simplification
+from calmotion.model.run import RunSettings
+from calmotion.model.tolerance import tolerance_of
+from calmotion.retargeting.problem.adaptive_knots import halved
+from calmotion.retargeting.problem.linear_problem import LinearProblem
+from calmotion.retargeting.problem.offset_basis import OffsetBasis
+from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
+from calmotion.simulation.inputs.curves import coupling_of
+from calmotion.simulation.inputs.time_grid import TimeGrid
+
+FixedOn = Callable[[OffsetBasis], BoolArray]
+
+
+def first_change(grid: TimeGrid, basis: OffsetBasis, fixed_on: FixedOn) -> int:
+    """Index of an instant before which only fixed coefficients act, on these knots and on the next finer ones.
+
+    Args:
+        fixed_on: Maps a basis to its fixed coefficients, shape [n], bool.
+    """
+
+    def start_on(on: OffsetBasis) -> float:
+        free = ~np.all(fixed_on(on).reshape(on.count, -1), axis=1)
+        return float(np.min(on.support[free, 0], initial=grid.end))
+
+    start = 0.0 if grid.cyclic else start_on(basis)
+    if start > 0.0:
+        start = min(start, start_on(basis.on(grid, halved(grid, basis.breaks))))
+    if not start > 0.0:
+        return 0
+    return min(int(np.searchsorted(grid.times, start - 0.5 * grid.h)), len(grid.times) - 2)
+
+
+CG_STEPS = 2  # of conjugate gradients
+JOINING_GAIN = 0.05  # share of the tolerance: idle motors with a larger gain join the search
+
+
+def idle_motors(character: Character) -> IntArray:
+    """Indices of the motors that may change but are idle."""
+    return np.flatnonzero([m.optimize and m.idle and m.follows is None for m in character.motors]).astype(np.int32)
+
+
+def idle_gain(at: Evaluation, linear: LinearProblem, character: Character) -> float | None:
+    """Decrease of the root-mean-square error that the idle motors would bring [m]; None where there are none.
+
+    Args:
+        at, linear: Where the search ended, and the problem linearised there.
+    """
+    motors = idle_motors(character)
+    if not len(motors):
+        return None
+    over = at.problem.over_motors(motors, coupling_of(character, motors))
+    other = linear.over(over.space, np.zeros(over.size), over.rigid)
+    residual = -other.gradient
+    direction, square = residual, float(residual @ residual)
+    decrease = 0.0
+    for _ in range(CG_STEPS):
+        product = other.product(direction)
+        curvature = float(direction @ product)
+        if not (square > 0.0 and curvature > 0.0):
+            break
+        length = square / curvature
+        decrease += 0.5 * length * square
+        residual = residual - length * product
+        before, square = square, float(residual @ residual)
+        direction = residual + (square / before) * direction
+    return at.gain(decrease, at.objective_value)
+
+
+BLOCK = 8  # neighbouring coefficients of a motor that vanish together; four already make a curve vanish
+
+
+def negligible_coefficients(x: Array, motors: int, energy: Array, budget: float) -> BoolArray:
+    """Which coefficients can be fixed at zero within a budget.
+
+    Args:
+        x: Coefficients, ordered by basis function, then motor, shape [P * m].
+        motors: m.
+        energy: x_b^T H_b x_b / 2 of each block, shape [blocks, m]: increase of the objective if the block is zero.
+        budget: Largest increase of the objective, of all blocks together.
+
+    Returns:
+        Shape [P * m].
+    """
+    count = len(x) // motors
+    order = np.argsort(energy, axis=None)
+    affordable = np.cumsum(energy.ravel()[order]) <= budget
+    chosen = np.zeros(energy.size, bool)
+    chosen[order[affordable]] = True
+    by_function = np.repeat(chosen.reshape(energy.shape), BLOCK, axis=0)[:count]
+    return by_function.ravel()
+
+
+def block_energies(x: Array, motors: int, product: Array) -> Array:
+    """|x_b^T (M x)_b| / 2 of each block, shape [blocks, m]: their energies if M couples blocks weakly.
+
+    Args:
+        x: Coefficients, ordered by basis function, then motor, shape [P * m].
+        motors: m.
+        product: M x.
+    """
+    count = len(x) // motors
+    blocks = -(-count // BLOCK)
+    padded = np.zeros((blocks * BLOCK, motors))
+    padded[:count] = np.abs(x * product).reshape(count, motors)
+    energies: Array = 0.5 * padded.reshape(blocks, BLOCK, motors).sum(axis=1)
+    return energies
+
+
+FINER = 0.1  # share of the least gain of a search that finer knots must gain
+PRUNED = 0.2  # share of it that the removed offsets may cost together
+
+
+def search_rows(
+    problem: RetargetProblem, character: Character, curves: Sequence[MotorCurve], options: RunSettings,
+    idle_gain_m: float | None,
+) -> list[Simplification]:  # fmt: skip
+    """The rows of a search that ended.
+
+    Args:
+        problem: On the final knots.
+        idle_gain_m: Gain that idle motors would bring [m]; None where there are none.
+    """
+    tolerance = tolerance_of(character, options.tolerance)
+    pruned = PRUNED * options.least_gain
+    idle = idle_motors(character)
+    rows = [_knots_row(problem, character, options)]
+    rows += [
+        Simplification(
+            character.motors[k].path + ": not optimised", "it moves no target; the error is its possible gain", gain
+        )
+        for k, gain in zip(idle, [idle_gain_m, *[None] * len(idle)], strict=False)
+    ]
+    rows += [
+        Simplification(
+            character.motors[curve.motor].path + ": curve unchanged",
+            f"a change would gain less than {100.0 * pruned:.3g}% of the tolerance",
+            pruned * tolerance,
+        )
+        for curve in curves
+        if not curve.changed and curve.motor in problem.space.motors
+    ]
+    return rows
+
+
+def _knots_row(problem: RetargetProblem, character: Character, options: RunSettings) -> Simplification:
+    """The closest distance of knots, and its reason."""
+    closest = float(np.diff(problem.space.basis.knots).min())
+    what = f"knots at least {1e3 * closest:.3g} ms apart"
+    if options.knot_spacing:
+        return Simplification(what, "given by retarget.optimize.knot_spacing")
+    if character.retarget.knot_spacing:
+        return Simplification(what, "given by calm:retarget:knotSpacing")
+    tolerance = tolerance_of(character, options.tolerance)
+    finer = FINER * options.least_gain
+    why = f"finer knots would gain less than {100.0 * finer:.3g}% of the tolerance"
+    return Simplification(what, why, finer * tolerance)

@@ -1,1 +1,0 @@
-"""Offsets and motors that the optimiser leaves unchanged."""

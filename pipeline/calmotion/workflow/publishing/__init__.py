@@ -1,1 +1,0 @@
-"""Manifests of results, and what must hold before a result is published."""
