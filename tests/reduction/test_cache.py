@@ -167,7 +167,7 @@ for turn in range(40):
     assert all((value[k] == 10.0 * key + k).all() for k in range(3)), key
     if turn % 7 == int(sys.argv[1]):
         # somebody is stopped in the middle of a write, by a way that leaves half a file
-        from calmotion.support.caching.caches import REDUCTIONS, cache_folder
+        from calmotion.support.caching.cache_folder import REDUCTIONS, cache_folder
         from calmotion.reduction.cache import cache_key
         path = cache_folder() / REDUCTIONS / (cache_key(("shared", key)) + ".npz")
         with contextlib.suppress(FileNotFoundError):  # another process has removed half a file

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from calmotion.errors import ShotError, raise_all
-from calmotion.support.caching.caches import configuration_folder
+from calmotion.support.caching.cache_folder import configuration_folder
 from calmotion.support.foreign_files import read_toml
 from calmotion.support.naming import nearest
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from calmotion.host.errors import SettingError
-from calmotion.support.caching.caches import CONFIGURATION_VARIABLE, configuration_folder
+from calmotion.support.caching.cache_folder import CONFIGURATION_VARIABLE, configuration_folder
 from calmotion.support.files import write_text
 from calmotion.support.foreign_files import read_toml, remedy_for
 from calmotion.support.operating_system import locked

@@ -21,7 +21,8 @@ from calmotion.model.meshes import CutPatch, FEMesh, MeshQuality
 from calmotion.model.result import Simplification
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
 from calmotion.support.caching.bundled_kernels import source_digest
-from calmotion.support.caching.caches import REDUCTIONS, key_of, store_arrays, stored_arrays
+from calmotion.support.caching.cache_folder import REDUCTIONS
+from calmotion.support.caching.caches import key_of, store_arrays, stored_arrays
 
 T = TypeVar("T")
 

@@ -1,6 +1,6 @@
 """Public names of `calmotion.support`: each is imported when it is first used."""
 
-from calmotion.support.caching.caches import cache_folder as cache_folder
+from calmotion.support.caching.cache_folder import cache_folder as cache_folder
 from calmotion.support.compilation import compiling as compiling
 from calmotion.support.compilation import kernel_folder as kernel_folder
 from calmotion.support.files import is_own as is_own

@@ -30,7 +30,8 @@ from numba.core import event
 
 from calmotion.errors import ShotError
 from calmotion.support.caching.bundled_kernels import digest_of, with_imports
-from calmotion.support.caching.caches import KERNELS, cache_folder, mark_used, prune
+from calmotion.support.caching.cache_folder import KERNELS, cache_folder
+from calmotion.support.caching.caches import mark_used, prune
 from calmotion.support.files import is_own
 from calmotion.support.operating_system import locked
 

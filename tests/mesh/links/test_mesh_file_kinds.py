@@ -6,8 +6,8 @@ import meshio
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.mesh import quadratic as cells_module
 from calmotion.mesh import mesh_file as mesh_file_module
+from calmotion.mesh import quadratic as cells_module
 from calmotion.mesh.repair import closed_solid
 from calmotion.mesh.tetrahedra import boundary_triangles, oriented_tets, surface_area, tet_volumes
 from calmotion.model import Body, ElasticMaterial, FlexibleSettings, Frame, TetGeometry

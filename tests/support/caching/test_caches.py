@@ -7,18 +7,8 @@ import numpy as np
 import pytest
 from calmotion.support.caching import caches
 from calmotion.support.caching.bundled_kernels import name_of
-from calmotion.support.caching.caches import (
-    CACHES,
-    KERNELS,
-    MESHES,
-    REDUCTIONS,
-    cache_folder,
-    clear,
-    entries,
-    prune,
-    store_arrays,
-    stored_arrays,
-)
+from calmotion.support.caching.cache_folder import CACHES, KERNELS, MESHES, REDUCTIONS, cache_folder
+from calmotion.support.caching.caches import clear, entries, prune, store_arrays, stored_arrays
 from calmotion.support.caching.verified_files import sealed
 from calmotion.support.files import PREFIX, _machine
 

@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 from calmotion.cli import Output, console_on, json_option, print_table
-from calmotion.support.caching.caches import CACHES, cache_folder
+from calmotion.support.caching.cache_folder import CACHES, cache_folder
 
 EXAMPLES = (("calmotion cache info", "how large are the caches?"),)
 ALL = "all"

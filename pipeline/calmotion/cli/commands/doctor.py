@@ -13,7 +13,7 @@ from importlib import metadata
 from pathlib import Path
 
 from calmotion.cli import Output, console_on, counted, json_option, print_table
-from calmotion.support.caching.caches import cache_folder
+from calmotion.support.caching.cache_folder import cache_folder
 from calmotion.support.files import try_writing
 from calmotion.version import __version__
 

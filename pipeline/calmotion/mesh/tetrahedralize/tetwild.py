@@ -12,7 +12,8 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.mesh.tetrahedra import flat_tets, surface_volume
-from calmotion.support.caching.caches import MESHES, key_of, store_arrays, stored_arrays
+from calmotion.support.caching.cache_folder import MESHES
+from calmotion.support.caching.caches import key_of, store_arrays, stored_arrays
 from calmotion.support.files import temporary_folder
 from calmotion.support.operating_system import TimeExceeded, run_limited
 

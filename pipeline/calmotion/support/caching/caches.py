@@ -1,4 +1,9 @@
-"""The user's caches, which there are and their folder, and the folder of the user's choices."""
+"""The user's caches: files that can be made again, verified when they are read, and limited in size.
+
+Each cache is a folder of the user's cache folder. An entry is what is used and removed as one: a file of arrays, or the
+folder of the kernels of one version of the sources. The least recently used entries go first. Only files that no other
+user can write are read, since kernels are unpickled and run.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +13,6 @@ import hashlib
 import logging
 import os
 import shutil
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
@@ -16,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.support.caching.cache_folder import CACHES, cache_folder
 from calmotion.support.caching.verified_files import (
     DamagedFileError,
     ForeignFileError,
@@ -25,45 +30,6 @@ from calmotion.support.caching.verified_files import (
     unpacked,
 )
 from calmotion.support.files import PREFIX, new_file, remove_abandoned
-
-KERNELS, MESHES, REDUCTIONS = "kernels", "meshes", "reductions"
-# Folder of each cache, its content, and its largest size [bytes].
-CACHES = {
-    KERNELS: ("compiled kernels", 500 * 10**6),
-    MESHES: ("tetrahedral meshes", 10**9),
-    REDUCTIONS: ("reduced bodies", 2 * 10**9),
-}
-
-CONFIGURATION_VARIABLE = "CALMOTION_CONFIG"
-
-
-def cache_folder() -> Path:
-    """The user's cache folder of calmotion: `$CALMOTION_CACHE`, else `calmotion` in the system's cache folder."""
-    chosen = os.environ.get("CALMOTION_CACHE")
-    if chosen:
-        return Path(chosen)
-    base = _absolute(os.environ, "XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
-    return Path(base) / "calmotion"
-
-
-def configuration_folder(environment: Mapping[str, str] | None = None) -> Path:
-    """The folder of the user's choices: the one that the environment names, else where the system keeps such things."""
-    variables = os.environ if environment is None else environment
-    if variables.get(CONFIGURATION_VARIABLE):
-        return Path(variables[CONFIGURATION_VARIABLE]).expanduser()
-    if sys.platform == "win32" and variables.get("APPDATA"):
-        return Path(variables["APPDATA"]) / "calmotion"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support" / "calmotion"
-    return Path(_absolute(variables, "XDG_CONFIG_HOME") or Path.home() / ".config") / "calmotion"
-
-
-def _absolute(variables: Mapping[str, str], name: str) -> str:
-    """A folder that the environment names; relative ones do not count, as the XDG base directories have it: they would
-    be another in each working folder."""
-    value = variables.get(name, "")
-    return value if os.path.isabs(value) else ""
-
 
 LOG = logging.getLogger("calmotion")
 _MODE = 0o644  # of files, whatever the umask says: a file that others can write is not read
