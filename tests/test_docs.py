@@ -17,7 +17,7 @@ from urllib.parse import urljoin
 import pytest
 from calmotion.cli.commands.table import BROUGHT_BY
 from floors import FLOORS, REQUIRED_PLUGINS
-from prose import sentences, sentences_through_code
+from prose import messages, sentences, sentences_through_code
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PACKAGE = REPOSITORY / "pipeline" / "calmotion"
@@ -49,6 +49,15 @@ RIDDLES = (
     r"\band is told\b",
     r"\bhas no say in\b",
     r"\btells? (?:it|what|which)\b",
+    r"\bis to expect\b",
+    r"\bno \w+ to be \w+ against\b",
+    r"\bmust not leave the house\b",
+    r"\bwinds around\b",
+    r"\bhow much .* holds of it\b",
+    r"\bis not its first again\b",
+    r"\banything needs\b",
+    r"\bwhat stands\b",
+    r"\bwhere it says nothing\b",
 )
 
 
@@ -76,6 +85,18 @@ def test_the_sentences_of_the_help_are_short():
             parsers += action.choices.values() if isinstance(action, argparse._SubParsersAction) else []
             long += [(parser.prog, found) for found in sentences(action.help or "") if len(found.split()) > 30]
     assert long == []
+
+
+def test_the_messages_of_the_program_are_short_and_plain():
+    """Reports, notes and errors are texts of the code; what is filled in is one word."""
+    wrong = []
+    for path in [*PACKAGE.rglob("*.py"), *REPOSITORY.glob("plugins/*/**/*.py")]:
+        for line, text in messages(ast.parse(path.read_text())):
+            for found in sentences(text):
+                riddles = [riddle for riddle in RIDDLES if re.search(riddle, found, re.I)]
+                if len(found.split()) > 30 or riddles:
+                    wrong.append(f"{path.relative_to(REPOSITORY)}:{line}: {riddles or 'over 30 words'}: {found}")
+    assert wrong == []
 
 
 def test_tolerance_is_the_accuracy_of_the_simulation_and_goal_the_error_that_is_accepted():

@@ -96,7 +96,7 @@ class Comparison:
         s = self._situation
         nothing = Fit({}, s.error, 0, score(s, s.error, 0))
         if self._is_quiet(self.QUIET):
-            quiet = Cause(NONE, 1.0, 0.95, "nothing: the robot does what a healthy one does, within the noise")
+            quiet = Cause(NONE, 1.0, 0.95, "nothing: within the noise, the robot moves like a healthy one")
             return Diagnosis((quiet,), "", self._channels(nothing), None, s)
         self._fits[frozenset()] = nothing
         for k, cause in enumerate(self._able):

@@ -128,7 +128,7 @@ class Live:
             gains = self._gains(position)
         except SimulationFailure as failure:
             raise ShotError(
-                "the robot has no static equilibrium in the pose in which it shall begin",
+                "the robot has no static equilibrium in the pose in which it begins",
                 remedy="Begin in another pose, or see what calmotion inspect says of the shot.",
             ) from failure
         self._renewal.begin(position, gains)
@@ -321,7 +321,7 @@ def _notes(shot: CompiledShot, forces: VelocityForces) -> tuple[str, ...]:
     if not forces.known:
         found.append("centrifugal forces are left out: joints move freely or close chains")
     if any(np.isfinite(motor.max_torque) for motor in shot.character.motors):
-        found.append("efforts are not limited: a stream that asks for more than a motor has leaves an error")
+        found.append("efforts are not limited: an error remains where the stream needs more than a motor has")
     delays = {motor.delay for motor in shot.character.motors if motor.model != PRESCRIBED}
     if len(delays) > 1:
         found.append("motors with different delays are taken as if all had the longest")

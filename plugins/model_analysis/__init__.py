@@ -158,7 +158,7 @@ def _representative(context: RunContext) -> CompiledShot:
     part = busiest(shot.animation, LONG_SHOT)
     if part is shot.animation or shot.character.retarget.cyclic:
         return shot
-    context.report("info", f"the shot is long: what is simulated of it are its busiest {LONG_SHOT:g} s")
+    context.report("info", f"the shot is long: only its busiest {LONG_SHOT:g} s are simulated")
     return replace(shot, animation=part)
 
 
@@ -198,7 +198,7 @@ class EstimateMotorEffects(Operator):
         options = run_settings(context.get(Source), context.get(ModelChoices))
         found = effects_of_gains(_representative(context), options)
         if found is None:
-            context.report("warning", "by the gains that the shot carries its motors could not hold the robot")
+            context.report("warning", "with the gains in the shot, its motors could not hold the robot")
             return []
         return [found]
 

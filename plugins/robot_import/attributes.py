@@ -118,7 +118,7 @@ def judged(kind: str, elements: Iterable[Element]) -> tuple[str, ...]:
 
 def markdown(kind: str) -> str:
     """The table of a kind of file as a page shows it."""
-    lines = ["| element | attributes | here | what becomes of them |", "| --- | --- | --- | --- |"]
+    lines = ["| element | attributes | here | meaning |", "| --- | --- | --- | --- |"]
     for row in sorted(table(kind), key=lambda row: TREATMENTS.index(row.treatment)):
         names = ", ".join(
             "all" if name == _ANYTHING else "(any)" if name == PRESENT else name for name in row.attributes

@@ -164,7 +164,7 @@ def flexible_links(text: str, known: Mapping[str, Material]) -> FlexibleLinks:
         )
     if wall is not None and not 0.0 < wall < 1.0:
         raise SettingError(
-            "a wall is thicker than nothing and thinner than 1 m", path="--flexible", found=text,
+            "the thickness of a wall must be above 0 and below 1 m", path="--flexible", found=text,
             remedy="Write a thickness such as 3mm, or leave it out for a solid link.",
         )  # fmt: skip
     name, found = material_named(material, known)

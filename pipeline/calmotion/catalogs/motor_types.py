@@ -224,7 +224,7 @@ def _sources(at: _Table, given: Any, values: Mapping[str, float]) -> dict[str, s
     for names, source in given.items():
         for name in names.split():
             if name not in values:
-                at.wrong("a source of a value that is not there", f"sources.{names}", name, nearest(name, values))
+                at.wrong("a source for a value that is not there", f"sources.{names}", name, nearest(name, values))
             found[name] = source
     return found
 

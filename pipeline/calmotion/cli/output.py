@@ -107,7 +107,7 @@ def print_fault(error: Exception, output: Output) -> None:
     if known is not None:
         return print_error(known, output)
     found = "".join(traceback.format_exception_only(error)).strip()
-    remedy = "Report it, with the traceback; where files must not leave the house, read it before"
+    remedy = "Report it, with the traceback. Remove paths and names from it that are confidential"
     fault = ShotError("the program has a fault", found=found, remedy=remedy)
     _print_problems([Problem(fault, traceback="".join(traceback.format_exception(error)))], output)
 

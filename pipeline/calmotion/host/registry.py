@@ -81,8 +81,8 @@ class Host:
             TypeError: Always.
         """
         raise TypeError(
-            "shots and results hold plugins, which do not travel between processes: open the shot there, and send the "
-            "report(), the motion or the columns() of the result"
+            "shots and results cannot be sent to another process, since they hold plugins: open the shot there, and "
+            "send the report(), the motion or the columns() of the result"
         )
 
     @property

@@ -159,7 +159,7 @@ def refuse_bad_neighbours(tets: IntArray, path: str) -> None:
     count, label = connected_components((uses @ uses.T) >= 3.0, directed=False)
     if count > 1:
         raise ShotError(
-            "its tetrahedra hang together in points or edges only, where the body would turn freely",
+            "parts of its tetrahedra are connected by points or edges only, about which they would turn freely",
             path=path, found=f"{count} parts",
             remedy="Join the parts by common faces, or split them into several bodies",
         )  # fmt: skip

@@ -91,9 +91,9 @@ def weak_seat_note(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFra
     if own <= _FALLS * less:
         return ""
     return (
-        f"{body.path}: how stiff it is depends on how much {at.path} holds of it, which the shot does not say: held "
-        f"there alone, its first frequency is {own:.4g} Hz, with half the radius {less:.4g} Hz (a GeomSubset of family "
-        "calmInterface tells)"
+        f"{body.path}: its stiffness depends on the size of the interface of {at.path}, which the shot does not "
+        f"author. Held there alone, its first frequency is {own:.4g} Hz, and {less:.4g} Hz with half of the radius. "
+        "A GeomSubset of family calmInterface sets the size"
     )
 
 

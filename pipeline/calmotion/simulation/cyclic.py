@@ -113,7 +113,7 @@ def refuse_open_loops(character: Character, animation: Animation) -> None:
         if apart > CLOSED:
             shown = f"{np.degrees(apart):.3g} degrees" if turning else f"{1e3 * apart:.3g} mm"
             raise ShotError(
-                "calm:retarget:cyclic is true, but the last frame of this motor is not its first again",
+                "calm:retarget:cyclic is true, but the first and the last frame of this motor differ",
                 path=motor.path,
                 attribute=motor.attribute,
                 found=f"{shown} apart",
@@ -125,7 +125,7 @@ def refuse_open_loops(character: Character, animation: Animation) -> None:
         away = max(cycle_gap(Track(frame.times, column), end, False) for column in frame.positions.T)
         if max(turned, away) > CLOSED:
             raise ShotError(
-                "calm:retarget:cyclic is true, but at the last frame this root is not where it was at the first",
+                "calm:retarget:cyclic is true, but the first and the last frame of this root differ",
                 path=character.joints[frame.joint].path,
                 found=f"{np.degrees(turned):.3g} degrees and {1e3 * away:.3g} mm apart",
                 remedy=_REMEDY,

@@ -140,7 +140,7 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
         under = "just before" if failure.share == 1.0 else f"under {failure.share:.0%} of gravity"
         return kind(
             f"the simulation {what}: {under} this body bends by {1e3 * bend.distance:.3g} mm, "
-            f"{bend.share:.0%} of its length, which its modes cannot follow much further",
+            f"{bend.share:.0%} of its length, which is beyond the range of its modes",
             path=character.bodies[tree.body[bend.component]].path,
             remedy="Check physics:youngsModulus (in the stage's units), the loads and the speed of the motion.",
         )

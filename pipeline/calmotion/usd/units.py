@@ -120,7 +120,7 @@ def other_units(stage: Usd.Stage, prims: Iterable[Usd.Prim]) -> list[ShotError]:
             same = there == here or (name in _USUAL and math.isclose(there, here, rel_tol=1e-6))
             if layer == root or same or (name == "upAxis" and layer not in stack):
                 continue
-            of_stage = "" if root.pseudoRoot.HasInfo(name) else ", which is what USD takes where it says nothing"
+            of_stage = "" if root.pseudoRoot.HasInfo(name) else " (the default of USD)"
             found.append(
                 ShotError(
                     f"the robot comes from a layer with another {name} than the shot", path=root.GetDisplayName(),

@@ -69,7 +69,7 @@ RULES: dict[str, tuple[Rule, str]] = {
         reading_findings,
         "The shot can be processed, and its motors can follow the animation within their limits.",
     ),
-    SCHEMAS: (unknown_attributes, "Every attribute in the namespace calm: is one that is read."),
+    SCHEMAS: (unknown_attributes, "Calmotion reads every attribute in the namespace calm:."),
     PLACES: (wrong_prims, "Calmotion's schemas are applied to prims of the right kind."),
 }
 

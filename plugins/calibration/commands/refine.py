@@ -78,8 +78,8 @@ def _print(report: dict[str, Any], console: Console) -> None:
     )
     say(
         console,
-        f"The largest error of take {report['take']} is {length(played)}; {length(expected)} is to expect of the new "
-        f"curves.",
+        f"The largest error of take {report['take']} is {length(played)}; the new curves should leave "
+        f"{length(expected)}.",
     )
     rows = [
         [

@@ -252,12 +252,12 @@ def _notes(
     for take in found.problem.takes:
         if take.start is not None:
             notes.append(
-                f"the recording of {take.shot.character.path} begins elsewhere than the shot: the simulation begins "
-                f"at rest where the encoders are {take.begin:.3g} s after the first frame, and is let go there"
+                f"the recording of {take.shot.character.path} begins in another pose than the shot: the simulation "
+                f"starts at rest, in the pose that the encoders show {take.begin:.3g} s after the first frame"
             )
         if take.moves:
             notes.append(
-                f"{take.shot.character.path} moves already when its recording begins: what it swings by itself then is "
+                f"{take.shot.character.path} moves already when its recording begins: its vibration at that time is "
                 "estimated from the recording (`start`)"
             )
     notes += _missed(found, fits)

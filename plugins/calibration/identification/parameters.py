@@ -147,8 +147,8 @@ def robot_parameters(
             path=shot.character.path,
             attribute="--parameters",
             found=", ".join(wanted),
-            remedy="Make a link flexible (CalmFlexibleBodyAPI) or a motor give (calm:motor:model), or ask for mass or "
-            "encoder_offset",
+            remedy="Make a link flexible (CalmFlexibleBodyAPI) or a motor compliant (calm:motor:model), or name "
+            "mass or encoder_offset",
         )
     # without it, the error of the mesh would be taken for another modulus and mass
     moduli = [p for p in found.values() if p.kind == MODULUS]

@@ -19,7 +19,7 @@ class Backlash(AddedExplanation):
 
     cause = "backlash"
     label = "backlash"
-    tells = "the joint pushed by hand with its motor on: play gives way without force, a soft loop does not"
+    tells = "push the joint by hand with its motor on: backlash moves without force, a soft loop resists"
     WIDTHS = tuple(np.geomspace(0.001, 0.08, 9))  # [rad]
 
     def applies(self, situation: Situation) -> bool:

@@ -27,7 +27,7 @@ def test_each_has_its_reason_and_its_error_and_a_skipped_step_says_so():
 def test_by_itself_a_report_has_one_line_with_the_largest_error():
     rows = [row("turning", None), row("modes", 2e-5), row("time step 5 ms", 3e-4), row("Draw", None, True)]
     assert printed(rows, False) == [
-        "simplified: the model, in 3 ways; the largest error, about 0.3 mm, has: time step 5 ms. --verbose lists all"
+        "simplified: 3 parts of the model; largest estimated error 0.3 mm (time step 5 ms). --verbose lists all"
     ]
-    assert printed([row("turning", None)], False) == ["simplified: the model, in 1 way. --verbose lists all"]
+    assert printed([row("turning", None)], False) == ["simplified: 1 part of the model. --verbose lists all"]
     assert printed([row("Draw", None, True)], False) == []

@@ -1,6 +1,8 @@
-"""The sentences of a page in Markdown, without its code, tables, headings, addresses and formulas."""
+"""The sentences of a page in Markdown, without its code, tables, headings, addresses and formulas; texts of code."""
 
+import ast
 import re
+from collections.abc import Iterator
 
 NOT_PROSE = re.compile(
     r"^ *```.*?^ *```$|\$\$.*?\$\$|<!--.*?-->"  # blocks of code and formulas, comments
@@ -31,3 +33,28 @@ def sentences_through_code(text: str) -> list[str]:
         if is_code and not then_code and re.match(r"[a-z]", then):
             found.append(then[:80])
     return found
+
+
+SENTENCE = re.compile(r"\w+(?: [\w()/'-]+,?){3}")  # four words in a row: no key, path, pattern or markup
+
+
+def messages(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    """Texts of a module that may be sentences for people, with their lines: those that are no docstrings, and hold no
+    markup. Values that are filled in are a word, X."""
+    skipped = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            skipped |= {id(part) for part in ast.walk(node) if part is not node}
+        elif isinstance(node, ast.Attribute) and node.attr == "split":  # a list of words
+            skipped.add(id(node.value))
+    for node in ast.walk(tree):
+        if id(node) in skipped:
+            continue
+        if isinstance(node, ast.JoinedStr):
+            text = "".join(str(part.value) if isinstance(part, ast.Constant) else "X" for part in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            text = node.value
+        else:
+            continue
+        if SENTENCE.search(text) and "<" not in text and "\n" not in text:
+            yield node.lineno, text

@@ -72,12 +72,12 @@ def run(args: argparse.Namespace, output: Output) -> int:
     robust = args.robust or any(text.startswith("retarget.optimize.robust=") for text in args.set) or args.settings
     if args.scenarios is not None and not robust:
         raise SettingError(
-            "this is the number of robots of a robust search, and none is requested", path="--scenarios",
+            "the number of robots is that of --robust, which is not there", path="--scenarios",
             found=args.scenarios, remedy="Add --robust, or leave it out.",
         )  # fmt: skip
     if args.goal is not None and robust:
         raise SettingError(
-            "a goal ends the search for the robot of the model, and a robust search goes on for others", path="--goal",
+            "a robust search has no goal: it goes on after the goal is reached on the model", path="--goal",
             found=f"{1e3 * args.goal:g}mm", remedy="Remove --goal or --robust.",
         )  # fmt: skip
     refuse_unused_retiming(args)

@@ -142,7 +142,7 @@ def _print_sources(console: Console, report: dict[str, Any]) -> None:
             "of two for about 9 of 10 links. What follows from them is as rough. --meshes aims at 1%, in minutes.",
         )
     if earlier:
-        say(console, f"the mesh of an earlier run is that of {earlier} of the flexible bodies")
+        say(console, f"{earlier} of the flexible bodies have their mesh from an earlier run")
 
 
 def _expected(row: dict[str, Any]) -> str:

@@ -32,8 +32,8 @@ def print_left_out(console: Console, rows: Sequence[dict[str, Any]], whole: bool
     if made:
         largest = max(made, key=lambda row: row["estimated_error_m"] or 0.0)
         error = largest["estimated_error_m"]
-        cost = f"; the largest error, about {about(error)}, has: {largest['what']}" if error else ""
-        say(console, f"simplified: the model, in {counted(len(made), 'way')}{cost}. --verbose lists all")
+        cost = f"; largest estimated error {about(error)} ({largest['what']})" if error else ""
+        say(console, f"simplified: {counted(len(made), 'part')} of the model{cost}. --verbose lists all")
 
 
 def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: bool) -> None:
@@ -56,8 +56,8 @@ def print_tempo(console: Console, tempo: dict[str, Any] | None) -> None:
         return
     if not tempo["possible"]:
         if (weak := tempo["too_weak"]) is not None:
-            needed = f"{weak['needed']:.4g} {weak['unit']} at {weak['time_s']:.2f} s against weight"
-            say(console, f"No tempo helps: {weak['path']} has {weak['limit']:.4g} {weak['unit']}, and needs {needed}.")
+            needed = f"{weak['needed']:.4g} {weak['unit']} at {weak['time_s']:.2f} s, where it has {weak['limit']:.4g}"
+            say(console, f"No tempo helps: to hold the weight, {weak['path']} needs {needed} {weak['unit']}.")
         return
     whole, parts = tempo["uniform_added_s"], tempo["least_added_s"]
     stretch = f"{tempo['uniform_stretch']:.0%} of its time ({whole:.2f} s more)"
@@ -86,7 +86,7 @@ def print_retiming(console: Console, retime: dict[str, Any] | None) -> None:
     print_table(console, "Tempo", ["animation", "times as long", "because of"], rows)
     if retime["lacking_stretch"]:
         more = math.ceil(20.0 * retime["lacking_stretch"]) / 20.0
-        say(console, f"limits ask for parts that take {more:g} times as long: --retime slowest={more:g} allows them")
+        say(console, f"some limits need parts that take {more:g} times as long: allow it by --retime slowest={more:g}")
     pins = retime["pins"]
     if pins:
         later = f", {1e3 * pins[0]['shift_s']:.0f} ms later" if pins[0]["shift_s"] > 5e-4 else ""

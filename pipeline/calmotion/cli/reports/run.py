@@ -58,8 +58,8 @@ def print_lost_motion(console: Console, lost: dict[str, Any] | None, suffix: str
     before = f" (as animated {length(worst['max_error_before_m'])})" if suffix else ""
     say(
         console,
-        f"backlash is not simulated: the torques of {len(turned)} of {len(lost['motors'])} motors change their sign "
-        f"{count} times; it would move {worst['path']} by up to {length(worst[f'max_error{suffix}_m'])}{before}"
+        f"backlash is not simulated; it would move {worst['path']} by up to {length(worst[f'max_error{suffix}_m'])}"
+        f"{before}, since the torques of {len(turned)} of {len(lost['motors'])} motors change their sign {count} times"
         if turned
         else "backlash costs nothing: the torques of the motors keep their signs",
     )
@@ -236,8 +236,8 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
     if held and held["max_error_m"] > FRICTION * report["tolerance_m"]:
         say(
             console,
-            f"friction of motors may hold {held['path']} off by up to {about(held['max_error_m'])} where it rests, "
-            "beside the errors above: no command takes that away",
+            f"at rest, friction of motors may leave {held['path']} up to {about(held['max_error_m'])} away from its "
+            "place; the errors above do not include this, and no command removes it",
         )
     print_retiming(console, report["retime"])
     print_limits(console, report["limits"], bool(suffix))

@@ -95,7 +95,7 @@ def _print_goal(console: Console, report: dict[str, Any]) -> None:
     apart = abs(worst - goal)  # the verdict is that of the target which is farthest off
     if error is not None and error > apart:
         finer = f"--tolerance {1e3 * max(apart, 0.1 * goal):.1g}mm"
-        say(console, f"The error of the simulation, {about(error)}, decides here: {finer} makes sure.")
+        say(console, f"The error of the simulation, {about(error)}, exceeds the distance to the goal: use {finer}.")
 
 
 def _say_of(console: Console, row: dict[str, Any], rows: list[dict[str, Any]], what: str, is_so: str) -> None:

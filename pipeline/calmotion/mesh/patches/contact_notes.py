@@ -58,6 +58,6 @@ def _shared(body: Body, frames: list[AttachmentFrame], triangles: Array) -> Iter
         if far > same:
             yield (
                 f"{body.path}: the frames of {' and '.join(frames[k].path for k in group)} are {1e3 * far:.3g} mm "
-                "apart, too near for a patch each: they hold one part of its surface and do not move against each "
-                "other (a GeomSubset of family calmInterface for each keeps them apart)"
+                "apart, too near for an interface patch each: they share one, and do not move against each "
+                "other (a GeomSubset of family calmInterface for each separates them)"
             )

@@ -96,7 +96,8 @@ def closed_solid(surfaces: Sequence[SurfaceMesh], body: str, any_hole: bool = Fa
         )  # fmt: skip
     if crossed:
         repairs.append(
-            f"its surface intersects itself, {100.0 * inverted:.2g}% of it inside out: what it winds around is solid"
+            f"its surface intersects itself, {100.0 * inverted:.2g}% of it inside out: all that it encloses counts as "
+            "solid"
         )
     volume = (enclosed_volume(whole.points, whole.triangles) if crossed else whole.volume) * scale**3
     whole = _decimated(whole, scale, repairs)

@@ -39,7 +39,7 @@ _FIRST, _FIRST_DENSE = 0.6, 0.4
 _LATE = 0.1  # share of the time after which an accepted mesh is not followed by a closer one
 _TRIANGLE = 3e-3  # processor time for a triangle of a surface with many details [s]; 2 to 3.3 ms were measured
 _COARSER = 1.6  # factor of size and envelope of a mesh that took too long
-INTERSECTS = "its surface intersects itself: the volume is that of all that it winds around"
+INTERSECTS = "its surface intersects itself: all that it encloses counts as solid"
 _LOOSE = 0.05  # of the volume: parts that a thin connection, which the mesh did not follow, held
 
 

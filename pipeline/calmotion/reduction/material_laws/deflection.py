@@ -81,10 +81,9 @@ def deflection_under(
             path=path,
             attribute="physics:youngsModulus",
             found=f"{material.youngs_modulus:.3g} Pa",
-            remedy="Check it, in units of the stage, the masses that the body carries, and steps of the animation, of "
-            "which `calmotion inspect` tells those beyond the limits of motors. Bodies with more than "
-            f"{UNPHYSICAL:g} times hang like ropes, and cannot be simulated; here a modulus of "
-            f"{material.youngs_modulus * deflection / (UNPHYSICAL * size):.2g} Pa is the least.",
+            remedy="Check it in units of the stage, check the masses that the body carries, and look for steps in the "
+            f"animation (`calmotion inspect`). Bodies that deflect by more than {UNPHYSICAL:g} times their size "
+            f"cannot be simulated: author {material.youngs_modulus * deflection / (UNPHYSICAL * size):.2g} Pa or more.",
         )
     strain = float(np.sqrt(deflections @ (omega_squared * deflections) / (material.youngs_modulus * model.mesh.volume)))
     return Deflection(deflection, moved, strain, shortening + moved * softening)

@@ -125,7 +125,7 @@ def _named(shot: CompiledShot, options: RunSettings, robots: Sequence[Scenario],
         f"a robot with {different} cannot be simulated" + (f": {reason}" if reason else ""),
         path=shot.character.path,
         attribute="calm:retarget:uncertainty",
-        remedy="Set a smaller uncertainty: the model is near buckling, or near another limit of what stands.",
+        remedy="Set a smaller uncertainty: some of these robots buckle, or cannot carry their weight.",
     )
 
 
@@ -147,7 +147,7 @@ def uncertainties_of(shot: CompiledShot) -> tuple[Parameter, ...]:
     if not parameters:
         given = shot.character.retarget.uncertainty
         raise ShotError(
-            "no parameter of the robot is uncertain, so there are no robots to be robust against",
+            "no parameter of the robot is uncertain, so that a robust search has no other robots",
             path=shot.character.path,
             attribute="calm:retarget:uncertainty:modulus, :damping, :payload and :gains",
             found=f"{given.modulus:g}, {given.damping:g}, {given.payload:g} and {given.gains:g}",

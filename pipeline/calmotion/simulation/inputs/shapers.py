@@ -57,7 +57,7 @@ def shaped(
     """
     if kind not in SHAPERS or not len(frequencies):
         raise ShotError(
-            "there is no such shaper" if len(frequencies) else "a rigid robot has no frequency to shape for",
+            "there is no such shaper" if len(frequencies) else "a rigid robot has no frequency for a shaper",
             attribute="--shaper",
             found=kind,
             remedy=f"Use one of {', '.join(SHAPERS)}." if len(frequencies) else "Leave it out.",
@@ -69,7 +69,7 @@ def shaped(
         edge, highest = cutoff * frequencies[0], 0.5 / grid.h
         if not edge < highest:
             raise ShotError(
-                "the cutoff of the low-pass filter is beyond what the steps of the simulation hold",
+                "the cutoff of the low-pass filter is too high for the time step",
                 attribute="retarget.shape.cutoff",
                 found=f"{cutoff:g}, which is {edge:.4g} Hz, with steps of {1e3 * grid.h:.3g} ms",
                 remedy=f"Use less than {highest / frequencies[0]:.3g}, or a smaller --step.",

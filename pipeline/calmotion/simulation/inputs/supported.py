@@ -39,14 +39,14 @@ def refuse_unsupported(character: Character, animation: Animation, options: RunS
     longest = max(LONGEST_PRE_ROLL, float(animation.frame_times[-1]))
     if options.pre_roll is not None and options.pre_roll > longest:
         raise ShotError(
-            "the pre-roll is longer than anything needs to come to rest", path=character.path, attribute="--pre-roll",
+            "the pre-roll is too long", path=character.path, attribute="--pre-roll",
             found=f"{options.pre_roll:g} s", remedy=f"Use {longest:g} s or less, or leave it out.",
         )  # fmt: skip
     if character.retarget.cyclic:
         refuse_open_loops(character, animation)
         if options.pre_roll:
             raise ShotError(
-                "a shot that loops has no beginning to ease into",
+                "a cyclic shot has no pre-roll",
                 path=character.path,
                 attribute="--pre-roll",
                 found=f"{options.pre_roll:g} s",

@@ -223,8 +223,8 @@ def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FE
     touching = len(without_contacts(points, tets)[0]) - len(points)
     if touching:
         repairs += (
-            f"at {touching} points tetrahedra have a corner or an edge in common, but no face, and hold each other the "
-            "less the finer they are: give them faces in common, or points of their own",
+            f"at {touching} points tetrahedra share a corner or an edge, but no face. Such a connection is the softer, "
+            "the finer the elements are: let them share faces, or separate their points",
         )
     quality = replace(measure_quality(points, tets, repairs=repairs), source="tetrahedra")
     return FEMesh(index, points, tets, quality)

@@ -74,12 +74,12 @@ def notes_of_results(composed: Usd.Stage, path: str, earlier: Sequence[str], inp
             others = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
             notes.append(
                 f"{layer.GetDisplayName()}: these results were made for another version of {changed[0]}{others}; their "
-                "errors are those of that version"
+                "errors hold for that version"
             )
         lost = _without_prim(layer, composed)
         if lost:
             others = f" and {len(lost) - 1} more" if len(lost) > 1 else ""
-            notes.append(f"{layer.GetDisplayName()}: the shot has no {lost[0]}{others}, of which it holds results")
+            notes.append(f"{layer.GetDisplayName()}: it has results for {lost[0]}{others}, which the shot has not")
     return notes
 
 

@@ -84,8 +84,8 @@ def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
     if (told := predictions(reading.stage)) is not None:
         layer, rms, largest = told
         reading.notes.append(
-            f"{layer}: what the calibrated robot predicted of its recordings was off by {1e3 * rms:.3g} mm (root mean "
-            f"square), {1e3 * largest:.3g} mm at most; expect at least that beside the errors of the model"
+            f"{layer}: the calibrated model differed from its recordings by {1e3 * rms:.3g} mm (root mean square), "
+            f"{1e3 * largest:.3g} mm at most; expect at least that in addition to the errors in this report"
         )
     prim = reading.stage.GetPrimAtPath(root)
     while prim and not schemas.is_applied(prim, _SCHEMA):

@@ -63,7 +63,7 @@ def test_a_take_says_what_the_next_one_should_be_like():
     files = {"layer": "two.usda", "root": "two_root.usda", "model": "two_model.usda", "model_root": None}
     report = {"parameters": [PARAMETER], "targets": [target], "take": 1, "notes": ["a note"]} | files
     lines = printed(refine, report)
-    assert lines[0] == "The largest error of take 1 is 20 mm; 2 mm is to expect of the new curves."
+    assert lines[0] == "The largest error of take 1 is 20 mm; the new curves should leave 2 mm."
     assert lines[-5:] == [
         "wrote two.usda", "wrote two_root.usda", "wrote two_model.usda",
         "next: play two_root.usda in take 2, record it, and run calmotion refine again", "note: a note",

@@ -90,7 +90,7 @@ def test_a_robot_that_stands_elsewhere_than_the_shot_begins_is_begun_where_its_e
     recording = SensorRecording("off.csv", "", (Channel(ANGLE, MOTOR, times, signals.at(ANGLE, 0, times), 1e-3),))
     found = calibrate_shots([(shot, [recording])], SETTINGS, RunSettings(step=1 / 240))
     assert found.estimate(f"position_gain {MOTOR}").value == pytest.approx(18.0, rel=0.03)
-    assert any("begins elsewhere" in note for note in found.notes)
+    assert any("begins in another pose" in note for note in found.notes)
 
 
 def test_a_largest_torque_below_that_of_the_shot_is_found(shots):
