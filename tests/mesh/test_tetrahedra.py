@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.mesh import tetrahedra as t
+from calmotion.mesh.bisection import bisected
+from calmotion.mesh.mass import mass_of_solid, mass_of_tets
+from calmotion.mesh.mesh_shaping import Surface, shaped
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
+from calmotion.mesh.tetrahedra import boundary_triangles, measure_quality, min_dihedral_deg, surface_area, tet_volumes
+from calmotion.model import Body, FEMesh, FlexibleSettings
 
 REGULAR = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 
@@ -132,3 +140,101 @@ def test_tetrahedra_that_fill_the_same_place_are_refused(second):
 def test_tetrahedra_that_share_no_face_are_refused(second):
     with pytest.raises(ShotError, match="points or edges"):
         neighbours((0, 1, 2, 3), second)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_solid_stays_and_marked_tetrahedra_become_smaller(helpers, seed):
+    points, tets = helpers.box((6, 2, 2), (0.3, 0.1, 0.1))
+    points, tets = np.asarray(points, dtype=float), np.asarray(tets)
+    marked = np.random.default_rng(seed).choice(len(tets), 10, replace=False)
+    new, split, parents = bisected(points, tets, marked)
+    assert np.array_equal(new[: len(points)], points) and len(split) > len(tets)
+    volumes = tet_volumes(new, split)
+    assert (volumes > 0.0).all() and volumes.sum() == pytest.approx(0.3 * 0.1 * 0.1)
+    assert np.bincount(parents, volumes) == pytest.approx(tet_volumes(points, tets)), "parts fill what they are part of"
+    # hanging nodes would make inner faces count as boundary
+    assert surface_area(new, boundary_triangles(split)) == pytest.approx(2 * (2 * 0.3 * 0.1 + 0.1 * 0.1))
+    kept = {tuple(sorted(tet)) for tet in split.tolist()}
+    assert not any(tuple(sorted(tets[k].tolist())) in kept for k in marked)
+
+
+def test_repeated_bisection_at_one_place_keeps_angles(helpers):
+    points, tets = helpers.box((4, 2, 2), (0.2, 0.1, 0.1))
+    points, tets = np.asarray(points, dtype=float), np.asarray(tets)
+    before = min_dihedral_deg(points, tets)
+    for _ in range(6):
+        near = np.linalg.norm(points[tets].mean(axis=1), axis=1)
+        points, tets, _ = bisected(points, tets, np.argsort(near)[:8])
+    assert min_dihedral_deg(points, tets) > 0.3 * before
+
+
+def test_a_box_has_the_mass_properties_of_a_box(helpers):
+    size, origin = np.array([0.3, 0.2, 0.1]), np.array([1.0, -2.0, 0.5])
+    points, tets = helpers.box((2, 3, 1), size, origin)
+    mass = mass_of_tets(points, tets, 1000.0)
+    assert mass.mass == pytest.approx(6.0)
+    assert np.allclose(mass.center, origin + size / 2)
+    squares = size**2
+    assert np.allclose(mass.inertia, np.diag(6.0 / 12.0 * (squares.sum() - squares)), rtol=0, atol=1e-12)
+    scaled = mass_of_tets(points, tets[:, [1, 0, 2, 3]], 1000.0, 3.0)
+    assert scaled.mass == pytest.approx(3.0) and np.allclose(scaled.inertia, 0.5 * mass.inertia)
+
+
+def test_a_surface_weighs_what_it_encloses(helpers):
+    place = np.array([3.0, -5.0, 7.0])
+    outer, inner = (helpers.box((3, 2, 1), np.array(size), place + at) for size, at in (
+        ([0.3, 0.04, 0.04], 0.0), ([0.2, 0.02, 0.02], 0.01)))  # fmt: skip
+    (points, tets), (hole, hollow) = outer, inner
+    whole, hole_tets = mass_of_tets(points, tets, 1200.0), mass_of_tets(hole, hollow, 1200.0)
+    surface = np.vstack([boundary_triangles(tets), boundary_triangles(hollow)[:, ::-1] + len(points)])
+    found = mass_of_solid(np.vstack([points, hole]), surface, 1200.0)
+    total = whole.mass - hole_tets.mass
+    assert found.mass == pytest.approx(total)
+    assert np.allclose(found.center, (whole.mass * whole.center - hole_tets.mass * hole_tets.center) / total)
+    same = mass_of_solid(points, boundary_triangles(tets), 1200.0, 2.0)
+    assert np.allclose(same.inertia, whole.inertia * 2.0 / whole.mass, rtol=0, atol=1e-9)
+
+
+SIZE = (0.2, 0.02, 0.02)
+
+
+@pytest.fixture
+def mesh(helpers):
+    """A bar, dented by a twentieth of a millimetre along its edges."""
+    points, tets = helpers.box((10, 2, 2), SIZE)
+    points = np.asarray(points).copy()
+    edge = (np.abs(points[:, 1:] - 0.01) > 0.009).all(axis=1)
+    points[edge, 1:] += 5e-5 * np.sign(0.01 - points[edge, 1:])
+    return FEMesh(0, points, tets, replace(measure_quality(points, tets), source="surface", frequency_error=0.01))
+
+
+def surface_of(helpers, volume):
+    corners, bricks = helpers.box((1, 1, 1), SIZE)
+    return Surface(np.asarray(corners), boundary_triangles(bricks), volume, 1e-3)
+
+
+def test_a_dented_mesh_gets_its_volume_and_its_patch(helpers, mesh, plastic):
+    body = Body("/Arm/link", helpers.frame(0, 0, 0), None, flexible=FlexibleSettings(plastic, interface_radius=0.016))
+    frames = [AttachmentFrame("/Arm/root", helpers.frame(0.01, 0.01, 0.01), "interface")]
+    volume = float(np.prod(SIZE))
+    found = shaped(mesh, body, surface_of(helpers, volume), frames)
+    assert mesh.quality.volume < 0.999 * volume and found.quality.volume_error < 1e-4
+    assert found.quality.source == "surface" and found.quality.frequency_error == 0.01
+    (patch,) = found.patches
+    assert np.array_equal(patch.origin, frames[0].frame.position)
+    corners = {tuple(point) for point in found.points}
+    assert all(tuple(point) in corners for point in patch.triangles.reshape(-1, 3))
+
+
+def test_a_surface_whose_volume_is_not_that_of_the_elements_is_not_fitted(helpers, mesh, plastic):
+    body = Body("/Arm/link", helpers.frame(0, 0, 0), None, flexible=FlexibleSettings(plastic))
+    found = shaped(mesh, body, surface_of(helpers, 0.9 * float(np.prod(SIZE))), ())
+    assert np.array_equal(found.points, mesh.points) and found.patches == ()
+
+
+def test_a_mesh_that_has_the_volume_by_chance_is_fitted(helpers, mesh, plastic):
+    """Dents and bumps may make up for each other: volume alone does not tell that a mesh follows its surface."""
+    body = Body("/Arm/link", helpers.frame(0, 0, 0), None, flexible=FlexibleSettings(plastic))
+    found = shaped(mesh, body, surface_of(helpers, 1.001 * mesh.quality.volume), ())
+    assert found.quality.volume_error > 3e-3 and not np.array_equal(found.points, mesh.points)
+    assert found.quality.volume == pytest.approx(np.prod(SIZE), rel=1e-4)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion import ShotError
 from calmotion.usd.clock import Clock, clock_of
 from pxr import Usd
 
@@ -38,17 +37,6 @@ def test_without_frames_per_second_a_frame_is_a_time_code():
 def test_a_range_that_is_not_authored_is_that_of_the_samples():
     clock = clock_of(stage_with(timeCodesPerSecond=24), np.array([7.0, 3.0, 31.0]))
     assert (clock.start, clock.end) == (3.0, 31.0)
-
-
-@pytest.mark.parametrize("values", [{"startTimeCode": 5, "endTimeCode": 5}, {"startTimeCode": 9, "endTimeCode": 2}])
-def test_a_shot_without_duration_is_refused(values):
-    with pytest.raises(ShotError, match="no duration"):
-        clock_of(stage_with(**values), np.array([1.0, 2.0]))
-
-
-def test_samples_at_one_time_alone_are_no_shot():
-    with pytest.raises(ShotError, match="one time code"):
-        clock_of(Usd.Stage.CreateInMemory(), np.array([4.0]))
 
 
 def test_time_codes_of_whole_seconds_are_no_frames():

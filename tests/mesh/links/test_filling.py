@@ -6,12 +6,18 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.errors import ShotError
+from calmotion.mesh.element_sizes import element_size
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.repair import closed_solid
 from calmotion.mesh.sources import choice
 from calmotion.mesh.tetrahedra import without_contacts
 from calmotion.mesh.tetrahedralize import filling as filling_module
 from calmotion.mesh.tetrahedralize import tetwild
-from mesher_links import box, link, run, surface
+from calmotion.reduction.mesh_refinement import response
+from calmotion.tolerance.meshes.accurate_mesh import accurate
+from calmotion.tolerance.meshes.body_mesh import geometry_of
+from calmotion.tolerance.meshes.options import MeshOptions
+from mesher_links import box, link, link_of, run, surface
 
 
 def test_a_mesh_that_takes_too_long_is_made_again_with_larger_elements(host, monkeypatch):
@@ -124,3 +130,49 @@ def test_separate_solids_are_joined_by_struts_where_all_else_fails():
     assert trimesh.Trimesh(made.points, made.triangles).body_count == 1
     assert 1.6e-4 < made.volume < 1.7e-4
     assert any("struts across gaps of up to 30 mm" in text for text in made.repairs)
+
+
+LINKS = {
+    "xarm7/xarm7.usda": "link2",
+    "g1_dual_arm/g1_dual_arm.usda": "left_elbow_link",
+    "panda/panda.usda": "link5",
+    "kuka_iiwa_14/iiwa14.usda": "link4",
+    "shadow/right_shadow_hand.usda": "rh_ffproximal",
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("file", LINKS)
+def test_the_first_frequency_is_that_of_other_meshes(shared_data, file):
+    body, frames = link_of(shared_data / "converted" / file, LINKS[file])
+    attachments = [AttachmentFrame(f"joint {k}", frame, "interface") for k, frame in enumerate(frames)]
+    volume = geometry_of(0, body, MeshOptions(), frames)
+    size, first = element_size(volume.shape), []
+    for factor in (1.25, 1.0, 0.8):
+        given = (0, body, volume, factor * size, MeshOptions(), frames[0], attachments)
+        mesh = accurate(*given)
+        first.append(float(response(mesh, body, attachments, 0, None, 1).compliances[0] ** -0.5))
+    spread = max(first) / min(first) - 1.0
+    print(f"\n{LINKS[file]}: the first frequency spreads by {100.0 * spread:.2g}% over three meshes")
+    assert spread < 0.02  # link2 of the xArm 1.6%, between the first and the last mesh
+
+
+def test_a_mesh_is_made_once_and_then_read_from_the_cache(host, own_cache, monkeypatch):
+    body = link(surface(box()), element_size=0.02)
+    (first,) = run(host, body)
+    (kept,) = own_cache.iterdir()
+    monkeypatch.setattr(tetwild, "_run", lambda *arguments: pytest.fail("meshed again"))
+    (again,) = run(host, body)
+    assert np.array_equal(first.points, again.points) and np.array_equal(first.tets, again.tets)
+    kept.write_bytes(b"torn")
+    monkeypatch.undo()
+    monkeypatch.setenv("CALMOTION_CACHE", str(own_cache.parent))
+    (third,) = run(host, body)
+    assert third.quality.volume == pytest.approx(first.quality.volume, rel=1e-3)
+    assert [path.suffix for path in own_cache.iterdir()] == [".npz"]
+
+
+def test_a_cache_that_cannot_be_written_is_not_an_error(host, monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "file"))
+    assert len(run(host, link(surface(box((0.05, 0.02, 0.02))), element_size=0.01))) == 1

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calmotion.model import Skin
+from calmotion.model import Motion, Skin
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import read_shot
 from calmotion.usd.transforms import rotation_from_quaternion
-from calmotion.usd.writing.bake import BakedMotion, bake_bodies, bake_points
+from calmotion.usd.writing.bake import BakedMotion, bake_bodies, bake_points, simulated_motion
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 from small_shots import ELBOW, FORE, UPPER, Scale, box, write_arm
 
@@ -135,3 +135,23 @@ def test_only_bodies_and_their_meshes_are_written(tmp_path):
     found = baked(tmp_path, modes=2)
     assert found.layer.GetPrimAtPath(UPPER).specifier == Sdf.SpecifierOver
     assert not found.layer.GetPrimAtPath(ELBOW) and not found.layer.GetPrimAtPath(f"{UPPER}/box")
+
+
+def motion(times: np.ndarray) -> Motion:
+    count = len(times)
+    positions = np.zeros((count, 1, 3))
+    positions[:, 0, 0] = times
+    none = np.zeros((count, 0))
+    return Motion(times, positions, np.tile([1.0, 0, 0, 0], (count, 1, 1)), (times[:, None],), none, none, none, none)
+
+
+def test_frames_are_picked_out_of_the_steps_without_the_pre_roll():
+    frames = np.arange(25) / 24.0
+    found = simulated_motion(motion((np.arange(24 * 20 + 48 + 1) - 48) / 480.0), frames)
+    assert np.array_equal(found.times, frames)
+    assert np.allclose(found.positions[:, 0, 0], frames) and np.allclose(found.elastic[0][:, 0], frames)
+
+
+def test_an_interrupted_run_gives_the_frames_it_reached():
+    found = simulated_motion(motion(np.arange(100) / 480.0), np.arange(25) / 24.0)
+    assert len(found.times) == 5

@@ -1,11 +1,15 @@
 """What a spline animates is seen where what time samples animate is."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
+import small_shots as shots
+from calmotion import ShotError
 from calmotion.usd.reading import read_shot
 from calmotion.usd.reading.animated import animation_codes
 from posed_shots import still_drives
-from pxr import Sdf, Ts, Usd, UsdGeom, UsdPhysics
+from pxr import Gf, Sdf, Ts, Usd, UsdGeom, UsdPhysics
 from small_shots import BASE, ELBOW, FORE, FRAMES, HAND, UPPER, make_target, write_arm
 
 KNOTS = ((0.0, 0.0), (12.0, 0.2), (24.0, 0.0))
@@ -113,3 +117,58 @@ def test_a_weight_by_a_spline_changes_in_time(tmp_path):
     _, animation, _ = read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
     (weights,) = animation.weights
     assert weights.values[0] == 0.0 and weights.values[-1] == 3.0 and len(weights.times) > 24
+
+
+MASS = "physics:mass"
+
+
+def arm(folder, *samples, default=None):
+    def edit(stage):
+        attribute = stage.GetPrimAtPath(shots.FORE).GetAttribute(MASS)
+        attribute.Clear()
+        if default is not None:
+            attribute.Set(default)
+        for code, value in samples:
+            attribute.Set(value, code)
+
+    character, _, _ = read_shot(str(shots.write_arm(folder / "shot.usda", edit)))
+    (body,) = [body for body in character.bodies if body.path == shots.FORE]
+    return body.mass.mass, [note for note in character.notes if MASS in note]
+
+
+def test_a_single_sample_is_the_value(tmp_path):
+    assert arm(tmp_path, (7.0, 0.75)) == (pytest.approx(0.75), [])
+
+
+@pytest.mark.parametrize(("default", "used"), [(None, 0.75), (2.0, 2.0)])
+def test_samples_that_differ_are_told_with_the_value_that_is_used(tmp_path, default, used):
+    mass, notes = arm(tmp_path, (0.0, 0.75), (12.0, 3.0), default=default)
+    assert mass == pytest.approx(used)
+    (note,) = notes
+    assert note.startswith(f"{shots.FORE}.{MASS}: it is animated") and f"{used} is used" in note
+
+
+def read(tmp_path, edit):
+    return read_shot(str(write_arm(tmp_path / "arm.usda", edit)))[0]
+
+
+def move(stage, path: str, far: float) -> None:
+    op = UsdGeom.Xformable(stage.GetPrimAtPath(path)).AddTranslateOp(opSuffix="moved")
+    op.Set(Gf.Vec3d(0, 0, 0), 0)
+    op.Set(Gf.Vec3d(far, 0, 0), 12)
+
+
+@pytest.mark.parametrize("path", [BASE, "/Arm"])
+def test_a_moving_root_that_is_fixed_to_the_world_is_refused_with_the_prim_that_moves_it(tmp_path, path):
+    with pytest.raises(ShotError, match="holds it in the world") as caught:
+        read(tmp_path, lambda stage: move(stage, path, 0.1))
+    assert caught.value.path == path and "12" in caught.value.found and "kinematicEnabled" in caught.value.remedy
+
+
+def test_a_root_with_samples_that_stands_still_is_fine(tmp_path):
+    assert len(read(tmp_path, lambda stage: move(stage, "/Arm", 0.0)).bodies) == 3
+
+
+def test_baked_transforms_of_other_bodies_give_a_note(tmp_path):
+    character = read(tmp_path, lambda stage: move(stage, FORE, 0.5))
+    assert any(FORE in note and "drives alone" in note for note in character.notes)
