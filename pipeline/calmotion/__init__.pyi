@@ -1,5 +1,6 @@
 """Public names of `calmotion`: each is imported when it is first used."""
 
+from calmotion.cli.pages import write_page as write_page
 from calmotion.errors import ShotError as ShotError
 from calmotion.host.errors import SettingError as SettingError
 from calmotion.model.run import OutputPaths as OutputPaths

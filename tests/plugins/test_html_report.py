@@ -9,6 +9,7 @@ import json
 import re
 from pathlib import Path
 
+import calmotion as cm
 import numpy as np
 import pytest
 import synthetic
@@ -226,6 +227,16 @@ def test_the_command_writes_a_page_with_the_words_of_its_report(calmotion, tmp_p
     assert page_row in json.loads(manifest.read_text())["outputs"]
     done = calmotion("simulate", shot, "--html", shot)
     assert done.returncode == 2 and "never overwritten" in done.stderr
+
+
+def test_python_writes_the_page_of_the_command(calmotion, tmp_path):
+    shot = tmp_path / "shot.usda"
+    shot.write_text(ONE_HINGE)
+    calmotion("simulate", shot, "--html", tmp_path / "command.html")
+    assert cm.write_page(cm.simulate(shot), tmp_path / "python.html") == str(tmp_path / "python.html")
+    pages = [(tmp_path / f"{name}.html").read_text(encoding="utf-8") for name in ("command", "python")]
+    assert len({text.split('id="player"')[0] for text in pages}) == 1, "the same words"
+    assert len({script(text, "scene-arrays") for text in pages}) == 1, "the same motion"
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,9 @@ from calmotion.cli.tables import with_texts
 from calmotion.host import Host
 from calmotion.model.outputs import PageContent, Section, TextTable
 from calmotion.support.naming import as_written
-from calmotion.workflow.manifest import origin_of
-from calmotion.workflow.outputs import write_page
+from calmotion.workflow import outputs
+from calmotion.workflow.manifest import origin_of, origin_of_run
+from calmotion.workflow.results import SimulationResult
 
 NAMED = 3  # files in a title
 Printed = Mapping[str, Callable[[dict[str, Any], Console], None]]
@@ -51,6 +52,22 @@ def sections_of(report: Mapping[str, Any], printed: Printed) -> tuple[Section, .
     return tuple(sections)
 
 
+def write_page(result: SimulationResult, path: str | os.PathLike[str]) -> str:
+    """Write a result as one page for browsers, as `--html` does: the report, its curves, and the motions in 3D.
+
+    Returns:
+        The path.
+
+    Raises:
+        ShotError: It cannot be written, or the shot is read from this file.
+    """
+    from calmotion.cli.reports.run import SECTIONS
+
+    report = result.report()
+    title = f"{report['command']} {os.path.basename(result.shot.path)}"
+    return result.write_page(path, PageContent(title, sections_of(report, SECTIONS), origin_of_run(result)))
+
+
 def page_of_report(
     host: Host, path: str | None, report: Mapping[str, Any], printed: Printed, inputs: Mapping[str, str],
     plots: Sequence[tuple[str, Any]] = (),
@@ -70,4 +87,5 @@ def page_of_report(
     names = [os.path.basename(name) for name in inputs.values()]
     more = f" and {counted(len(names) - NAMED, 'more file')}" if len(names) > NAMED else ""
     title = f"{report['command']} {', '.join(names[:NAMED])}{more}"
-    return write_page(host, path, PageContent(title, sections_of(report, printed), origin_of(inputs), tuple(plots)))
+    content = PageContent(title, sections_of(report, printed), origin_of(inputs), tuple(plots))
+    return outputs.write_page(host, path, content)

@@ -84,23 +84,14 @@ def run_once(
         result = function(shot, verify=args.verify, outputs=_paths(args), **options)
     report = result.report()
     if args.html:
-        report["html"] = _page(result, report, args.html)
+        from calmotion.cli.pages import write_page
+
+        report["html"] = write_page(result, args.html)
     if args.manifest and not result.problems and not result.interrupted:
         from calmotion.workflow.manifest import write_manifest
 
         report["manifest"] = write_manifest(result, args.manifest)
     return result, report
-
-
-def _page(result: SimulationResult, report: dict[str, Any], path: str) -> str:
-    """Write the page of `--html`; its path."""
-    from calmotion.cli.pages import sections_of
-    from calmotion.cli.reports.run import SECTIONS
-    from calmotion.model.outputs import PageContent
-    from calmotion.workflow.manifest import origin_of_run
-
-    title = f"{report['command']} {os.path.basename(result.shot.path)}"
-    return result.write_page(path, PageContent(title, sections_of(report, SECTIONS), origin_of_run(result)))
 
 
 def status_of(result: SimulationResult, report: dict[str, Any], args: argparse.Namespace) -> int:
