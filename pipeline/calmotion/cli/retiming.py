@@ -38,11 +38,7 @@ def retime_settings(args: argparse.Namespace) -> dict[str, object]:
 
 
 def refuse_unused_retiming(args: argparse.Namespace) -> None:
-    """Refuse options of the tempo where it stays as it is.
-
-    Raises:
-        SettingError: There are some.
-    """
+    """Refuse options of the tempo where it stays as it is."""
     from calmotion.host import SettingError
 
     if args.retime is not None or any(text.startswith("retarget.optimize.retime=") for text in args.set):

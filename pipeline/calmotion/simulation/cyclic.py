@@ -101,11 +101,7 @@ def eased(angles: Array, rates: Array, world: Array, h: float) -> tuple[Array, A
 
 
 def refuse_open_loops(character: Character, animation: Animation) -> None:
-    """The last frame of a shot that loops must be its first again.
-
-    Raises:
-        ShotError: It is not.
-    """
+    """The last frame of a shot that loops must be its first again."""
     end = float(animation.frame_times[-1])
     for motor, tracks in zip(character.motors, zip(animation.tracks, animation.current, strict=True), strict=True):
         turning = character.joints[motor.joint].kind == "revolute"

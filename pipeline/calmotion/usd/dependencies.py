@@ -86,9 +86,6 @@ def refuse_place(path: str, named_by: str, attribute: str = "") -> None:
     Args:
         path: As it is authored or resolved.
         named_by: The layer or prim that names it.
-
-    Raises:
-        ShotError: It is one.
     """
     reason = forbidden_place(path)
     if reason is not None:

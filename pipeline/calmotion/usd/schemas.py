@@ -98,11 +98,7 @@ def value(prim: Usd.Prim, schema: str, attribute: str, time: float | None = None
 
 
 def require(holds: bool, prim: Usd.Prim, attribute: str, found: object, problem: str, remedy: str = CORRECT) -> None:
-    """Refuse what was found in an attribute, unless it keeps a rule.
-
-    Raises:
-        ShotError: It does not.
-    """
+    """Refuse what was found in an attribute, unless it keeps a rule."""
     if not holds:
         raise ShotError(problem, path=str(prim.GetPath()), attribute=attribute, found=found, remedy=remedy)
 

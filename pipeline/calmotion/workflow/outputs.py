@@ -58,9 +58,6 @@ def refuse_overwriting(inputs: Mapping[str, str], files: Mapping[str, str]) -> N
     Args:
         inputs: Files that are read, by what they are: `the shot`.
         files: Files that are written, by their options.
-
-    Raises:
-        SettingError: One is.
     """
     from calmotion.usd.writing.root import root_path
 
@@ -92,9 +89,6 @@ def refuse_layers(shot: str, provenance: Provenance, character: Character | None
         provenance: With its layers.
         character: With the mesh files of its bodies, where it was read.
         files: Files that are written, by their options.
-
-    Raises:
-        SettingError: One is.
     """
     folder = os.path.dirname(os.path.realpath(shot))
     read = {os.path.join(folder, layer.path): "layer" for layer in provenance.layers}
@@ -117,11 +111,7 @@ def _is_same(one: str, other: str) -> bool:
 
 
 def refuse_other_types(outputs: object) -> None:
-    """Refuse outputs that are named in another way.
-
-    Raises:
-        SettingError: They are.
-    """
+    """Refuse outputs that are named in another way."""
     if not isinstance(outputs, OutputPaths):
         raise SettingError(
             "must be OutputPaths", path="outputs", found=repr(outputs)[:80],
@@ -180,11 +170,7 @@ def write_page(host: Host, page: str, content: PageContent) -> str:
 
 
 def refuse_unwritable(file: str) -> None:
-    """Refuse a file that cannot be written.
-
-    Raises:
-        ShotError: It cannot.
-    """
+    """Refuse a file that cannot be written."""
     try:
         try_writing(file)
     except OSError as error:

@@ -241,11 +241,7 @@ def _made_by(host: Host, operators: Sequence[str]) -> list[type]:
 
 
 def _refuse_unknown_methods(source: Source) -> None:
-    """Refuse an integrator or an input shaper that the command does not have, before anything costly.
-
-    Raises:
-        SettingError: It has none of this name.
-    """
+    """Refuse an integrator or an input shaper that the command does not have, before anything costly."""
     integrators = ("bdf2",) if source.command == "optimize" else INTEGRATORS
     for option, found, known in (
         ("--integrator", source.settings.integrator, integrators), ("--shaper", source.shaper, SHAPERS),
@@ -260,11 +256,7 @@ def _refuse_unknown_methods(source: Source) -> None:
 
 
 def _refuse_unreadable_motion(source: Source, host: Host) -> None:
-    """Refuse a motion that no plugin reads, before anything costly.
-
-    Raises:
-        SettingError: None does.
-    """
+    """Refuse a motion that no plugin reads, before anything costly."""
     from calmotion.model import MotorTracks
 
     readers = host.providers(MotorTracks)

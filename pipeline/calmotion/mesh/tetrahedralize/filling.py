@@ -157,11 +157,7 @@ def _detailed(attempt: _Attempt, solid: Solid, shape: Shape, size: float, longer
 
 
 def _refuse_hopeless(attempt: _Attempt, path: str, time: ProcessorTime) -> None:
-    """Refuse a surface that is too detailed still, before the time is spent.
-
-    Raises:
-        OutOfTime: It is.
-    """
+    """Refuse a surface that is too detailed still, before the time is spent."""
     least = _TRIANGLE * len(attempt.triangles)
     if attempt.detailed and least > _FIRST_DENSE * time.limit:
         raise OutOfTime(

@@ -132,11 +132,7 @@ def _improvement(points: np.ndarray, triangles: np.ndarray, element_size: float)
 
 
 def _refuse_hopeless(key: str, size: str, path: str, time: ProcessorTime) -> None:
-    """Refuse a mesh that has already taken as much time as there is: every shot of a robot would try it again.
-
-    Raises:
-        OutOfTime: It has.
-    """
+    """Refuse a mesh that has already taken as much time as there is: every shot of a robot would try it again."""
     taken = _stored(key, "seconds")
     if taken is not None and taken[0].shape == () and float(taken[0]) >= time.limit - time.used:
         raise _out_of_time(size, path, time)

@@ -88,11 +88,7 @@ def refuse_unsupported(character: Character, animation: Animation, options: RunS
 
 
 def _refuse_tolerance(character: Character, options: RunSettings) -> None:
-    """A tolerance must be above the rounding of positions, and within the character.
-
-    Raises:
-        ShotError: It is not.
-    """
+    """A tolerance must be above the rounding of positions, and within the character."""
     tolerance = options.tolerance if options.tolerance is not None else character.retarget.tolerance
     if tolerance is None:
         return
@@ -116,9 +112,6 @@ def refuse_half_turns(character: Character, grid: TimeGrid, angles: Array) -> No
     Args:
         character: With the motors.
         angles: Of the motors, shape [T, M].
-
-    Raises:
-        ShotError: One does.
     """
     if len(angles) > 1:
         _refuse_turns(character, np.abs(np.diff(angles, axis=0)), grid.times, grid.h)

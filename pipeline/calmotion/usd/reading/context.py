@@ -132,9 +132,6 @@ def refuse_without_transform(prim: Usd.Prim, what: str) -> None:
 
     Args:
         what: It stands for, such as `a target`.
-
-    Raises:
-        ShotError: It is no UsdGeomXformable.
     """
     from pxr import UsdGeom
 

@@ -120,9 +120,6 @@ def refuse_options(options: WriteOptions, motors: Sequence[Motor], seconds: floa
         options: How curves are written.
         motors: Those whose curves may be.
         seconds: Length of the shot [s].
-
-    Raises:
-        ShotError: They do not.
     """
     if options.splines and options.samples_per_second is not None:
         raise ShotError(

@@ -70,9 +70,6 @@ def refuse_foreign_root(layer: str) -> None:
 
     Args:
         layer: The layer of overs, not yet written.
-
-    Raises:
-        ShotError: There is such a file.
     """
     path = root_path(layer)
     if not os.path.isfile(path):

@@ -91,9 +91,6 @@ def refuse_held_twice(prims: Mapping[str, Usd.Prim], joints: Sequence[JointPrim]
     Args:
         prims: Of the bodies, by path.
         stiff: Paths of the joints that leave nothing free: with motors that follow their curves exactly.
-
-    Raises:
-        ShotError: There is one.
     """
     attached = {joint.body1 for joint in joints if joint.body0 == ""}
     kinematic = [path for path, prim in prims.items() if path not in attached and prim.GetAttribute(_KINEMATIC).Get()]
@@ -134,9 +131,6 @@ def refuse_lost_bodies(reading: Reading, bodies: list[str], joints: Sequence[Joi
 
     Args:
         bodies: Paths of the bodies.
-
-    Raises:
-        ShotError: There is one.
     """
     for joint in joints:
         prim = world_side_prim(reading, joint) if joint.body0 == "" else None

@@ -86,9 +86,6 @@ def refuse_unused_animation(
         joints: Those that connect bodies.
         driven: Paths of those that are motors.
         given: Paths of those whose tracks are given beside the shot.
-
-    Raises:
-        ShotError: There is one.
     """
     by_path: dict[str, list[JointPrim]] = {}
     for joint in joints:
