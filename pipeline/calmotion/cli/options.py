@@ -71,10 +71,11 @@ def shot_arguments(command: argparse.ArgumentParser, optional: bool = False) -> 
 def html_option(command: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     """Add `--html`."""
     command.add_argument(
-        "--html", metavar="FILE",
+        "--html",
+        metavar="FILE",
         help="write one page for browsers, with the report, its curves and, for a motion, a 3D player; it needs no "
         "network",
-    )  # fmt: skip
+    )
 
 
 def plugin_option(command: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
@@ -110,13 +111,15 @@ def run_options(command: argparse.ArgumentParser) -> None:
     outputs.add_argument("--video", metavar="FILE", help="write a video (.webp, or .mp4 where ffmpeg is installed)")
     html_option(outputs)
     outputs.add_argument(
-        "--manifest", metavar="FILE",
+        "--manifest",
+        metavar="FILE",
         help="write a manifest (JSON): inputs and outputs with hashes, versions, settings, verdict",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "--motion", metavar="FILE",
+        "--motion",
+        metavar="FILE",
         help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
-    )  # fmt: skip
+    )
     command.add_argument(
         "--verbose", action="store_true", help="also print the search, the steps, the error budget and all notes"
     )
@@ -154,9 +157,11 @@ def simulation_options(command: argparse.ArgumentParser, integrators: str) -> No
         help="time before the first frame in which the robot eases into the motion (default: automatic)",
     )
     model.add_argument(
-        "--motors", choices=("authored", "ideal"), default="authored",
+        "--motors",
+        choices=("authored", "ideal"),
+        default="authored",
         help="ideal: joints follow their curves exactly, whatever calm:motor:model says (default: authored)",
-    )  # fmt: skip
+    )
     meanings = "; ".join(f"{kind}: {meaning}" for kind, meaning in MEANINGS.items())
     group = command.add_argument_group(
         "model simplification", f"By default the tolerance decides. Kinds: {meanings}; all: all of these."

@@ -19,13 +19,16 @@ def retime_options(command: argparse.ArgumentParser) -> None:
         "seconds, with an s) whose distances stay as they are",
     )  # fmt: skip
     group.add_argument(
-        "--pin", metavar="FILE", type=_pins,
+        "--pin",
+        metavar="FILE",
+        type=_pins,
         help=f"CSV file of such times, in its column {' or '.join(PIN_COLUMNS)}, or its only column of time codes",
-    )  # fmt: skip
+    )
     group.add_argument(
-        "--retime-scene", choices=("yes", "no"),
+        "--retime-scene",
+        choices=("yes", "no"),
         help="whether cameras, props and sounds follow the tempo (default: yes)",
-    )  # fmt: skip
+    )
 
 
 def retime_settings(args: argparse.Namespace) -> dict[str, object]:
@@ -45,9 +48,7 @@ def refuse_unused_retiming(args: argparse.Namespace) -> None:
         return
     for option, value in (("--pin", args.pin), ("--retime-scene", args.retime_scene)):
         if value is not None:
-            raise SettingError(
-                "the tempo stays as it is", path=option, remedy=f"Add --retime, or leave {option} out."
-            )  # fmt: skip
+            raise SettingError("the tempo stays as it is", path=option, remedy=f"Add --retime, or leave {option} out.")
 
 
 def _tempo(text: str) -> dict[str, object]:

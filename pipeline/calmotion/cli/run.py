@@ -58,16 +58,19 @@ def shot_to_run(args: argparse.Namespace) -> Shot:
     refuse_overwriting(shot.inputs, files_of(_paths(args)) | manifest)
     if args.manifest and not _may_be_manifest(args.manifest):
         raise SettingError(
-            "the file that is there is no manifest, and is never changed", path="--manifest", found=args.manifest,
+            "the file that is there is no manifest, and is never changed",
+            path="--manifest",
+            found=args.manifest,
             remedy="Choose another.",
-        )  # fmt: skip
+        )
     of_layer = {"--bake": args.bake, "--samples-per-second": args.samples_per_second, "--splines": args.splines}
     unused = [option for option, value in of_layer.items() if value]
     if unused and not args.output:
         raise SettingError(
-            "this option says how the layer is written, and no layer is", path=unused[0],
+            "this option says how the layer is written, and no layer is",
+            path=unused[0],
             remedy=f"Name one with -o, or leave {unused[0]} out.",
-        )  # fmt: skip
+        )
     return shot
 
 

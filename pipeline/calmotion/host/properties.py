@@ -98,9 +98,11 @@ def quantity_of(value: float | str | None, unit: str, name: str = "") -> float |
         value = parse_quantity(value, unit)
     elif value is not None and (isinstance(value, bool) or not isinstance(value, Real)):
         raise SettingError(
-            "must be a number or a text", path=name, found=repr(value),
+            "must be a number or a text",
+            path=name,
+            found=repr(value),
             remedy=f"Write a number, in {unit}, or a text with a unit.",
-        )  # fmt: skip
+        )
     if value is not None and not math.isfinite(value):
         raise SettingError("must be finite", path=name, found=value, remedy="Write another number, or leave it out.")
     return None if value is None else float(value)

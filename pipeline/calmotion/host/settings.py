@@ -25,14 +25,18 @@ def read_settings_file(path: str | Path) -> Settings:
         tree = read_toml(path)
     except OSError as error:
         raise SettingError(
-            "the settings file cannot be read", path=str(path), found=error.strerror,
+            "the settings file cannot be read",
+            path=str(path),
+            found=error.strerror,
             remedy="Name a TOML file with a table for each operator, such as [fe.mesh].",
-        ) from error  # fmt: skip
+        ) from error
     except ValueError as error:
         raise SettingError(
-            "the settings file is not valid TOML", path=str(path), found=error,
+            "the settings file is not valid TOML",
+            path=str(path),
+            found=error,
             remedy=remedy_for(path) or "Correct it there; a table is [fe.mesh], and a line in it element_size = '5mm'.",
-        ) from error  # fmt: skip
+        ) from error
     return merge(_flat(tree, (), str(path)))
 
 

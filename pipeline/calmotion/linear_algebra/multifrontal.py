@@ -181,10 +181,11 @@ def _require_memory(entries: int, nodes: int) -> None:
     needed, free = _OF_AN_ENTRY * entries, available_memory()
     if needed > free:
         raise FactorsTooLarge(
-            f"there is not enough memory for a mesh of {nodes} nodes", attribute="calm:flexible:elementSize",
+            f"there is not enough memory for a mesh of {nodes} nodes",
+            attribute="calm:flexible:elementSize",
             found=f"{needed / 1e9:.1f} GB are needed, {free / 1e9:.1f} GB can be taken",
             remedy="Author a larger calm:flexible:elementSize, end other programs, or use a machine with more memory.",
-        )  # fmt: skip
+        )
 
 
 def _borders(graph: Any, dissection: Dissection) -> list[Any]:

@@ -92,10 +92,12 @@ def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArr
     tets = np.array(tets, dtype=np.int32).reshape(-1, 4)
     if len(points) > MOST_POINTS:
         raise ShotError(
-            "the mesh has too many points", path=path, attribute="points",
+            "the mesh has too many points",
+            path=path,
+            attribute="points",
             found=f"{len(points)}, at most {MOST_POINTS}",
             remedy="Author a coarser TetMesh, or remove it so that a closed Mesh is tetrahedralised",
-        )  # fmt: skip
+        )
     remedy = "Author a TetMesh with valid elements, or remove it so that a closed Mesh is tetrahedralised"
     if len(tets) == 0:
         raise ShotError("the mesh has no tetrahedra", path=path, found=0, remedy=remedy)
@@ -111,8 +113,10 @@ def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArr
         element = int(np.flatnonzero(flat)[0])
         raise ShotError(
             "a tetrahedron has no volume",
-            path=path, found=f"element {element}, {volumes[element]:.3g} m^3", remedy=remedy,
-        )  # fmt: skip
+            path=path,
+            found=f"element {element}, {volumes[element]:.3g} m^3",
+            remedy=remedy,
+        )
     inverted = volumes < 0.0
     tets[inverted] = tets[inverted][:, [0, 2, 1, 3]]
     return tets, int(inverted.sum())
@@ -145,8 +149,10 @@ def refuse_bad_neighbours(tets: IntArray, path: str) -> None:
         one, other = sorted(order[[twice[0], twice[0] + 1]] // 4)
         raise ShotError(
             "two tetrahedra fill the same place, whose mass and stiffness would count twice",
-            path=path, found=f"elements {one} and {other}", remedy="Remove one of them, or author the mesh again",
-        )  # fmt: skip
+            path=path,
+            found=f"elements {one} and {other}",
+            remedy="Remove one of them, or author the mesh again",
+        )
     pairs = order[np.flatnonzero(same)] // 4, order[np.flatnonzero(same) + 1] // 4
     count = len(tets)
     graph = coo_matrix((np.ones(len(pairs[0])), pairs), shape=(count, count))
@@ -160,9 +166,10 @@ def refuse_bad_neighbours(tets: IntArray, path: str) -> None:
     if count > 1:
         raise ShotError(
             "parts of its tetrahedra are connected by points or edges only, about which they would turn freely",
-            path=path, found=f"{count} parts",
+            path=path,
+            found=f"{count} parts",
             remedy="Join the parts by common faces, or split them into several bodies",
-        )  # fmt: skip
+        )
 
 
 def without_unused_points(points: Array, tets: IntArray) -> tuple[Array, IntArray]:

@@ -208,10 +208,11 @@ def retimed(animation: Animation, tempo: TimeMap, frame_times: Array) -> Animati
 def with_contacts_at(character: Character, tempo: TimeMap) -> Character:
     """The character whose feet come and go at a tempo."""
     joints = tuple(
-        joint if joint.contact is None
+        joint
+        if joint.contact is None
         else replace(joint, contact=replace(joint.contact, times=tempo.performed(joint.contact.times)))
         for joint in character.joints
-    )  # fmt: skip
+    )
     return replace(character, joints=joints)
 
 

@@ -48,9 +48,11 @@ def read_recordings(host: Host, names: Sequence[str], settings: Settings) -> tup
         if os.path.exists(request.file) and not able:
             suffixes = sorted({suffix for cls in readers(host) for suffix in cls.suffixes})
             raise SettingError(
-                "no plugin reads this recording", path="--recording", found=request.file,
+                "no plugin reads this recording",
+                path="--recording",
+                found=request.file,
                 remedy=f"Use a file that ends in {', '.join(suffixes)}, or a plugin with a reader (--plugins).",
-            )  # fmt: skip
+            )
         if not os.path.isfile(request.file):
             raise SettingError(
                 "the recording does not exist", path="--recording", found=request.file, remedy="Check the path."

@@ -263,9 +263,11 @@ def _with_error(mesh: FEMesh, factor: float, error: float) -> FEMesh:
     """The mesh with a factor of its stiffness and the error of its compliance, to which that of its volume is added."""
     by_volume = 2.0 * abs(mesh.quality.volume_error)  # the stiffness of a rod goes with its section squared
     quality = replace(
-        mesh.quality, frequency_error=0.5 * (error + by_volume), stiffness_factor=factor,
+        mesh.quality,
+        frequency_error=0.5 * (error + by_volume),
+        stiffness_factor=factor,
         min_dihedral_deg=min_dihedral_deg(mesh.points, mesh.tets),
-    )  # fmt: skip
+    )
     return replace(mesh, quality=quality)
 
 
@@ -278,7 +280,9 @@ def _largest(indicators: Array, share: float) -> Indices:
 
 def _nothing_free(body: Body, mesh: FEMesh) -> ShotError:
     return ShotError(
-        "its parent joint holds all of the mesh, so that nothing of it can bend", path=body.path,
-        attribute="calm:flexible:interfaceRadius", found=f"{len(mesh.tets)} tetrahedra",
+        "its parent joint holds all of the mesh, so that nothing of it can bend",
+        path=body.path,
+        attribute="calm:flexible:interfaceRadius",
+        found=f"{len(mesh.tets)} tetrahedra",
         remedy="Use a finer mesh or a smaller interface, or set calm:flexible:enabled to false.",
-    )  # fmt: skip
+    )

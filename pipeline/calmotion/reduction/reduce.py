@@ -155,8 +155,9 @@ def full_body(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], 
     if root_patch is None:
         raise ShotError(
             "no joint connects this flexible body to a parent",
-            path=body.path, remedy="Connect it to its parent or to the world by a PhysicsJoint",
-        )  # fmt: skip
+            path=body.path,
+            remedy="Connect it to its parent or to the world by a PhysicsJoint",
+        )
     moving = [patch for patch in patches if patch is not root_patch]
     centers = [attachments[patch.attachments[0]].frame.position for patch in moving]
     support = Support(root_patch.nodes, [patch.nodes for patch in moving], centers)

@@ -189,7 +189,9 @@ def _metric(problem: RetargetProblem) -> csr_matrix:
     spline, motors = space.basis.values, gram.shape[1]
     parts = [
         kron(spline.T @ diags(gram[:, a, b]) @ spline, csr_matrix(([1.0], ([a], [b])), shape=(motors, motors)))
-        for a in range(motors) for b in range(motors) if np.any(gram[:, a, b])
-    ]  # fmt: skip
+        for a in range(motors)
+        for b in range(motors)
+        if np.any(gram[:, a, b])
+    ]
     regularized = kron(space.penalty, eye(motors))
     return csr_matrix(sum(parts, start=csr_matrix(regularized)))

@@ -71,9 +71,7 @@ def optimize_shot(
         if scenarios:
             problem = problem.for_robots(robots_of(prepared, problem, scenarios, options))
         progress(0.0, "loading kernels (compiled in the first run)")
-        compile_kernels(
-            model, Workspace.for_system(model.system), curves.angles, curves.rates, grid.h, prepared.world
-        )  # fmt: skip
+        compile_kernels(model, Workspace.for_system(model.system), curves.angles, curves.rates, grid.h, prepared.world)
         return _optimized(prepared, (problem, start, adaptive), intended, options, progress, checkpoint, memory)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure

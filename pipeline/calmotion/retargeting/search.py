@@ -241,9 +241,7 @@ class RetargetSearch:
         space = self.problem.space
         basis = space.basis.on(self.problem.grid, breaks)
         # fixed coefficients stay exactly zero
-        x = np.where(
-            self.locked_on(basis), 0.0, converted(space.basis, basis, self.search.x, len(space.motors))
-        )  # fmt: skip
+        x = np.where(self.locked_on(basis), 0.0, converted(space.basis, basis, self.search.x, len(space.motors)))
         self.problem, self.search = self.problem.on_basis(basis), _restarted(self.search, x)
         return True
 
@@ -270,9 +268,7 @@ class RetargetSearch:
             return
         fixed = fixed | dropped
         begin = replace(search, x=np.where(fixed, 0.0, search.x), reason="", radius=np.inf)
-        pruned = minimize(
-            problem, begin, fixed, self._least, max_iterations=self.options.max_iterations + 3
-        )  # fmt: skip
+        pruned = minimize(problem, begin, fixed, self._least, max_iterations=self.options.max_iterations + 3)
         limits = pruned.at.problem.limits
         kept = (limits is None or limits.kept(pruned.at.limited)) and self._reached(at) <= self._reached(pruned.at)
         if kept and pruned.at.merit <= at.merit + 2.0 * budget:

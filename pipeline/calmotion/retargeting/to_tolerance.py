@@ -177,9 +177,7 @@ def _complete_run(
     return projected.complete_run(tracks, max(result.step_s, own_step(projected.shot.character, options)))
 
 
-def _is_accurate(
-    projected: ProjectedShot, tracks: tuple[Track, ...], result: Result, options: RunSettings
-) -> bool:  # fmt: skip
+def _is_accurate(projected: ProjectedShot, tracks: tuple[Track, ...], result: Result, options: RunSettings) -> bool:
     """Whether the subspaces of almost the same motion do for the curves that were found; if not, they are chosen anew.
 
     More directions tell, and all of them only where these do not do.

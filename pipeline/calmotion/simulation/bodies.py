@@ -93,7 +93,7 @@ def reduce_bodies(
     rigid = (
         rigid_body(body, own) if index not in result else result[index]
         for index, (body, own) in enumerate(zip(character.bodies, anchors, strict=True))
-    )  # fmt: skip
+    )
     return _damped(character, tree, list(rigid))
 
 

@@ -36,7 +36,7 @@ class SteadyState:
 
     def __init__(
         self, model: Model, world: Array | None, h: float, workspace: Workspace, start: Sequence[State] | None = None
-    ):  # fmt: skip
+    ):
         self.model, self.world, self.h, self._workspace = model, world, h, workspace
         self._start = start
         self.known: Monodromy | None = None  # the derivative of a loop nearby

@@ -64,7 +64,7 @@ def static_motion(
     ws, joint_angles = Workspace.for_system(model.system), model.joint_angles(angles)
     intended = IntendedMotion(
         rigid.c.copy(), rigid.q.copy(), rigid.target_positions.copy(), rigid.target_rotations.copy()
-    )  # fmt: skip
+    )
     state: State | None = None
     for n in np.flatnonzero(judged):
         if state is None:

@@ -123,9 +123,11 @@ def at_instants(simulation: Simulation, rows: slice) -> Simulation:
         known(motion.joint_forces), known(motion.joint_moments),
     )  # fmt: skip
     return replace(
-        simulation, motion=kept, position_errors=cut(simulation.position_errors),
+        simulation,
+        motion=kept,
+        position_errors=cut(simulation.position_errors),
         rotation_errors=cut(simulation.rotation_errors),
-    )  # fmt: skip
+    )
 
 
 def _sag(prepared: Prepared, run: ForwardRun, errors: Array) -> Array:
@@ -166,9 +168,11 @@ def _unheld_rows(prepared: Prepared) -> list[Simplification]:
 
 
 def limit_uses(
-    before: Sequence[Excess], after: Sequence[Excess], grid: TimeGrid,
+    before: Sequence[Excess],
+    after: Sequence[Excess],
+    grid: TimeGrid,
     costs: Mapping[tuple[int, str], float] | None = None,
-) -> tuple[LimitUse, ...]:  # fmt: skip
+) -> tuple[LimitUse, ...]:
     """The limits of the motors as values for the user.
 
     Args:

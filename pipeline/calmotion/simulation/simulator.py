@@ -190,7 +190,7 @@ class Simulator:
         joint_angles, joint_rates = followed_by_joints
         trajectory = simulate_from(
             self.model.system, known.trajectory, first, joint_angles, joint_rates, self._workspace
-        )  # fmt: skip
+        )
         states = trajectory.states
         positions, rotations = target_frames(self.model, states.c[first:], states.q[first:], states.u[first:])
         return ForwardRun(

@@ -13,14 +13,17 @@ from calmotion.arrays import Array
 
 TIME_UNITS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _WORDS = {
-    "s": "s sec secs second seconds", "ms": "ms msec msecs millis millisec millisecs millisecond milliseconds",
+    "s": "s sec secs second seconds",
+    "ms": "ms msec msecs millis millisec millisecs millisecond milliseconds",
     "us": "us usec usecs \u00b5s \u03bcs micros microsec microsecs microsecond microseconds",
     "ns": "ns nsec nsecs nanos nanosec nanosecs nanosecond nanoseconds",
-}  # fmt: skip
+}
 _UNIT_OF = {word: unit for unit, words in _WORDS.items() for word in words.split()}
 _TIMES = set("t time times ts timestamp timestamps stamp stamps clock elapsed timecode date datetime".split())
-_BESIDE = set("header field ros rosbag bag sim simulation wall system log since start epoch unix data msg in of the "
-              "robot relative rel absolute abs measured elapsed gps utc host device recording".split())  # fmt: skip
+_BESIDE = set(
+    "header field ros rosbag bag sim simulation wall system log since start epoch unix data msg in of the "
+    "robot relative rel absolute abs measured elapsed gps utc host device recording".split()
+)
 _COUNTERS = set("frame frames index idx step row sample seq sequence tick count no nr id unnamed field header".split())
 _PARTS = set("episode task chunk subtask".split())  # of a data set, which number a whole recording (LeRobot)
 _CLOCK_TIME = re.compile(

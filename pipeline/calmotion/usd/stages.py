@@ -96,9 +96,11 @@ def open_layer(path: str) -> Sdf.Layer:
 
     if os.path.islink(path) and not os.path.exists(path):
         raise ShotError(
-            "this is a symbolic link to a file that does not exist", path=path, found=os.readlink(path),
+            "this is a symbolic link to a file that does not exist",
+            path=path,
+            found=os.readlink(path),
             remedy="Correct the link, or name the file itself",
-        )  # fmt: skip
+        )
     if not os.path.exists(path):
         raise ShotError(
             "the file does not exist", path=path or "SHOT", remedy=f"{_nearest_file(path)}Check the path of the shot"
@@ -145,9 +147,11 @@ def open_stage(path: str, *, muted: tuple[str, ...] = ()) -> Usd.Stage:
             stage = Usd.Stage.Open(layer, Usd.Stage.LoadAll)
         except Tf.ErrorException as error:
             raise ShotError(
-                "USD cannot compose the shot", path=path, found=one_line(_message(error)) or None,
+                "USD cannot compose the shot",
+                path=path,
+                found=one_line(_message(error)) or None,
                 remedy="Correct the file that it names; usdview shows where",
-            ) from error  # fmt: skip
+            ) from error
         del kept  # the stage has them now
         # USD keeps layers that were opened earlier in this process; take what is on disk now.
         for used in stage.GetUsedLayers():
@@ -172,9 +176,11 @@ def _reload(layer: Sdf.Layer) -> None:
         layer.Reload()
     except Tf.ErrorException as error:
         raise ShotError(
-            "this is not a USD file any more, or it is damaged", path=layer.realPath,
-            found=one_line(_message(error)) or None, remedy="Correct the file, or write it again",
-        ) from error  # fmt: skip
+            "this is not a USD file any more, or it is damaged",
+            path=layer.realPath,
+            found=one_line(_message(error)) or None,
+            remedy="Correct the file, or write it again",
+        ) from error
 
 
 def _merged(errors: list[ShotError]) -> list[ShotError]:

@@ -123,11 +123,13 @@ def other_units(stage: Usd.Stage, prims: Iterable[Usd.Prim]) -> list[ShotError]:
             of_stage = "" if root.pseudoRoot.HasInfo(name) else " (the default of USD)"
             found.append(
                 ShotError(
-                    f"the robot comes from a layer with another {name} than the shot", path=root.GetDisplayName(),
-                    attribute=name, found=f"{there} in {layer.GetDisplayName()}, {here} in the root layer{of_stage}",
+                    f"the robot comes from a layer with another {name} than the shot",
+                    path=root.GetDisplayName(),
+                    attribute=name,
+                    found=f"{there} in {layer.GetDisplayName()}, {here} in the root layer{of_stage}",
                     remedy=f"Author {name} = {there} in the root layer, unless all values of the robot, with its "
                     "masses and materials, suit that of the shot",
                 )
-            )  # fmt: skip
+            )
             break
     return found

@@ -80,9 +80,7 @@ class Hits:
             return np.asarray(1.0 / self.nearness.astype(float))
 
 
-def rasterize(
-    corners: Array, width: int, height: int, *, both_sides: bool = False, before: Hits | None = None
-) -> Hits:  # fmt: skip
+def rasterize(corners: Array, width: int, height: int, *, both_sides: bool = False, before: Hits | None = None) -> Hits:
     """Find the nearest triangle in each pixel.
 
     Args:

@@ -135,9 +135,10 @@ def scene(model: Model, motion: Motion, row: int) -> tuple[Array, Array, IntArra
     """The same of the scenery, and of the bodies at one row after it."""
     still, bodies = model.still, pose(model, motion, row)
     return (
-        np.concatenate([still[0], bodies[0]]), np.concatenate([still[1], bodies[1]]),
+        np.concatenate([still[0], bodies[0]]),
+        np.concatenate([still[1], bodies[1]]),
         np.concatenate([still[2], bodies[2]]),
-    )  # fmt: skip
+    )
 
 
 def fit_camera(view: Viewpoint, cloud: Array, width: int, height: int, margin: float = 0.04) -> Camera:

@@ -269,9 +269,11 @@ def _tempo(retime: bool | Mapping[str, Any]) -> Settings:
     unknown = set(given) - {"slowest", "fastest"}
     if unknown:
         raise SettingError(
-            "this is no setting of the tempo", path="retime", found=", ".join(sorted(unknown)),
+            "this is no setting of the tempo",
+            path="retime",
+            found=", ".join(sorted(unknown)),
             remedy="Use slowest, fastest and pin.",
-        )  # fmt: skip
+        )
     pinned = {"pinned": ",".join(str(pin) for pin in pins)} if len(pins) else {}
     return {"retarget.optimize": {"retime": True} | given | pinned}
 
@@ -285,9 +287,11 @@ def _forced(keep: Sequence[str], leave_out: Sequence[str]) -> Settings:
     keep, leave_out = ((kinds,) if isinstance(kinds, str) else kinds for kinds in (keep, leave_out))
     for kind in set(keep) & set(leave_out):
         raise SettingError(
-            "simplifications of one kind cannot be both made and not made", path="--keep, --leave-out", found=kind,
+            "simplifications of one kind cannot be both made and not made",
+            path="--keep, --leave-out",
+            found=kind,
             remedy="Leave one of them out.",
-        )  # fmt: skip
+        )
     forced: dict[str, object] = {}
     for given, choice in ((leave_out, OFF), (keep, ON)):
         forced |= {kind: choice for name in given for kind in (KINDS if name == "all" else (name,))}

@@ -207,9 +207,11 @@ def _expected(character: Character, animation: Animation) -> dict[str, float]:
 
     cost = expected_cost(character, animation, RunSettings(), True)
     return {
-        "duration_s": float(animation.frame_times[-1]), "steps": cost.steps, "memory_gb": cost.memory / 1e9,
+        "duration_s": float(animation.frame_times[-1]),
+        "steps": cost.steps,
+        "memory_gb": cost.memory / 1e9,
         "hours": cost.hours,
-    }  # fmt: skip
+    }
 
 
 def _without(

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 def publishing_problems(
     manifest: str | os.PathLike[str], *, strict: bool = True, plugins: Sequence[str] = ()
-) -> list[ShotError]:  # fmt: skip
+) -> list[ShotError]:
     """Why a result must not be published; empty where it may be.
 
     Args:
@@ -56,9 +56,10 @@ def _of_verdict(verdict: dict[str, Any], manifest: dict[str, Any], path: str) ->
         problems.append(ShotError("the result has no layer", path=path, remedy="Run `calmotion optimize` with -o"))
     if verdict.get("tolerance_kept") is not True:
         refuse(
-            "the simulation does not keep the tolerance", "tolerance_kept",
+            "the simulation does not keep the tolerance",
+            "tolerance_kept",
             "Raise --tolerance, or see the error budget (--verbose)",
-        )  # fmt: skip
+        )
     if verdict.get("interrupted"):
         refuse("the search was interrupted", "interrupted", "Run the same command again: it resumes")
     if verdict.get("improved") is False:
@@ -186,16 +187,20 @@ def read_manifest(path: str | os.PathLike[str]) -> dict[str, Any]:
         found: Any = json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise ShotError(
-            "the manifest cannot be read", path=str(path), found=getattr(error, "strerror", None) or error,
+            "the manifest cannot be read",
+            path=str(path),
+            found=getattr(error, "strerror", None) or error,
             remedy="Write the result again with --manifest",
-        ) from error  # fmt: skip
+        ) from error
     wrong = [key for key, kind in _KEYS.items() if not isinstance(found, dict) or not isinstance(found.get(key), kind)]
     rows = [] if wrong else [*found["inputs"], *found["outputs"]]
     if wrong or found["format"] != FORMAT or not all(_is_row(row) for row in rows):
         raise ShotError(
-            "this is no manifest of a result", path=str(path), found=f"no {wrong[0]}" if wrong else None,
+            "this is no manifest of a result",
+            path=str(path),
+            found=f"no {wrong[0]}" if wrong else None,
             remedy="Name a file that --manifest wrote",
-        )  # fmt: skip
+        )
     manifest: dict[str, Any] = found
     return manifest
 
@@ -217,9 +222,7 @@ def changed_files(manifest: Mapping[str, Any], folder: str | os.PathLike[str]) -
             if digest == row["sha256"]:
                 continue
             problem = "is missing" if digest is None else "has changed since the result was made"
-            found.append(
-                ShotError(f"this {row['role']} {problem}", path=str(path), found=digest, remedy=remedy)
-            )  # fmt: skip
+            found.append(ShotError(f"this {row['role']} {problem}", path=str(path), found=digest, remedy=remedy))
     return found
 
 

@@ -47,9 +47,11 @@ def prepare_outputs(inputs: Mapping[str, str], outputs: OutputPaths) -> None:
             try_writing(Path(path) / "file" if option in _FOLDERS else path)
         except OSError as error:
             raise SettingError(
-                "this output cannot be written", path=option, found=f"{path}: {error.strerror}",
+                "this output cannot be written",
+                path=option,
+                found=f"{path}: {error.strerror}",
                 remedy="Choose another.",
-            ) from error  # fmt: skip
+            ) from error
 
 
 def refuse_overwriting(inputs: Mapping[str, str], files: Mapping[str, str]) -> None:
@@ -72,9 +74,11 @@ def refuse_overwriting(inputs: Mapping[str, str], files: Mapping[str, str]) -> N
         for what, name in inputs.items():
             if _is_same(path, name):
                 raise SettingError(
-                    f"this file is read as {what}, and what is read is never overwritten", path=option, found=path,
+                    f"this file is read as {what}, and what is read is never overwritten",
+                    path=option,
+                    found=path,
                     remedy="Choose another.",
-                )  # fmt: skip
+                )
 
 
 def _on_all_systems(path: str) -> str:
@@ -98,9 +102,11 @@ def refuse_layers(shot: str, provenance: Provenance, character: Character | None
         for file, kind in read.items():
             if os.path.exists(file) and _is_same(path, file):
                 raise SettingError(
-                    f"this file is a {kind} of the shot, which is never overwritten", path=option, found=path,
+                    f"this file is a {kind} of the shot, which is never overwritten",
+                    path=option,
+                    found=path,
                     remedy="Choose another.",
-                )  # fmt: skip
+                )
 
 
 def _is_same(one: str, other: str) -> bool:
@@ -114,9 +120,11 @@ def refuse_other_types(outputs: object) -> None:
     """Refuse outputs that are named in another way."""
     if not isinstance(outputs, OutputPaths):
         raise SettingError(
-            "must be OutputPaths", path="outputs", found=repr(outputs)[:80],
+            "must be OutputPaths",
+            path="outputs",
+            found=repr(outputs)[:80],
             remedy='Write calmotion.OutputPaths(layer="calm.usda").',
-        )  # fmt: skip
+        )
 
 
 def requested_files(host: Host, outputs: OutputPaths) -> list[type]:

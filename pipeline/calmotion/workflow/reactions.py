@@ -77,9 +77,10 @@ def _standing(character: Character, motion: Motion, base: int, forces: Array, mo
         return {}
     worst = int(np.argmin(inside))
     return {
-        "support_margin_m": float(inside[worst]), "support_time_s": float(motion.times[motion.judged][worst]),
+        "support_margin_m": float(inside[worst]),
+        "support_time_s": float(motion.times[motion.judged][worst]),
         "center_of_pressure_m": pressure[worst].tolist(),
-    }  # fmt: skip
+    }
 
 
 def contact_rows(character: Character, motion: Motion) -> list[dict[str, Any]]:

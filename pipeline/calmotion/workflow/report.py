@@ -169,14 +169,16 @@ def _retime(character: Character, retimed: Retimed | None) -> dict[str, Any] | N
         "map": [] if tempo is None else np.stack([tempo.animation, tempo.performance], axis=1).tolist(),
         "stretches": [
             {
-                "from_s": part.start, "to_s": part.end, "factor": part.factor,
+                "from_s": part.start,
+                "to_s": part.end,
+                "factor": part.factor,
                 "because": [{"path": character.motors[k].path, "quantity": name} for k, name in part.because],
             }
             for part in report.stretches
         ],
         "lacking_stretch": report.lacking or None,
         "pins": [{"time_s": time, "shift_s": shift} for time, shift in report.pins],
-    }  # fmt: skip
+    }
 
 
 def _error_shares(character: Character, result: Result) -> list[dict[str, Any]]:

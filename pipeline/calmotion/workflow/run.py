@@ -244,8 +244,9 @@ def _refuse_unknown_methods(source: Source) -> None:
     """Refuse an integrator or an input shaper that the command does not have, before anything costly."""
     integrators = ("bdf2",) if source.command == "optimize" else INTEGRATORS
     for option, found, known in (
-        ("--integrator", source.settings.integrator, integrators), ("--shaper", source.shaper, SHAPERS),
-    ):  # fmt: skip
+        ("--integrator", source.settings.integrator, integrators),
+        ("--shaper", source.shaper, SHAPERS),
+    ):
         if found is not None and found not in known:
             raise SettingError(
                 f"{source.command} supports only {', '.join(known)}",

@@ -39,9 +39,11 @@ def run(args: argparse.Namespace, output: Output) -> int:
         shutil.copyfile(_sample(), shot)
     except OSError as error:
         raise ShotError(
-            "the folder of the demo cannot be written", path=str(folder), found=str(error.strerror),
+            "the folder of the demo cannot be written",
+            path=str(folder),
+            found=str(error.strerror),
             remedy="Name another with -o.",
-        ) from None  # fmt: skip
+        ) from None
     arguments = ["optimize", str(shot), "-o", str(folder / "bartender_calm.usda")]
     arguments += ["--csv", str(folder / "bartender.csv")]
     for option, name, plugin in OPTIONAL:

@@ -110,10 +110,11 @@ def _processor() -> Iterator[Finding]:
     units = [name for name in ("avx2", "fma", "avx512f", "neon") if features.get(name)]
     fast = "avx2" in units or "neon" in units
     yield Finding(
-        "processor", OK if fast else NOTE,
+        "processor",
+        OK if fast else NOTE,
         f"{binding.get_host_cpu_name()}, {platform.machine()}, {', '.join(units) or 'no vector units'}",
         "" if fast else "Runs take several times as long without AVX2; use another machine, or wait",
-    )  # fmt: skip
+    )
 
 
 def _memory() -> Iterator[Finding]:

@@ -30,17 +30,20 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     shot_arguments(command)
     command.add_argument(
-        "--meshes", action="store_true",
+        "--meshes",
+        action="store_true",
         help="mesh the flexible bodies, in minutes; else their frequencies are rough, from beams and sections",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "--modes", metavar="DIR",
+        "--modes",
+        metavar="DIR",
         help="folder for the mode shapes of the flexible bodies (.vtu, .png) and their table; with --meshes",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "--figures", metavar="DIR",
+        "--figures",
+        metavar="DIR",
         help="folder for tempo.png: where the animation would have to be slower, and for which motors",
-    )  # fmt: skip
+    )
     command.add_argument(
         "--strict",
         action="store_true",

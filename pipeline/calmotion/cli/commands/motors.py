@@ -53,9 +53,7 @@ def _row(motor: MotorType) -> dict[str, Any]:
     """A motor for programs: values in SI, with their units and sources."""
     from calmotion.catalogs.motor_types import QUANTITIES
 
-    units = {
-        name: QUANTITIES[name].linear_si if motor.linear else QUANTITIES[name].si for name in motor.values
-    }  # fmt: skip
+    units = {name: QUANTITIES[name].linear_si if motor.linear else QUANTITIES[name].si for name in motor.values}
     return {
         "title": motor.title,
         "group": motor.group,

@@ -72,13 +72,17 @@ def run(args: argparse.Namespace, output: Output) -> int:
     robust = args.robust or any(text.startswith("retarget.optimize.robust=") for text in args.set) or args.settings
     if args.scenarios is not None and not robust:
         raise SettingError(
-            "the number of robots is that of --robust, which is not there", path="--scenarios",
-            found=args.scenarios, remedy="Add --robust, or leave it out.",
-        )  # fmt: skip
+            "the number of robots is that of --robust, which is not there",
+            path="--scenarios",
+            found=args.scenarios,
+            remedy="Add --robust, or leave it out.",
+        )
     if args.goal is not None and robust:
         raise SettingError(
-            "a robust search has no goal: it goes on after the goal is reached on the model", path="--goal",
-            found=f"{1e3 * args.goal:g}mm", remedy="Remove --goal or --robust.",
-        )  # fmt: skip
+            "a robust search has no goal: it goes on after the goal is reached on the model",
+            path="--goal",
+            found=f"{1e3 * args.goal:g}mm",
+            remedy="Remove --goal or --robust.",
+        )
     refuse_unused_retiming(args)
     return run_shot(optimize, args, output)

@@ -245,9 +245,11 @@ def _body_row(body: dict[str, Any]) -> list[str]:
 def _solid_row(body: dict[str, Any]) -> list[str]:
     error = body["frequency_error"]
     return [
-        body["path"], body["solid"], f"{1e6 * body['volume_m3']:.4g} cm³",
+        body["path"],
+        body["solid"],
+        f"{1e6 * body['volume_m3']:.4g} cm³",
         "-" if error is None else f"{100.0 * error:.2g}%",
-    ]  # fmt: skip
+    ]
 
 
 def _motor_row(motor: dict[str, Any]) -> list[str]:

@@ -199,9 +199,11 @@ def _named_patches(
         if not spans_a_plane(mesh.nodes[nodes]):
             raise ShotError(
                 f"this interface of {attachments[group[0]].path} is too small to carry a joint",
-                path=surface.path, attribute="indices", found=f"{len(nodes)} nodes of the mesh of {body} on it",
+                path=surface.path,
+                attribute="indices",
+                found=f"{len(nodes)} nodes of the mesh of {body} on it",
                 remedy="Add faces to it, or author a smaller calm:flexible:elementSize",
-            )  # fmt: skip
+            )
         for other, taken in patches.items():
             if np.intersect1d(nodes, taken).size:
                 raise overlapping(surface, attachments[groups[other][0]].path)
@@ -213,16 +215,20 @@ def overlapping(surface: InterfaceSurface, joint: str) -> ShotError:
     """The error about a named interface that overlaps that of another joint."""
     return ShotError(
         f"this interface overlaps that of {joint}",
-        path=surface.path, attribute="indices", remedy="Leave a face between the two, or join them by one",
-    )  # fmt: skip
+        path=surface.path,
+        attribute="indices",
+        remedy="Leave a face between the two, or join them by one",
+    )
 
 
 def _nothing_left(body: str, radius: float, size: float) -> ShotError:
     return ShotError(
         "the interfaces of the joints are so large that nothing of the body is left to bend",
-        path=body, attribute="calm:flexible:interfaceRadius", found=f"{radius:.4g} m, on a body of {size:.4g} m",
+        path=body,
+        attribute="calm:flexible:interfaceRadius",
+        found=f"{radius:.4g} m, on a body of {size:.4g} m",
         remedy="Author a smaller radius, in the units of the stage; or remove it: it is then measured",
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,9 +305,11 @@ def _patch(
     if not spans_a_plane(mesh.nodes[nodes]):
         raise ShotError(
             f"the surface near the attachment frame of {path} is too small to carry a joint",
-            path=body, attribute="calm:flexible:interfaceRadius", found=f"{len(nodes)} nodes within {radius:.4g} m",
+            path=body,
+            attribute="calm:flexible:interfaceRadius",
+            found=f"{len(nodes)} nodes within {radius:.4g} m",
             remedy="Move the joints apart, or author a smaller elementSize or another interfaceRadius",
-        )  # fmt: skip
+        )
     opposite = other_cheek(place.skin, center, radius, place.axis) if automatic else None
     if opposite is not None:
         nodes = np.union1d(nodes, nodes_of_area(mesh, candidates, opposite, radius, place.axis))

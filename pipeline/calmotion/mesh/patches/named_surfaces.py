@@ -33,7 +33,7 @@ def refuse_named_surfaces(character: Character) -> None:
                         attribute="indices",
                         found=f"{len(surface.triangles)} triangles",
                         remedy="Add faces to it, or remove it: a patch is then chosen around the joint",
-                    )  # fmt: skip
+                    )
                 )
         for one, other in combinations(body.interfaces, 2):
             if one.joint != other.joint and _share_a_triangle(one, other):

@@ -91,9 +91,11 @@ def closed_solid(surfaces: Sequence[SurfaceMesh], body: str, any_hole: bool = Fa
     crossed = inverted > _INVERTED
     if inverted > (_CROSSED if any_hole else _INVERTED):
         raise ShotError(
-            "its surface intersects itself, and a part of it is inside out", path=body,
-            found=f"{100.0 * inverted:.2g}% of the surface", remedy="Untwist it, or author a TetMesh below the body",
-        )  # fmt: skip
+            "its surface intersects itself, and a part of it is inside out",
+            path=body,
+            found=f"{100.0 * inverted:.2g}% of the surface",
+            remedy="Untwist it, or author a TetMesh below the body",
+        )
     if crossed:
         repairs.append(
             f"its surface intersects itself, {100.0 * inverted:.2g}% of it inside out: all that it encloses counts as "
@@ -285,8 +287,10 @@ def _in_one_piece(whole: Part, scale: float, repairs: list[str], body: str, any_
     if joined is None:
         sizes = ", ".join(f"{1e6 * scale**3 * piece.volume:.3g}" for piece in large)
         raise ShotError(
-            "its surfaces are separate solids that do not touch", path=body, found=f"{sizes} cm^3",
+            "its surfaces are separate solids that do not touch",
+            path=body,
+            found=f"{sizes} cm^3",
             remedy="Make them overlap, or divide them into several bodies",
-        )  # fmt: skip
+        )
     repairs.append(f"bridged gaps of up to {1e3 * scale * gap:.2g} mm between {len(large)} separate solids")
     return concatenated([joined, *cavities])

@@ -197,10 +197,11 @@ def _closed(piece: Part, path: str, repairs: list[str], any_hole: bool) -> Closu
     large = len(doubtful) and (doubtful.max() > _HOLE * area or doubtful.sum() > _HOLES * area)
     if (large and not any_hole) or _is_flat(Part(closure.points, closure.triangles)):
         raise ShotError(
-            "this is an open surface, which tetrahedra cannot fill", path=path,
+            "this is an open surface, which tetrahedra cannot fill",
+            path=path,
             found=f"{len(closure.areas)} holes, the largest {100.0 * closure.areas.max() / area:.3g}% of the surface",
             remedy=REMEDY,
-        )  # fmt: skip
+        )
     return closure
 
 
@@ -210,9 +211,11 @@ def _oriented(piece: Part, path: str, repairs: list[str]) -> np.ndarray:
     patches = patches_of(piece.triangles, areas)
     if len(patches.one_sided):
         raise ShotError(
-            "this surface has only one side, such as a Moebius strip", path=path,
-            found=f"{int(np.isin(patches.label, patches.one_sided).sum())} triangles", remedy=REMEDY,
-        )  # fmt: skip
+            "this surface has only one side, such as a Moebius strip",
+            path=path,
+            found=f"{int(np.isin(patches.label, patches.one_sided).sum())} triangles",
+            remedy=REMEDY,
+        )
     triangles = _flipped(piece.triangles, patches.flip)
     boundaries = patch_boundaries(triangles, patches.label, patches.count)
     signs = closing_signs(boundaries)

@@ -39,10 +39,11 @@ def equivalent_beam(body: Body, frames: Sequence[Frame]) -> Solid:
     if body.mass is None or not frames:
         missing = "no mass" if body.mass is None else "no joint"
         raise ShotError(
-            "this flexible body has no geometry", path=body.path,
+            "this flexible body has no geometry",
+            path=body.path,
             found=f"no TetMesh, Mesh or mesh file, and {missing} for an equivalent beam",
             remedy="Add a closed Mesh below it, name a mesh file in calm:flexible:meshFile, or author its physics:mass",
-        )  # fmt: skip
+        )
     root = frames[0].position
     bars = [frame.position - root for frame in frames[1:]]
     if not any(np.linalg.norm(bar) > 0.0 for bar in bars):
@@ -53,10 +54,11 @@ def equivalent_beam(body: Body, frames: Sequence[Frame]) -> Solid:
     bars = [bar for bar in bars if np.linalg.norm(bar) > _SHORT * longest]
     if not bars:
         raise ShotError(
-            "this flexible body has no geometry, and no length for an equivalent beam", path=body.path,
+            "this flexible body has no geometry, and no length for an equivalent beam",
+            path=body.path,
             found="its joints and its center of mass are in one place",
             remedy="Add a closed Mesh below it, or name a mesh file in calm:flexible:meshFile",
-        )  # fmt: skip
+        )
     length = sum(float(np.linalg.norm(bar)) for bar in bars)
     area = body.mass.mass / (body.flexible.material.density * length)
     taper = 0.0

@@ -52,9 +52,11 @@ def solid_of(body: Body, surfaces: tuple[SurfaceMesh, ...]) -> Solid:
         return replace(solid, source=source, repairs=(*notes, *solid.repairs))
     if first is None:
         first = ShotError(
-            "its surfaces enclose no volume", path=body.path, found="no triangles",
+            "its surfaces enclose no volume",
+            path=body.path,
+            found="no triangles",
             remedy="Add a closed Mesh below it, or name a mesh file in calm:flexible:meshFile",
-        )  # fmt: skip
+        )
     raise first
 
 

@@ -51,10 +51,12 @@ def hollowed(solid: Solid, thickness: float, section: str, path: str) -> Solid:
         cavity = None
     if cavity is None:
         raise ShotError(
-            "this body is nowhere thick enough for a cavity inside its wall", path=path,
-            attribute="calm:flexible:wallThickness", found=f"{thickness:.3g} m",
+            "this body is nowhere thick enough for a cavity inside its wall",
+            path=path,
+            attribute="calm:flexible:wallThickness",
+            found=f"{thickness:.3g} m",
             remedy="Author a smaller wallThickness, or remove it so that the body is solid",
-        )  # fmt: skip
+        )
     made = part_of(manifold_of(outer) - manifold_of(cavity))
     largest = max(connected_pieces(made.points, made.triangles), key=lambda piece: abs(piece.volume))
     whole = made if largest.volume > 0.0 else largest

@@ -161,10 +161,11 @@ def _refuse_hopeless(attempt: _Attempt, path: str, time: ProcessorTime) -> None:
     least = _TRIANGLE * len(attempt.triangles)
     if attempt.detailed and least > _FIRST_DENSE * time.limit:
         raise OutOfTime(
-            "tetrahedralising would exceed the limit of processor time", path=path,
+            "tetrahedralising would exceed the limit of processor time",
+            path=path,
             found=f"{len(attempt.triangles)} triangles, {time.limit:g} s",
             remedy=REMEDY + MORE_TIME.format(np.ceil(least / _FIRST_DENSE)),
-        )  # fmt: skip
+        )
 
 
 def _coarser(solid: Solid, shape: Shape, attempt: _Attempt) -> _Attempt:
@@ -214,9 +215,10 @@ def _accepted(mesh: FEMesh, solid: Solid, volumes: list[float], path: str) -> FE
     if error > _ACCEPTED:
         raise ShotError(
             "the tetrahedra do not fill the surface",
-            path=path, found=f"volume error {100.0 * error:.2g}%, allowed {100.0 * _ACCEPTED:.2g}%",
+            path=path,
+            found=f"volume error {100.0 * error:.2g}%, allowed {100.0 * _ACCEPTED:.2g}%",
             remedy="Author a smaller calm:flexible:elementSize, repair the Mesh, or give a TetMesh or a mesh file",
-        )  # fmt: skip
+        )
     return replace(mesh, quality=replace(mesh.quality, volume_error=error, repairs=notes))
 
 
@@ -245,15 +247,19 @@ def refuse_too_many(shape: Shape, size: float, time: ProcessorTime, path: str) -
         least, limit = smallest_size(shape, int(time.nodes)), time.limit * nodes / time.nodes
         raise ShotError(
             f"its mesh would have about {nodes:.1e} nodes, too many for {time.limit:g} s of processor time",
-            path=path, attribute="calm:flexible:elementSize", found=f"{size:.3g} m",
+            path=path,
+            attribute="calm:flexible:elementSize",
+            found=f"{size:.3g} m",
             remedy=f"Author at least {least:.2g} m" + MORE_TIME.format(limit),
-        )  # fmt: skip
+        )
 
 
 def refuse_loose_parts(tets: np.ndarray, path: str) -> None:
     count = connected_parts(tets)
     if count > 1:
         raise ShotError(
-            "its tetrahedra are not connected", path=path, found=f"{count} separate parts",
+            "its tetrahedra are not connected",
+            path=path,
+            found=f"{count} separate parts",
             remedy="Make the parts overlap or touch, or split them into several bodies",
-        )  # fmt: skip
+        )

@@ -147,9 +147,11 @@ def _keep_hopeless(key: str, taken: float) -> None:
 
 def _out_of_time(size: str, path: str, time: ProcessorTime) -> OutOfTime:
     return OutOfTime(
-        "tetrahedralising exceeded the limit of processor time", path=path, found=f"{size}, {time.limit:g} s",
+        "tetrahedralising exceeded the limit of processor time",
+        path=path,
+        found=f"{size}, {time.limit:g} s",
         remedy=REMEDY + MORE_TIME.format(4.0 * time.limit),
-    )  # fmt: skip
+    )
 
 
 def _run(
@@ -175,8 +177,10 @@ def _run(
             last = messages.decode(errors="replace").strip().splitlines()[-1:] or ["no message"]
             raise ShotError(
                 "the tetrahedraliser failed",
-                path=path, found=f"exit status {status}: {last[0]}", remedy=REMEDY,
-            )  # fmt: skip
+                path=path,
+                found=f"exit status {status}: {last[0]}",
+                remedy=REMEDY,
+            )
         with np.load(destination) as file:
             made, tets = file["points"] * diagonal + center, file["tets"]
             time.used += float(file["seconds"])
@@ -200,6 +204,8 @@ def _limited(command: list[str], folder: Path, time: ProcessorTime, size: str, p
         if error.processor:
             raise _out_of_time(size, path, time) from None
         raise ShotError(
-            "the tetrahedraliser does not end", path=path,
-            found=f"{size}, {_PATIENCE * left:g} s without using {left:.0f} s of processor time", remedy=REMEDY,
-        ) from None  # fmt: skip
+            "the tetrahedraliser does not end",
+            path=path,
+            found=f"{size}, {_PATIENCE * left:g} s without using {left:.0f} s of processor time",
+            remedy=REMEDY,
+        ) from None

@@ -107,9 +107,11 @@ def reactions(
     total, joints = len(angles), len(system.rows)
     work: Work = allocate_work(system)
     result = Reactions(
-        np.zeros((total, joints, 3)), np.zeros((total, joints, 3)), np.zeros((total, joints)),
+        np.zeros((total, joints, 3)),
+        np.zeros((total, joints, 3)),
+        np.zeros((total, joints)),
         np.zeros((total, joints, 3, 3)),
-    )  # fmt: skip
+    )
     _reactions(system, states, Inputs(angles, rates, trajectory.world[instants]), work, result)
     return result
 

@@ -52,9 +52,11 @@ def integrate(
         )
     if integrator == "rk4" and np.any(system.servo[:, BEYOND_COULOMB]):
         raise IntegrationError(
-            "rk4 simulates no friction of motors but Coulomb's", attribute="--integrator", found=integrator,
+            "rk4 simulates no friction of motors but Coulomb's",
+            attribute="--integrator",
+            found=integrator,
             remedy="Leave it out, or set calm:motor:frictionModel to coulomb.",
-        )  # fmt: skip
+        )
     if integrator in IMPLICIT:
         try:
             return simulate(

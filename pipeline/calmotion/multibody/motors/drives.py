@@ -108,9 +108,7 @@ def add_motors(system: System, motors: Sequence[GivingMotor]) -> System:
     return wide
 
 
-def joint_values(
-    system: System, motor: IntArray, motors: Sequence[Motor], u: Array, joint_angles: Array
-) -> Array:  # fmt: skip
+def joint_values(system: System, motor: IntArray, motors: Sequence[Motor], u: Array, joint_angles: Array) -> Array:
     """Where the joints stand, which is not what their motors follow where these give.
 
     Args:

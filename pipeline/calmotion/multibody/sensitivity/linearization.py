@@ -151,7 +151,7 @@ def linearize(
     Raises:
         SimulationFailure: A singular step, or one that had to be refined: its equations are not those of the others.
         ValueError: A simulation by another integrator than BDF2; contacts and the continuous adjoint.
-    """  # fmt: skip
+    """
     if trajectory.integrator != "bdf2":
         raise ValueError("only BDF2 has derivatives")
     if continuous and has_contacts(system):

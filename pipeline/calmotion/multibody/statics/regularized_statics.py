@@ -85,7 +85,7 @@ def regularize(system: System, K: Array, Lc: Array, Nc: Array) -> None:
 @kernel
 def _add_regularization(
     system: System, Jp: Array, x: Array, lam: Array, out: Array, out_lam: Array, transposed: bool
-) -> None:  # fmt: skip
+) -> None:
     """(out, out_lam) += E (x, lam), or with E^T; shapes [B, N] and [J, 6]."""
     for b in range(len(system.parent)):
         p = system.side[b, 0]
@@ -121,7 +121,7 @@ def _add_regularization(
 @kernel
 def _refine(
     system: System, matrix: StepMatrix, x: Array, lam: Array, scratch: SolutionScratch, transposed: bool
-) -> None:  # fmt: skip
+) -> None:
     """(x, lam) <- (r, r_lam) + E (x, lam), the right-hand side of the next refinement."""
     copy_rows(scratch.right, scratch.X)
     copy_rows(scratch.right_lam, scratch.lam)
@@ -145,7 +145,7 @@ def solve_statics(system: System, matrix: StepMatrix, x: Array, lam: Array, scra
 @shared_kernel
 def solve_statics_transposed(
     system: System, matrix: StepMatrix, x: Array, lam: Array, scratch: SolutionScratch
-) -> None:  # fmt: skip
+) -> None:
     """The transposed equations; same arguments."""
     copy_rows(x, scratch.right)
     copy_rows(lam, scratch.right_lam)

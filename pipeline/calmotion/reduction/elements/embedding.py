@@ -49,8 +49,9 @@ class Embedding:
     def _curl(self, modes: Array, rows: Indices) -> Array:
         # gradient[k, j, i, r] = d_j u_i
         gradient = np.einsum("kaj,kair->kjir", self.gradients[rows], modes[self.nodes[rows]], optimize=True)
-        return 0.5 * np.stack([gradient[:, (i + 1) % 3, (i + 2) % 3] - gradient[:, (i + 2) % 3, (i + 1) % 3]
-                               for i in range(3)], axis=1)  # fmt: skip
+        return 0.5 * np.stack(
+            [gradient[:, (i + 1) % 3, (i + 2) % 3] - gradient[:, (i + 2) % 3, (i + 1) % 3] for i in range(3)], axis=1
+        )
 
 
 def embed(mesh: QuadraticMesh, points: Array) -> Embedding:

@@ -47,10 +47,12 @@ def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial)
     chosen, weights, error = greedy_cubature(columns, target, ERROR, _MOST)
     if error > 10.0 * ERROR:
         raise ShotError(
-            "no cubature of the Neo-Hookean energy is accurate enough", path=material.path,
-            attribute="calm:flexible:elasticity", found=f"error {error:.2%} with {len(chosen)} points",
+            "no cubature of the Neo-Hookean energy is accurate enough",
+            path=material.path,
+            attribute="calm:flexible:elasticity",
+            found=f"error {error:.2%} with {len(chosen)} points",
             remedy="Use stvk, which needs no cubature, or a coarser mesh.",
-        )  # fmt: skip
+        )
     C = linear_tangent(lame, mu)
     points = candidates[chosen]
     correction = np.diag(basis.omega_squared) - np.einsum("c,cmi,mn,cnj->ij", weights, points, C, points, optimize=True)

@@ -82,9 +82,11 @@ def _filled(body: Body, frames: Sequence[Frame]) -> tuple[Cells, Array, Indices]
     cells = cells_of(solid.points, solid.triangles, body.flexible)
     if cells is None:
         raise ShotError(
-            "its surfaces enclose no volume", path=body.path, found="no cell of a grid is inside",
+            "its surfaces enclose no volume",
+            path=body.path,
+            found="no cell of a grid is inside",
             remedy="Add a closed Mesh below it, or name a mesh file in calm:flexible:meshFile",
-        )  # fmt: skip
+        )
     return cells, solid.points, solid.triangles
 
 

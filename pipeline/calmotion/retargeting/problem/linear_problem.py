@@ -135,8 +135,9 @@ class LinearProblem:
         space, inertia, coupling = self.space, self.rigid.response.inertia, self.space.coupling
         found: list[tuple[csr_matrix, Array] | None] = [
             (spline, np.einsum("ma,nm,mb->nab", coupling, weights[name], coupling))
-            for name, spline in space.splines.items() if name in weights
-        ]  # fmt: skip
+            for name, spline in space.splines.items()
+            if name in weights
+        ]
         for k, robot in enumerate(self.sweeps.robots):
             own, run = robot.at.robot, robot.at.run
             for name, limited in own.limited.items():

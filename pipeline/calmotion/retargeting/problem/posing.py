@@ -136,7 +136,7 @@ def knot_spacing(character: Character, options: RunSettings) -> float | None:
 
 def unknowns(
     character: Character, animation: Animation, grid: TimeGrid, options: RunSettings, offsets: Array | None = None
-) -> Unknowns:  # fmt: skip
+) -> Unknowns:
     """What a search may change.
 
     Args:

@@ -155,13 +155,11 @@ class TempoProgram:
         for matrix, bound in ((identity, most), (-identity, -least), *self._linearized(c)):
             rows.append(hstack([matrix, csr_matrix((matrix.shape[0], n))]))
             room.append(bound)
-        quadratic = vstack([
-            hstack([self._quadratic, csr_matrix((n, n))]), hstack([csr_matrix((n, n)), 1e-9 * identity])
-        ])  # fmt: skip
+        quadratic = vstack(
+            [hstack([self._quadratic, csr_matrix((n, n))]), hstack([csr_matrix((n, n)), 1e-9 * identity])]
+        )
         linear = np.concatenate([self._quadratic @ (c - 1.0), self._means])
-        found = elastic_minimum(
-            csr_matrix(quadratic), linear, csr_matrix(vstack(rows)), np.concatenate(room), EXCEEDED
-        )  # fmt: skip
+        found = elastic_minimum(csr_matrix(quadratic), linear, csr_matrix(vstack(rows)), np.concatenate(room), EXCEEDED)
         return found.x[:n]
 
     def _linearized(self, c: Array) -> Iterator[tuple[csr_matrix, Array]]:

@@ -119,7 +119,7 @@ class _Searches:
         """The result of one more, with other settings."""
         latest = optimize_to_tolerance(
             shot, replace(self._options, **options), self._progress, self._checkpoint, memory=self._memory
-        )  # fmt: skip
+        )
         self.done = continued(self.done, latest) if self._count else latest
         self._count += 1
         return self.done

@@ -41,7 +41,7 @@ def tempo_input(shot: CompiledShot, options: RunSettings, tracks: Sequence[Track
         try:
             run = run_forward(
                 model, Workspace.for_system(model.system), sampled.angles, sampled.rates, grid.h, prepared.world
-            )  # fmt: skip
+            )
             efforts = rigid_efforts(model, grid, prepared.world, sampled, run)
         except SimulationFailure as failure:
             raise failure_error(prepared, failure) from failure

@@ -26,9 +26,11 @@ def pinned_times(text: str, start: float, per_second: float) -> tuple[float, ...
             value = float(part.removesuffix("s"))
         except ValueError:
             raise ShotError(
-                "this is neither a time code nor seconds", attribute="--retime pin", found=part,
+                "this is neither a time code nor seconds",
+                attribute="--retime pin",
+                found=part,
                 remedy="Write time codes with commas between them, as pin=24,48,72, or seconds, as pin=1s,2s,3s.",
-            ) from None  # fmt: skip
+            ) from None
         found.append(value if part.endswith("s") else (value - start) / per_second)
     return tuple(np.unique(found).tolist())
 
@@ -47,9 +49,11 @@ def refuse_tempo(character: Character, animation: Animation, settings: TempoSett
         )  # fmt: skip
     if animation.tempo is not None:
         raise ShotError(
-            "the shot has results at another tempo already", path=path, attribute="calm:retime:map",
+            "the shot has results at another tempo already",
+            path=path,
+            attribute="calm:retime:map",
             remedy="Name the shot beneath these results, or leave --retime out.",
-        )  # fmt: skip
+        )
     for name, value, fits in (
         ("slowest", settings.slowest, 1.0 <= settings.slowest < np.inf),
         ("fastest", settings.fastest, 0.0 < settings.fastest <= 1.0),
@@ -62,7 +66,9 @@ def refuse_tempo(character: Character, animation: Animation, settings: TempoSett
     outside = [time for time in settings.pinned if not 0.0 <= time <= end]
     if outside:
         raise ShotError(
-            "a pinned time is outside of the shot", path=path, attribute="calm:retime:pinned",
+            "a pinned time is outside of the shot",
+            path=path,
+            attribute="calm:retime:pinned",
             found=f"{outside[0]:.3f} s after the first frame, where the shot lasts {end:.3f} s",
             remedy="Name time codes of the animation, in the range of the shot.",
-        )  # fmt: skip
+        )

@@ -96,9 +96,10 @@ def find_tempo(given: TempoInput, settings: TempoSettings, path: str) -> FoundTe
         _refuse_contradiction(given, settings, path, program, c)
     frames = int(np.ceil(float(basis.integral(0.0, end) @ c) / given.frame - 1e-6))
     whole = replace(
-        program, durations=(*pins, Duration(0.0, end, frames * given.frame)),
+        program,
+        durations=(*pins, Duration(0.0, end, frames * given.frame)),
         weights=1.0 / (SPREAD + np.abs(c - 1.0)),
-    )  # fmt: skip
+    )
     found = whole.solve(c)
     if pins and whole.missed(found) > NOTICED:
         _refuse_missed(path, whole.missed(found))
@@ -122,7 +123,7 @@ def _path(given: TempoInput, basis: StretchBasis) -> Path:
 
 def _refuse_contradiction(
     given: TempoInput, settings: TempoSettings, path: str, program: TempoProgram, c: Array
-) -> None:  # fmt: skip
+) -> None:
     """Refuse pins between which the limits leave too little time.
 
     Raises:
@@ -174,9 +175,7 @@ def _least_duration(given: TempoInput, part: Duration, fastest: float) -> float:
     return float(total(part.end) - total(part.start))
 
 
-def _report(
-    settings: TempoSettings, needed: Tempo, program: TempoProgram, c: Array, tempo: TimeMap
-) -> TempoReport:  # fmt: skip
+def _report(settings: TempoSettings, needed: Tempo, program: TempoProgram, c: Array, tempo: TimeMap) -> TempoReport:
     """The report on a tempo.
 
     Args:
@@ -196,9 +195,11 @@ def _report(
     pinned = np.array(settings.pinned)
     shifts = tempo.performed(pinned) - pinned if len(pinned) else pinned
     return TempoReport(
-        needed.uniform_added_s, needed.least_added_s, tuple(stretches),
+        needed.uniform_added_s,
+        needed.least_added_s,
+        tuple(stretches),
         tuple(zip(settings.pinned, shifts.tolist(), strict=True)),
-    )  # fmt: skip
+    )
 
 
 def _reached(program: TempoProgram, c: Array, instants: slice) -> tuple[tuple[int, str], ...]:

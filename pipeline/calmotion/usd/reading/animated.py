@@ -203,10 +203,12 @@ def retime_map(composed: Usd.Stage) -> Array | None:
             )
             if not rises:
                 raise ShotError(
-                    "these are not pairs of ascending time codes", path=str(prim.GetPath()),
-                    attribute=MAP, found=f"{len(pairs)} pairs",
+                    "these are not pairs of ascending time codes",
+                    path=str(prim.GetPath()),
+                    attribute=MAP,
+                    found=f"{len(pairs)} pairs",
                     remedy="Optimise the shot beneath once more with --retime, which writes four pairs or more",
-                )  # fmt: skip
+                )
             return pairs
     return None
 

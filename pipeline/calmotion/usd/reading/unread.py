@@ -35,15 +35,19 @@ def unread_attributes(stage: Usd.Stage, declared: bool = False) -> Iterator[Shot
             owner = owners.get(name, "")
             if not owner:
                 yield ShotError(
-                    "no schema of Calmotion has this attribute", path=prim.GetPath(), attribute=name,
+                    "no schema of Calmotion has this attribute",
+                    path=prim.GetPath(),
+                    attribute=name,
                     remedy=nearest(name, owners) or f"The names are {', '.join(sorted(owners))}",
-                )  # fmt: skip
+                )
             elif (declared or owner not in _READ_ANYWAY) and not schemas.is_applied(prim, owner):
                 problem = "is declared by" if owner in _READ_ANYWAY else "is not read: it needs"
                 yield ShotError(
-                    f"{problem} {owner}, which is not applied", path=prim.GetPath(), attribute=name,
+                    f"{problem} {owner}, which is not applied",
+                    path=prim.GetPath(),
+                    attribute=name,
                     remedy=f"Apply {owner}, or remove the attribute",
-                )  # fmt: skip
+                )
 
 
 def misplaced_schemas(stage: Usd.Stage) -> Iterator[ShotError]:
@@ -61,10 +65,12 @@ def misplaced_schemas(stage: Usd.Stage) -> Iterator[ShotError]:
             allowed, what = fits[schema]
             if not allowed(prim):
                 yield ShotError(
-                    f"{schema} belongs on {what}, and has no effect here", path=prim.GetPath(), attribute="apiSchemas",
+                    f"{schema} belongs on {what}, and has no effect here",
+                    path=prim.GetPath(),
+                    attribute="apiSchemas",
                     found=str(prim.GetTypeName()) or "a prim without a type",
                     remedy="Move the schema there, or remove it",
-                )  # fmt: skip
+                )
 
 
 def _owners() -> dict[str, str]:

@@ -23,9 +23,11 @@ def no_bodies(stage: Usd.Stage) -> ShotError:
     skeletons = [prim for prim in prims_of(stage) if prim.GetTypeName() == "Skeleton"]
     if skeletons:
         return ShotError(
-            _PROBLEM, path=str(skeletons[0].GetPath()), found="a skinned character without physics",
+            _PROBLEM,
+            path=str(skeletons[0].GetPath()),
+            found="a skinned character without physics",
             remedy="Run `calmotion rig` on it, and open the layer that it writes",
-        )  # fmt: skip
+        )
     every = list(stage.TraverseAll())
     skipped = [prim for prim in every if is_applied(prim, RIGID_BODY)]
     inactive = [prim for prim in every if not prim.IsActive()]
@@ -46,9 +48,10 @@ def _reason(prim: Usd.Prim) -> tuple[str, str, str] | None:
         return "", "it is a class, which has no place in the scene", "Inherit from it or reference it in a prim (def)"
     if not prim.IsDefined():
         return (
-            "", "an override (over) of a prim that no layer defines",
+            "",
+            "an override (over) of a prim that no layer defines",
             "Open the file that has this layer above that of the robot in its subLayers, or write such a file",
-        )  # fmt: skip
+        )
     if is_applied(prim, RIGID_BODY):
         return "physics:rigidBodyEnabled", "False", "Set it to true, or remove it"
     return None

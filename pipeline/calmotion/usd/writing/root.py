@@ -80,9 +80,10 @@ def refuse_foreign_root(layer: str) -> None:
         role = ""
     if role != stages.ROOT:
         raise ShotError(
-            f"the root layer of {layer} would replace this file, which Calmotion did not write", path=path,
+            f"the root layer of {layer} would replace this file, which Calmotion did not write",
+            path=path,
             remedy="Choose another -o, or move the file",
-        )  # fmt: skip
+        )
 
 
 def shot_layers(shot: str, replaced: tuple[str, ...]) -> list[str]:

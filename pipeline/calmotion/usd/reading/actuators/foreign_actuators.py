@@ -85,8 +85,10 @@ def affine_actuators(actuators: Sequence[Usd.Prim]) -> list[AffineActuator]:
     for prim in actuators:
         gain, bias, gear = (numbers_of(prim, name) for name in POSITION_ACTUATOR)
         unknown = token_of(prim, "mjc:biasType") == "none" or token_of(prim, "mjc:gainType") not in (
-            "", "fixed", "affine"
-        )  # fmt: skip
+            "",
+            "fixed",
+            "affine",
+        )
         if unknown or not gain or not gain[0] or len(bias) < 3:
             continue
         if not np.all(np.isfinite([gain[0], *bias[:3]])) or bias[1] > 0.0:

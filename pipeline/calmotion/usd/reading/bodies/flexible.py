@@ -157,11 +157,13 @@ def with_parts(
         return material
     if material.core is not None:
         raise ShotError(
-            "is that of a part of one material, but its meshes have several", path=body_prim.GetPath(),
-            attribute="calm:flexible:infill", found=", ".join(paths),
+            "is that of a part of one material, but its meshes have several",
+            path=body_prim.GetPath(),
+            attribute="calm:flexible:infill",
+            found=", ".join(paths),
             remedy="Bind one material for `physics`, or remove calm:flexible:infill and lower the modulus and density "
             "of the printed part",
-        )  # fmt: skip
+        )
     volumes = [abs(surface_volume(shape.surface.points, shape.surface.triangles)) for shape in solids]
     stiffness = np.array([found.youngs_modulus * volume for found, volume in zip(own, volumes, strict=True)])
     ratios = np.array([m.poissons_ratio for m in own])

@@ -51,8 +51,10 @@ def interfaces_of(
         if earlier is not None:
             raise ShotError(
                 f"the joint {joint} has an interface on this body already",
-                path=prim.GetPath(), found=earlier, remedy="Keep one subset, with all its faces",
-            )  # fmt: skip
+                path=prim.GetPath(),
+                found=earlier,
+                remedy="Keep one subset, with all its faces",
+            )
         geometry = prim.GetParent()
         points, triangles = _triangles(prim, subset, geometry, reading.start)
         linear, offset = to_body(reading, geometry, pose)

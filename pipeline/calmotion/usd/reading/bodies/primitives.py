@@ -171,7 +171,7 @@ def _frustum(low: float, high: float, height: float) -> Moments:
     along = np.pi * height**3 * (second - first * center)
     return Moments(
         np.pi * height * area, np.array([0.0, 0.0, height * (center - 0.5)]), np.diag([across, across, along])
-    )  # fmt: skip
+    )
 
 
 def _hemisphere(radius: float, equator: float, up: float) -> Moments:

@@ -99,7 +99,7 @@ def _still_geometry(reading: Reading, middle: Array, size: float) -> Iterator[Us
 
 def _box_is_near(
     boxes: UsdGeom.BBoxCache, prim: Usd.Prim, middle: Gf.Vec3d, size: float, boundable: type[UsdGeom.Boundable]
-) -> bool:  # fmt: skip
+) -> bool:
     """Whether a prim may be near the robot, all in stage units; True where that is not known without its children."""
     if not prim.IsA(boundable) and not prim.HasAttribute("extentsHint"):
         return True

@@ -54,9 +54,11 @@ def tell_what_is_elsewhere(reading: Reading, joints: Sequence[JointPrim], poses:
             attribute="physics:localPos0",
             found=f"{away:.3g} m and {turned:.3g} deg apart" + (f", and {len(found) - 1} more" if found[1:] else ""),
             remedy="Move the frame of the joint with the robot: it is in the world, which no transform above the robot "
-            "moves" if world else "Correct the frames of the joint, or the transform of the body",
+            "moves"
+            if world
+            else "Correct the frames of the joint, or the transform of the body",
         )
-    )  # fmt: skip
+    )
 
 
 def _apart(joint: JointPrim, poses: Mapping[str, Pose], meters: float) -> tuple[float, float]:

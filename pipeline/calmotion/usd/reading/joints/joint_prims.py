@@ -23,9 +23,11 @@ if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
 _KINDS = {
-    "PhysicsRevoluteJoint": "revolute", "PhysicsPrismaticJoint": "prismatic", "PhysicsFixedJoint": "fixed",
+    "PhysicsRevoluteJoint": "revolute",
+    "PhysicsPrismaticJoint": "prismatic",
+    "PhysicsFixedJoint": "fixed",
     "PhysicsSphericalJoint": "spherical",
-}  # fmt: skip
+}
 _WITH_AXIS = ("revolute", "prismatic")
 _DRIVES = {"revolute": "angular", "prismatic": "linear"}
 _LIMITS = ("physics:lowerLimit", "physics:upperLimit")

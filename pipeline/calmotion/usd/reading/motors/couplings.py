@@ -57,7 +57,7 @@ def coupled(prim: Usd.Prim, attribute: str) -> str:
 
 def coupled_joint(
     prim: Usd.Prim, attribute: str, among: Mapping[str, JointPrim], other: str, what: str, kind: str
-) -> JointPrim:  # fmt: skip
+) -> JointPrim:
     """The joint that a coupling names.
 
     Args:
@@ -89,7 +89,7 @@ CLOSE = 1e-3  # as in PhysX, units of the stage: a rack whose distance from the 
 
 def rack_coupling(
     reading: Reading, prim: Usd.Prim, hinges: Mapping[str, JointPrim], slides: Mapping[str, JointPrim]
-) -> Coupling:  # fmt: skip
+) -> Coupling:
     """What a rack and pinion couples: length = ratio angle [m/rad].
 
     Args:
@@ -118,10 +118,12 @@ def _frame(reading: Reading, prim: Usd.Prim, side: int, joint: JointPrim) -> tup
     body, path = body_on(reading.stage, prim, side), str(prim.GetPath())
     if not body or body not in (joint.body0, joint.body1):
         raise ShotError(
-            "body 0 of a rack and pinion is the pinion, and body 1 the rack", path=path,
-            attribute=f"physics:body{side}", found=body or None,
+            "body 0 of a rack and pinion is the pinion, and body 1 the rack",
+            path=path,
+            attribute=f"physics:body{side}",
+            found=body or None,
             remedy=f"Name a body of {joint.path}: {', '.join(filter(None, (joint.body0, joint.body1)))}",
-        )  # fmt: skip
+        )
     (on,) = prim.GetRelationship(f"physics:body{side}").GetForwardedTargets()[:1]
     pose = reading.pose(reading.stage.GetPrimAtPath(on))
     offset, turn = (prim.GetAttribute(f"physics:local{what}{side}").Get() for what in ("Pos", "Rot"))
@@ -131,10 +133,12 @@ def _frame(reading: Reading, prim: Usd.Prim, side: int, joint: JointPrim) -> tup
     if not abs(cosine) > ALONG:
         off = np.degrees(np.arccos(min(abs(cosine), 1.0)))
         raise ShotError(
-            f"the x axis of a frame of a rack and pinion lies along its joint, {joint.path}", path=path,
-            attribute=f"physics:localRot{side}", found=f"{off:.3g} degrees off it",
+            f"the x axis of a frame of a rack and pinion lies along its joint, {joint.path}",
+            path=path,
+            attribute=f"physics:localRot{side}",
+            found=f"{off:.3g} degrees off it",
             remedy="Turn the frame, or correct the joint that is named",
-        )  # fmt: skip
+        )
     position = pose.position + pose.rotation @ (pose.scale * (np.zeros(3) if offset is None else gf.vector(offset)))
     return x, position, float(np.sign(cosine)) * (1.0 if body == joint.body1 else -1.0)
 
@@ -163,10 +167,12 @@ def gears_of_joints(reading: Reading, joints: Sequence[JointPrim], driven: Colle
         coupling = next((c for c in left if known.intersection(c.joints)), None)
         if coupling is None:
             raise ShotError(
-                "it couples two joints that no motor drives", path=str(left[0].prim.GetPath()),
-                attribute=COUPLED[str(left[0].prim.GetTypeName())][0], found=" and ".join(left[0].joints),
+                "it couples two joints that no motor drives",
+                path=str(left[0].prim.GetPath()),
+                attribute=COUPLED[str(left[0].prim.GetTypeName())][0],
+                found=" and ".join(left[0].joints),
                 remedy="Drive one of them with a motor",
-            )  # fmt: skip
+            )
         left = [other for other in left if other is not coupling]
         (leader, follower), ratio = coupling.joints, coupling.ratio
         if leader not in known:
@@ -189,10 +195,12 @@ def _coupling(reading: Reading, prim: Usd.Prim, hinges: Mapping[str, JointPrim])
         ends = [body_on(reading.stage, hinge.prim, side) for side in (0, 1)]
         if not on.intersection(end for end in ends if end):
             raise ShotError(
-                "a gear is on the bodies that its hinges turn", path=path, attribute="physics:body0",
+                "a gear is on the bodies that its hinges turn",
+                path=path,
+                attribute="physics:body0",
                 found=", ".join(sorted(on)) or None,
                 remedy=f"Name bodies of {hinge.path}: {', '.join(filter(None, ends))}",
-            )  # fmt: skip
+            )
         found.append(hinge.path)
         signs.append(-1.0 if ends[0] in on else 1.0)
     ratio = number_or(prim, "physics:gearRatio", 1.0)

@@ -39,9 +39,11 @@ def given_joints(stage: Usd.Stage, given: MotorTracks | None) -> tuple[str, ...]
             )
         if (other := found.setdefault(named[0], name)) != name:
             raise ShotError(
-                "two columns move the same joint", path=given.origin, found=f"{other} and {name}",
+                "two columns move the same joint",
+                path=given.origin,
+                found=f"{other} and {name}",
                 remedy="Remove one of them",
-            )  # fmt: skip
+            )
     return tuple(found)
 
 

@@ -75,9 +75,10 @@ def _holds(track: Track, frame: float) -> list[tuple[int, int]]:
         k for (_, end), (start, _) in zip(runs[:-1], runs[1:], strict=True) if start == end + 1 for k in (end, start)
     }
     return [
-        (start, end) for start, end in runs
+        (start, end)
+        for start, end in runs
         if end - start > 1 or track.times[end] - track.times[start] > _KEYS * frame or jumps & {start, end}
-    ]  # fmt: skip
+    ]
 
 
 def _sharp(track: Track, holds: list[tuple[int, int]]) -> list[tuple[int, int]]:

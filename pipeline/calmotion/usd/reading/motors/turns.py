@@ -54,11 +54,13 @@ def unwrapped(track: Track, joint: JointPrim, reading: Reading) -> Track:
     lower, upper = np.degrees([joint.lower, joint.upper])
     reading.warn(
         ShotError(
-            "its animation jumps by a turn, and its limits do not let it turn on", path=joint.path,
-            attribute="physics:lowerLimit, physics:upperLimit", found=f"{place}; {lower:.4g} to {upper:.4g} deg",
+            "its animation jumps by a turn, and its limits do not let it turn on",
+            path=joint.path,
+            attribute="physics:lowerLimit, physics:upperLimit",
+            found=f"{place}; {lower:.4g} to {upper:.4g} deg",
             remedy="Remove the limits if the joint turns on; else animate the way back",
         )
-    )  # fmt: skip
+    )
     return track
 
 

@@ -102,17 +102,21 @@ def refuse_unused_animation(
         if not axes:
             if not driven:
                 raise ShotError(
-                    "this joint is animated, but connects no body", path=path, attribute="physics:body1",
+                    "this joint is animated, but connects no body",
+                    path=path,
+                    attribute="physics:body1",
                     remedy="Name the bodies that it joins in physics:body0 and physics:body1, and apply "
                     "PhysicsRigidBodyAPI to them",
-                )  # fmt: skip
+                )
         elif len(stray) == len(names) or (len(axes) > 1 and stray):
             free = ", ".join(joint.drive for joint in axes)
             raise ShotError(
-                "the drive is animated in a direction in which its joint does not move", path=path, attribute=stray[0],
+                "the drive is animated in a direction in which its joint does not move",
+                path=path,
+                attribute=stray[0],
                 found=f"a {axes[0].kind} joint" if len(axes) == 1 else f"a joint that is free in {free}",
                 remedy=_remedy(axes[0], stray[0]),
-            )  # fmt: skip
+            )
         elif stray:
             reading.note(f"{path}: {stray[0]} is animated and not used: the joint does not move in that direction")
 
@@ -125,10 +129,12 @@ def refuse_connection(path: str, attribute: Any) -> None:
     """
     if attribute.HasAuthoredConnections():
         raise ShotError(
-            "its value comes by a connection, which USD does not evaluate", path=path, attribute=attribute.GetName(),
+            "its value comes by a connection, which USD does not evaluate",
+            path=path,
+            attribute=attribute.GetName(),
             found=", ".join(map(str, attribute.GetConnections())),
             remedy="Author time samples in its place, or remove the connection",
-        )  # fmt: skip
+        )
 
 
 def _remedy(joint: JointPrim, name: str) -> str:
