@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from calmotion.mesh.moments import is_closed, surface_moments
 from calmotion.rigging.links import cut_skin
-from calmotion.usd.reading.bodies.moments import is_closed, surface_moments
 from tubes import tube
 
 

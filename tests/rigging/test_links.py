@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from calmotion.mesh.moments import surface_moments
 from calmotion.rigging.links import make_links, targets_of, tip_of
-from calmotion.usd.reading.bodies.moments import surface_moments
 from scipy.spatial.transform import Rotation
 from tubes import tube
 

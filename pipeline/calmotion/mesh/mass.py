@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calmotion.arrays import Array, Indices, IntArray
+from calmotion.mesh.moments import surface_moments, tetrahedron_moments
 from calmotion.mesh.parts import Makeup
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.model.character import Body, MassProperties, SurfaceMesh
@@ -27,36 +28,20 @@ def mass_of_tets(
         makeup: Of a body of several materials; each tetrahedron has its mean density.
     """
     volume = np.abs(tet_volumes(points, tets))
-    return _mass(points[tets], volume if makeup is None else volume * makeup.density, density, mass)
+    moments = tetrahedron_moments(points[tets], volume if makeup is None else volume * makeup.density)
+    return moments.mass_properties(density if mass is None else mass / moments.volume)
 
 
 def mass_of_solid(points: Array, triangles: Indices, density: float, mass: float | None = None) -> MassProperties:
-    """Mass properties of the inside of a closed surface, exact, by signed tetrahedra of its triangles and one point.
+    """Mass properties of the inside of a closed surface, exact.
 
     Args:
         points: [m], shape [n, 3].
         triangles: Shape [m, 3], outward, those of cavities inward.
         density, mass: As of `mass_of_tets`.
     """
-    corners = points[triangles]
-    middle = points.mean(axis=0)  # against cancellation far from the origin
-    tets = np.concatenate([np.broadcast_to(middle, (len(corners), 1, 3)), corners], axis=1)
-    return _mass(tets, np.linalg.det(corners - middle) / 6.0, density, mass)
-
-
-def _mass(corners: Array, weight: Array, density: float, mass: float | None) -> MassProperties:
-    """That of tetrahedra with corners [m], shape [m, 4, 3], and volumes [m^3], shape [m].
-
-    Source: int x x^T over a tetrahedron is V (sum x_i x_i^T + (sum x_i)(sum x_i)^T) / 20.
-    """
-    weight = weight * (density if mass is None else mass / float(weight.sum()))
-    total = float(weight.sum())
-    center = weight @ corners.mean(axis=1) / total
-    arms = corners - center
-    sums = arms.sum(axis=1)
-    second = np.einsum("e,eki,ekj->ij", weight, arms, arms) + np.einsum("e,ei,ej->ij", weight, sums, sums)
-    second /= 20.0
-    return MassProperties(total, center, np.trace(second) * np.eye(3) - second)
+    moments = surface_moments(points, triangles)
+    return moments.mass_properties(density if mass is None else mass / moments.volume)
 
 
 def joined_surfaces(surfaces: Sequence[SurfaceMesh]) -> tuple[Array, Indices] | None:

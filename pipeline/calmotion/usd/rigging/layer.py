@@ -10,10 +10,10 @@ import numpy as np
 
 from calmotion.arrays import Array, IntArray
 from calmotion.catalogs.materials import Material
+from calmotion.mesh.moments import surface_moments
 from calmotion.model import MassProperties, Provenance
 from calmotion.rigging.links import Link, tip_of
 from calmotion.usd import gf
-from calmotion.usd.reading.bodies.moments import surface_moments
 from calmotion.usd.reading.skeletons import BoundSkeleton
 from calmotion.usd.stages import RIG
 from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation

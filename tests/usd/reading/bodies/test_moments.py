@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.mesh.moments import is_closed, sum_of, surface_moments, tetrahedron_moments
 from calmotion.model import MassProperties
 from calmotion.usd import schemas
-from calmotion.usd.reading.bodies.moments import is_closed, sum_of, surface_moments, tetrahedron_moments
 from calmotion.usd.reading.bodies.polygons import triangulate
 from calmotion.usd.reading.bodies.primitives import solid
 from pxr import Usd, UsdGeom

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.arrays import Array
+from calmotion.mesh.moments import Moments, sum_of, surface_moments
 from calmotion.model import MassProperties
 from calmotion.usd import gf, schemas
 from calmotion.usd.dialects import number_of
 from calmotion.usd.reading.bodies.flexible import ELASTIC
-from calmotion.usd.reading.bodies.moments import Moments, sum_of, surface_moments
 from calmotion.usd.reading.bodies.primitives import TYPES
 from calmotion.usd.reading.bodies.shapes import MESH, Shape
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below

@@ -4,17 +4,19 @@ Cylinders and capsules also of two radii (`Cylinder_1`, `Capsule_1`)."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
-from calmotion.usd.reading.bodies.moments import Moments, together
+from calmotion.mesh.moments import Moments
 
 if TYPE_CHECKING:
     from pxr import Usd
 
+Part = tuple[float, float, Callable[[Array], Array]]  # from and to along z, and the radius there
 _TWO_RADII = ("Cylinder_1", "Capsule_1")
 TYPES = ("Cube", "Sphere", "Cylinder", "Capsule", "Cone", *_TWO_RADII)
 _SIDES = 32  # facets around an axis: within 0.5 % of a circle
@@ -42,48 +44,26 @@ def solid(prim: Usd.Prim, time: float) -> tuple[Array, IntArray, Moments]:
     if kind == "Cube":
         size = _positive(prim, "size", time)
         return (*_cube(size), Moments(size**3, np.zeros(3), np.eye(3) * size**5 / 12.0))
-    if kind in _TWO_RADII:
-        return _of_two_radii(prim, kind, time)
-    radius = _positive(prim, "radius", time)
     if kind == "Sphere":
+        radius = _positive(prim, "radius", time)
         profile = _arc(radius, 0.0, -np.pi / 2, np.pi / 2, 2 * _RINGS)
-        moments = Moments(4.0 / 3.0 * np.pi * radius**3, np.zeros(3), np.eye(3) * 4.0 / 15.0 * np.pi * radius**5)
-        return (*_revolve(profile), moments)
-    height = _positive(prim, "height", time)
-    half = height / 2.0
-    if kind == "Cylinder":
-        profile = np.array([[0.0, -half], [radius, -half], [radius, half], [0.0, half]])
-        moments = _cylinder(radius, height)
-    elif kind == "Cone":
-        profile = np.array([[0.0, -half], [radius, -half], [0.0, half]])
-        volume = np.pi * radius**2 * height / 3.0
-        moments = Moments(
-            volume,
-            np.array([0.0, 0.0, -height / 4.0]),
-            volume * np.diag([3.0 / 20.0 * radius**2] * 2 + [3.0 / 80.0 * height**2]),
-        )
-    else:
-        profile = np.concatenate(
-            [_arc(radius, -half, -np.pi / 2, 0.0, _RINGS), _arc(radius, half, 0.0, np.pi / 2, _RINGS)]
-        )
-        moments = _capsule(radius, height)
-    points, triangles = _revolve(profile)
-    turn = _axis_permutation(prim, time)
-    return points @ turn.T, triangles, moments.mapped(turn, np.zeros(3))
-
-
-def _of_two_radii(prim: Usd.Prim, kind: str, time: float) -> tuple[Array, IntArray, Moments]:
-    """A frustum, and with hemispheres of its radii for a capsule."""
-    low, high, height = (_positive(prim, name, time) for name in ("radiusBottom", "radiusTop", "height"))
-    half = height / 2.0
-    parts = [_frustum(low, high, height)]
-    profile = np.array([[0.0, -half], [low, -half], [high, half], [0.0, half]])
-    if kind == "Capsule_1":
-        parts += [_hemisphere(low, -half, -1.0), _hemisphere(high, half, 1.0)]
+        return (*_revolve(profile), _revolved([_cap(radius, 0.0, -1.0), _cap(radius, 0.0, 1.0)]))
+    names = ("radiusBottom", "radiusTop") if kind in _TWO_RADII else ("radius", "radius")
+    low, high = (_positive(prim, name, time) for name in names)
+    half = _positive(prim, "height", time) / 2.0
+    if kind == "Cone":
+        high = 0.0
+    parts = [(-half, half, lambda z: low + (high - low) * (z + half) / (2.0 * half))]
+    if kind.startswith("Capsule"):
+        parts += [_cap(low, -half, -1.0), _cap(high, half, 1.0)]
         profile = np.concatenate([_arc(low, -half, -np.pi / 2, 0.0, _RINGS), _arc(high, half, 0.0, np.pi / 2, _RINGS)])
+    elif kind == "Cone":
+        profile = np.array([[0.0, -half], [low, -half], [0.0, half]])
+    else:
+        profile = np.array([[0.0, -half], [low, -half], [high, half], [0.0, half]])
     points, triangles = _revolve(profile)
     turn = _axis_permutation(prim, time)
-    return points @ turn.T, triangles, together(parts).mapped(turn, np.zeros(3))
+    return points @ turn.T, triangles, _revolved(parts).mapped(turn, np.zeros(3))
 
 
 def _positive(prim: Usd.Prim, name: str, time: float) -> float:
@@ -144,38 +124,23 @@ def _revolve(profile: Array) -> tuple[Array, IntArray]:
     return np.concatenate(points), np.concatenate(faces).astype(np.int32)
 
 
-def _cylinder(radius: float, height: float) -> Moments:
-    volume = np.pi * radius**2 * height
-    return Moments(volume, np.zeros(3), volume * np.diag([radius**2 / 4.0] * 2 + [height**2 / 12.0]))
+def _cap(radius: float, equator: float, up: float) -> Part:
+    """Half a ball on one side of its equator; up is 1 or -1."""
+    low, high = sorted((equator, equator + up * radius))
+    return low, high, lambda z: np.sqrt(np.maximum(radius**2 - (z - equator) ** 2, 0.0))
 
 
-def _capsule(radius: float, height: float) -> Moments:
-    """A cylinder and two hemispheres (centroid 3r/8 off the equator, second moment about the equator 2/15 pi r^5)."""
-    cylinder = _cylinder(radius, height)
-    ball = 4.0 / 3.0 * np.pi * radius**3
-    across = cylinder.second[0, 0] + 4.0 / 15.0 * np.pi * radius**5
-    offset = height / 2.0
-    along = cylinder.second[2, 2] + 4.0 / 15.0 * np.pi * radius**5 + ball * (offset**2 + 0.75 * offset * radius)
-    return Moments(cylinder.volume + ball, np.zeros(3), np.diag([across, across, along]))
-
-
-def _frustum(low: float, high: float, height: float) -> Moments:
-    """A cone that is cut off, from radius `low` at -height/2 to `high` at height/2: integrals of r^2 and r^4 over z."""
-    d = high - low
-    area = low**2 + low * d + d**2 / 3.0
-    first = low**2 / 2.0 + 2.0 * low * d / 3.0 + d**2 / 4.0  # times z / height, from the lower end
-    second = low**2 / 3.0 + low * d / 2.0 + d**2 / 5.0
-    fourth = sum(low**k * high ** (4 - k) for k in range(5)) / 5.0
-    center = first / area
-    across = np.pi * height * fourth / 4.0
-    along = np.pi * height**3 * (second - first * center)
-    return Moments(
-        np.pi * height * area, np.array([0.0, 0.0, height * (center - 0.5)]), np.diag([across, across, along])
-    )
-
-
-def _hemisphere(radius: float, equator: float, up: float) -> Moments:
-    """Half a ball on one side of its equator; up is 1 or -1 (centroid 3r/8 off the equator)."""
-    volume, own = 2.0 / 3.0 * np.pi * radius**3, 2.0 / 15.0 * np.pi * radius**5
-    off = 0.375 * radius
-    return Moments(volume, np.array([0.0, 0.0, equator + up * off]), np.diag([own, own, own - volume * off**2]))
+def _revolved(parts: Sequence[Part]) -> Moments:
+    """Moments of solids of revolution about z: integrals of r^2, r^2 z, r^2 z^2 and r^4 over z, of degree 4 at most for
+    cones and balls, by the rule of Gauss that is exact to degree 5."""
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    integrals = np.zeros(4)
+    for low, high, radius in parts:
+        z = 0.5 * (low + high) + 0.5 * (high - low) * nodes
+        area = np.pi * radius(z) ** 2
+        rows = np.stack([area, area * z, area * z**2, area**2 / (4.0 * np.pi)])
+        integrals += 0.5 * (high - low) * rows @ weights
+    volume, first, along, across = integrals
+    middle = first / volume
+    center = np.array([0.0, 0.0, middle])
+    return Moments(float(volume), center, np.diag([across, across, along - volume * middle**2]))

@@ -9,11 +9,11 @@ import numpy as np
 
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
+from calmotion.mesh.moments import Moments, is_closed, surface_moments
 from calmotion.model import SurfaceMesh, TetGeometry
 from calmotion.usd import gf
 from calmotion.usd.reading.animated import moves_on_body
 from calmotion.usd.reading.bodies import primitives
-from calmotion.usd.reading.bodies.moments import Moments, is_closed, surface_moments
 from calmotion.usd.reading.bodies.polygons import triangulate
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
 from calmotion.usd.schemas import is_applied

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.arrays import Array, IntArray
+from calmotion.arrays import Array, Indices, IntArray
 from calmotion.model import MassProperties
 
 
@@ -40,27 +39,16 @@ class Moments:
         return MassProperties(density * self.volume, self.center, np.trace(second) * np.eye(3) - second)
 
 
-def together(parts: Sequence[Moments]) -> Moments:
-    """The moments of solids that do not overlap."""
-    volume = sum(part.volume for part in parts)
-    center = sum((part.volume * part.center for part in parts), np.zeros(3)) / volume
-    second = np.zeros((3, 3))
-    for part in parts:
-        off = part.center - center
-        second += part.second + part.volume * np.outer(off, off)
-    return Moments(volume, center, second)
-
-
-def tetrahedron_moments(corners: Array) -> Moments:
-    """Moments of a set of tetrahedra, signed by their orientation.
+def tetrahedron_moments(corners: Array, weights: Array | None = None) -> Moments:
+    """Moments of a set of tetrahedra.
 
     Args:
         corners: Shape [n, 4, 3].
+        weights: In place of their volumes, which are signed by their orientation, shape [n].
 
     Source: integral of x x^T over a simplex, V/20 (sum_i x_i x_i^T + s s^T), s the sum of its corners.
     """
-    edges = corners[:, 1:] - corners[:, :1]
-    volumes = np.linalg.det(edges) / 6.0
+    volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0 if weights is None else weights
     total = float(volumes.sum())
     if total == 0.0:
         return Moments(0.0, np.zeros(3), np.zeros((3, 3)))
@@ -72,7 +60,7 @@ def tetrahedron_moments(corners: Array) -> Moments:
     return Moments(total, center, second / 20.0)
 
 
-def surface_moments(points: Array, triangles: IntArray) -> Moments:
+def surface_moments(points: Array, triangles: Indices) -> Moments:
     """Moments of the solid within a closed triangulated surface; an inward surface is turned outward.
 
     Args:
