@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -11,10 +12,15 @@ from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.schemas import NAMES
 
 if TYPE_CHECKING:
-    from pxr import Usd
+    from pxr import Sdf, Usd
 
 _PHYSICS = ("PhysicsMassAPI", "PhysicsRigidBodyAPI", "PhysicsCollisionAPI", "PhysicsMaterialAPI")
 _DRIVE, _DRIVES = "PhysicsDriveAPI", ("angular", "linear")
+_SAME_IN_PYTHON = {
+    "text": ("TfToken", "std::string"),
+    "real": ("GfHalf", "float", "double"),
+    "whole": ("int", "unsigned int", "int64_t", "uint64_t"),
+}
 _RESET, _INVERSE = "!resetXformStack!", "!invert!"
 
 
@@ -126,24 +132,10 @@ def _alike(found: str, wanted: str) -> bool:
     from pxr import Sdf
 
     one, other = (Sdf.ValueTypeNames.Find(name) for name in (found, wanted))
-    if not one or not other:
-        return False
-    if one.type == other.type:
-        return True
-    groups = (("half", "float", "double"), ("token", "string"), ("int", "uint", "int64", "uint64"))
-    for group in groups:
-        if found in group and wanted in group:
-            return True
-    return _shape(found) == _shape(wanted) is not None
+    return bool(one and other) and one.isArray == other.isArray and _kind(one) == _kind(other)
 
 
-def _shape(name: str) -> tuple[str, str] | None:
-    """What kind of vector, quaternion or matrix of reals a type is, whatever its precision and role."""
-    for role in ("point", "vector", "normal", "color", "texCoord", "float", "double", "half"):
-        rest = name.removeprefix(role)
-        if rest != name and rest[:1] in ("2", "3", "4"):
-            return rest[:1], "[]" * name.endswith("[]")
-    for role in ("quat", "matrix"):
-        if name.startswith(role):
-            return role + (name[6:7] if role == "matrix" else ""), "[]" * name.endswith("[]")
-    return None
+def _kind(of: Sdf.ValueTypeName) -> str:
+    """What a value, or an element of an array, is, whatever its precision and role."""
+    name = re.sub(r"^(Gf(?:Vec|Quat|Matrix)\d?)[dfh]$", r"\1", str(of.scalarType.cppTypeName))
+    return next((kind for kind, names in _SAME_IN_PYTHON.items() if name in names), name)
