@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from calmotion.model import ElasticMaterial, FlexibleSettings, Simplification
 from calmotion.reduction import cache as reduction_cache
-from calmotion.reduction.cache import cache_key, cached_reduction, recomputed
+from calmotion.reduction.cache import cache_key, cached_reduction, known_reduction, recomputed, store_reduction
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
 
 
@@ -196,3 +196,9 @@ def test_several_processes_at_once_never_see_half_a_file(folder, repository):
         assert code == 0, err
         assert int(out) < 40
     assert not list(folder.glob(".calmotion-*"))
+
+
+def test_a_value_that_is_stored_takes_the_place_of_the_one_before():
+    for value in (1.0, 2.0):
+        store_reduction(("a body", 1), value)
+        assert known_reduction(("a body", 1)) == value

@@ -63,12 +63,17 @@ def cached_reduction(key_parts: object, compute: Callable[[], T]) -> T:
     found: T | None = None if _recomputed.get() else known_reduction(key_parts)
     if found is not None:
         return found
-    key, value = cache_key(key_parts), compute()
-    arrays: list[Any] = []
+    value = compute()
+    store_reduction(key_parts, value)
+    return value
+
+
+def store_reduction(key_parts: object, value: object) -> None:
+    """Store a value under a key, see `cached_reduction`, in place of the one that is there."""
+    key, arrays = cache_key(key_parts), list[Any]()
     structure = json.dumps({"key": key, "value": _encode(value, arrays)}).encode()
     named = {f"a{k}": array for k, array in enumerate(arrays)}
     store_arrays(REDUCTIONS, key, {"structure": np.frombuffer(structure, dtype=np.uint8)} | named)
-    return value
 
 
 def known_reduction(key_parts: object) -> Any:

@@ -70,7 +70,7 @@ def reduce_bodies(
         models.expect(members.values())
 
     def reduced(index: int) -> ReducedBody:
-        from calmotion.reduction.cache import cached_reduction
+        from calmotion.reduction.cache import cached_reduction, store_reduction
 
         own = members[index]
         load_envelope = None if load_envelopes is None else load_envelopes[index]
@@ -84,7 +84,8 @@ def reduce_bodies(
 
             assert models is not None
             made = reduce_body(*parts, full=models.of(own))
-            cached_reduction(_meshed_before(own.body, own.attachments, own.root), lambda: replace(made, skin=()))
+            # of finer and finer meshes the last one stays
+            store_reduction(_meshed_before(own.body, own.attachments, own.root), replace(made, skin=()))
             return made
 
         return cached_reduction(parts, reduce)
