@@ -69,7 +69,7 @@ def plot_signals(curves: Sequence[ChannelCurves]) -> Figure:
             ):  # fmt: skip
                 axes.plot(curve.times, values[:, c], color=color, linewidth=0.9, linestyle=style, label=label)
             name = f" {COMPONENTS[c]}" if curve.measured.shape[1] > 1 else ""
-            tidy(axes, curve.unit if c == 0 else "", f"{_title(curve)}{name}")
+            tidy(axes, f"[{curve.unit}]", f"{_title(curve)}{name}")
     grid[0][0].legend(fontsize=SMALL, frameon=False)
     for axes in grid[-1]:
         axes.set_xlabel("time [s]", fontsize=SMALL)
@@ -85,7 +85,7 @@ def plot_residual_spectra(curves: Sequence[ChannelCurves]) -> Figure:
         ):  # fmt: skip
             frequencies, amplitudes = _spectrum(curve.times, curve.measured - values)
             axes.semilogy(frequencies, amplitudes, color=color, linewidth=0.9, linestyle=style, label=label)
-        tidy(axes, curve.unit, _title(curve))
+        tidy(axes, f"amplitude [{curve.unit}]", _title(curve))
     first = figure.axes[0]
     first.legend(fontsize=SMALL, frameon=False)
     figure.axes[-1].set_xlabel("frequency [Hz]", fontsize=SMALL)

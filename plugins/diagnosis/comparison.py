@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.recordings import ACCELEROMETER, UNITS
 
 from .explanations.base import Explanation
 from .explanations.joints import Backlash, Ripple
@@ -224,7 +223,7 @@ class Comparison:
                 float(np.sqrt(np.mean(np.concatenate([v[s.blocks[b]] for b in own]) ** 2))) / weight
                 for v in (s.error, best.left)
             )
-            unit = "m/s" if sensor.kind == ACCELEROMETER else UNITS[sensor.kind]  # accelerations are integrated
+            unit = sensor.error_unit
             rows.append(
                 {"name": sensor.name, "unit": unit, "error_rms": error, "noise": noise, "unexplained_rms": left}
             )

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.recordings import ANGLE
+from calmotion.recordings import ANGLE, UNITS
 from calmotion.views import AFTER, BEFORE, INTENDED, LIMIT, SMALL, new_figure, save, short, tidy
 from matplotlib.figure import Figure
 
@@ -59,8 +59,8 @@ def plot_motion(diagnosis: Diagnosis) -> Figure:
         if diagnosis.fit is not None:
             explained = (s.error - diagnosis.fit.left)[rows] / s.weights[k]
             right.plot(sensor.times, explained, color=AFTER, lw=0.8, label="explained")
-        tidy(left, short(sensor.path))
-        tidy(right, "")
+        tidy(left, f"{sensor.kind} [{UNITS[sensor.kind]}]", short(sensor.path))
+        tidy(right, f"error [{sensor.error_unit}]", f"{short(sensor.path)}: error")
     for axes in grid[0]:
         axes.legend(fontsize=SMALL, loc="upper right")
     for axes in grid[-1]:
@@ -83,7 +83,7 @@ def plot_spectra(diagnosis: Diagnosis) -> Figure:
                 if row["unit"] == "Hz":
                     axes.axvline(row["value"], color=LIMIT, lw=0.8, ls=":")
                     axes.annotate(cause.cause, (row["value"], 1.0), xycoords=("data", "axes fraction"), fontsize=SMALL)
-        tidy(axes, short(sensor.path))
+        tidy(axes, f"amplitude [{sensor.error_unit}]", f"{short(sensor.path)}: error")
     axes.legend(fontsize=SMALL)
     axes.set_xlabel("frequency [Hz]")
     return figure
@@ -108,9 +108,9 @@ def plot_speed_and_torque(diagnosis: Diagnosis) -> Figure:
             if since is not None:
                 near = (since >= 0.0) & (since < 0.5)
                 right.plot(since[near], error[near], ".", ms=1.5, color=BEFORE)
-        tidy(left, f"error of {short(sensor.path)}")
-        tidy(right, "")
-    left.set_xlabel("speed of the command")
+        tidy(left, f"error [{sensor.error_unit}]", f"{short(sensor.path)}: error over speed")
+        tidy(right, f"error [{sensor.error_unit}]", f"{short(sensor.path)}: error after reversals of torque")
+    left.set_xlabel("speed of the command [rad/s or m/s]")
     right.set_xlabel("time since the torque changed its sign [s]")
     return figure
 

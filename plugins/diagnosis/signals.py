@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.recordings import ANGLE
+from calmotion.recordings import ACCELEROMETER, ANGLE, UNITS
 
 HEALTHY = 0.7  # ratio of critical damping of a loop that does not ring
 STRIBECK = 0.05  # speed over which the excess of friction at rest is gone [rad/s or m/s]
@@ -76,6 +76,11 @@ class Sensor:
     def name(self) -> str:
         """Kind and path."""
         return f"{self.kind} {self.path}"
+
+    @property
+    def error_unit(self) -> str:
+        """Unit of its errors: accelerations are integrated."""
+        return "m/s" if self.kind == ACCELEROMETER else UNITS[self.kind]
 
 
 @dataclass(frozen=True, eq=False)
