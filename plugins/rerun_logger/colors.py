@@ -56,15 +56,6 @@ def luminance(color: Sequence[float]) -> float:
     return float(linear @ (0.2126, 0.7152, 0.0722))
 
 
-def contrast(first: Sequence[float], second: Sequence[float]) -> float:
-    """Contrast of two colors, 1 to 21.
-
-    Source: Web Content Accessibility Guidelines 2.2, contrast ratio.
-    """
-    dark, bright = sorted((luminance(first), luminance(second)))
-    return (bright + 0.05) / (dark + 0.05)
-
-
 def fading(color: Color, count: int) -> Array:
     """Colors from a pale one to the full color, shape [count, 3], 8 bits.
 

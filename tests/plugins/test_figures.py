@@ -137,14 +137,6 @@ def test_of_many_targets_the_figure_shows_the_worst_and_says_so(figures):
     assert "8 of 12" in figure.get_supxlabel()
 
 
-def test_the_instants_are_the_worst_of_each_part_of_the_shot(figures):
-    animation, result = synthetic.animation(), synthetic.result()
-    times = figures.filmstrip.choose_instants(animation, result, 3)
-    errors = np.interp(animation.frame_times, result.before.motion.times, result.before.position_errors[:, 0])
-    parts = np.array_split(np.arange(synthetic.FRAMES), 3)
-    assert times.tolist() == [animation.frame_times[part[np.argmax(errors[part])]] for part in parts]
-
-
 def test_it_is_skipped_when_no_figures_are_requested():
     values = [synthetic.character(), synthetic.animation(), synthetic.result(), OutputPaths()]
     with pytest.raises(PluginError, match="--figures"):
@@ -184,21 +176,3 @@ def test_robustness_is_drawn_as_shares_of_robots_beside_the_error_of_the_model(f
     assert points == {60.0, 1.0, 2.0}
     result = dataclasses.replace(synthetic.result(), robustness=found)
     assert "robustness.png" in [Path(path).name for path in draw(tmp_path, result, {"figures.plot": {"dpi": 60}})]
-
-
-def test_spectra_name_the_pose_of_the_modes(figures):
-    modes = SystemModes(np.array([4.0]), np.array([0.01]), 0.25)
-    (axes,) = figures.spectra.plot_spectra(synthetic.character(), synthetic.result(), modes).axes
-    assert "modes in the pose at 0.25 s (largest error)" in lines_of(axes)
-
-
-def test_the_filmstrip_has_the_whole_trails(figures, monkeypatch):
-    monkeypatch.setattr(figures.filmstrip, "choose_instants", lambda animation, result, count: np.array([0.6]))
-    character, animation, result = synthetic.character(), synthetic.animation(), synthetic.result()
-    figure = figures.filmstrip.draw_filmstrip(character, animation, result, 1)
-    trails = [line for axes in figure.axes for line in axes.get_lines() if len(line.get_xdata()) > 1]
-    assert len(trails) == 4  # two in the panel of each row
-    for line in trails:
-        (left, right), (bottom, top) = line.axes.get_xlim(), line.axes.get_ylim()
-        assert np.all((line.get_xdata() >= left) & (line.get_xdata() <= right))
-        assert np.all((line.get_ydata() >= top) & (line.get_ydata() <= bottom))

@@ -1,7 +1,7 @@
 """What robots that others made cost: `calmotion bench robots FILE ...` makes the two longest links of each flexible.
 
 Each FILE is a USD robot without a shot of ours, such as `calmotion import` writes. Its two longest links that a driven
-joint carries become flexible (polyamide), all driven joints move for two seconds, as far as their limits allow, and its
+joint carries become flexible (nylon), all driven joints move for two seconds, as far as their limits allow, and its
 last link is the target. The caches of meshes and reductions are empty, kernels are at hand after the first robot, and
 no tolerance is asked for. The table has processor seconds by stage, the memory, and the verdict.
 """
@@ -13,20 +13,25 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from calmotion import ShotError
+from calmotion.arrays import Array
+from calmotion.model import WORLD, Body, Joint
+from calmotion.multibody import span_tree
+from calmotion_plugins.robot_import import import_robot
 
 from ..common.reporting import bench_parser, finish, keep, say
-from ..scenes.links import POLYAMIDE, Link, read_links
 from .stages import OPERATORS
 
-SECONDS, RATE = 2.0, 60.0  # length of the motion [s], and its frames [1/s]
-TURN = 40.0  # of a joint, where its limits allow it [deg]
+SECONDS = 2.0  # length of the motion [s]
+TIMES = np.linspace(0.0, SECONDS, round(60.0 * SECONDS) + 1)  # of its frames
+TURN = np.radians(40.0)  # of a joint, where its limits allow it
+MATERIAL = "nylon"
 LINKS = 2
 STAGES = ("read", "analyse", "mesh", "reduce", "refine", "search")
 
@@ -119,114 +124,38 @@ def compose(file: str, out: Path, links: int) -> list[str]:
     Raises:
         ShotError: It cannot be read, or no driven joint carries a link with a surface.
     """
-    from calmotion.usd import open_stage
-
-    robot = open_stage(file)  # which registers the schemas
-    from pxr import Sdf, Usd, UsdGeom, UsdPhysics
-
-    joints = list(_driven(robot))
-    solid = {link.body.path: _length(link) for link in read_links(file) if link.body.surfaces}
-    carried = sorted({body for _, body in joints} & solid.keys(), key=lambda body: (solid[body], body), reverse=True)
-    chosen = carried[:links]
+    robot = import_robot(file, layer=out).character
+    joints = [robot.joints[motor.joint] for motor in robot.motors if motor.optimize]
+    carried = {joint.body1 for joint in joints if robot.bodies[joint.body1].surfaces}
+    chosen = sorted(carried, key=lambda k: (_length(robot.bodies[k]), robot.bodies[k].path), reverse=True)[:links]
     if not chosen:
         raise ShotError("no driven joint carries a link with a surface", path=file, remedy="Name another robot")
-    layer = Sdf.Layer.CreateNew(str(out))
-    layer.subLayerPaths = [os.path.abspath(file)]
-    stage = Usd.Stage.Open(layer)
-    stage.SetDefaultPrim(stage.GetPrimAtPath(robot.GetDefaultPrim().GetPath()))
-    UsdGeom.SetStageMetersPerUnit(stage, UsdGeom.GetStageMetersPerUnit(robot))
-    UsdPhysics.SetStageKilogramsPerUnit(stage, UsdPhysics.GetStageKilogramsPerUnit(robot))
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.GetStageUpAxis(robot))
-    stage.SetTimeCodesPerSecond(RATE)
-    stage.SetFramesPerSecond(RATE)
-    stage.SetStartTimeCode(0)
-    stage.SetEndTimeCode(SECONDS * RATE)
-    _make_flexible(stage, chosen)
-    for path, _ in joints:
-        _animate(stage.GetPrimAtPath(path))
-    stage.GetPrimAtPath(_farthest(robot, [body for _, body in joints])).ApplyAPI("CalmTargetAPI")
-    layer.Save()
-    return chosen
+    motion: dict[str, Any] = {"time_s": TIMES} | {joint.name: _swing(joint) for joint in joints}
+    np.savez(out.with_suffix(".npz"), **motion)
+    tree, depth = span_tree(robot), [0] * (len(robot.bodies) + 1)
+    for body, parent in zip(tree.body, tree.parent, strict=True):
+        depth[body] = 1 + depth[tree.body[parent] if parent >= 0 else WORLD]
+    last = max((joint.body1 for joint in joints), key=lambda k: depth[k])
+    names = {k: robot.bodies[k].path.rpartition("/")[2] for k in (*chosen, last)}
+    flexible = [f"{names[k]}={MATERIAL}" for k in chosen]
+    import_robot(file, layer=out, motion=out.with_suffix(".npz"), flexible=flexible, targets=[names[last]])
+    return [robot.bodies[k].path for k in chosen]
 
 
-def _make_flexible(stage: Any, bodies: Sequence[str]) -> None:
-    """Apply the schema to bodies, with polyamide."""
-    from pxr import Sdf, UsdShade
-
-    material = UsdShade.Material.Define(stage, stage.GetDefaultPrim().GetPath().AppendChild("BenchPolyamide"))
-    prim = material.GetPrim()
-    prim.AddAppliedSchema("PhysicsVolumeDeformableMaterialAPI")
-    material_of = {"youngsModulus": POLYAMIDE.youngs_modulus, "poissonsRatio": POLYAMIDE.poissons_ratio}
-    for name, value in (material_of | {"density": POLYAMIDE.density}).items():
-        prim.CreateAttribute(f"physics:{name}", Sdf.ValueTypeNames.Float).Set(value)
-    for body in bodies:
-        link = stage.GetPrimAtPath(body)
-        link.ApplyAPI("CalmFlexibleBodyAPI")
-        UsdShade.MaterialBindingAPI.Apply(link).Bind(material, materialPurpose="physics")
-
-
-def _driven(stage: Any) -> Iterator[tuple[str, str]]:
-    """Revolute and prismatic joints that actuators or drives turn, else all, and the body that each carries."""
-    from calmotion.usd import actuated_joints
-    from pxr import UsdPhysics
-
-    driven = set(actuated_joints(stage)) or {
-        str(prim.GetPath()) for prim in stage.Traverse() if any("DriveAPI" in api for api in prim.GetAppliedSchemas())
-    }
-    for prim in stage.Traverse():
-        if driven and str(prim.GetPath()) not in driven:
-            continue
-        if prim.GetTypeName() not in ("PhysicsRevoluteJoint", "PhysicsPrismaticJoint"):
-            continue
-        joint = UsdPhysics.Joint(prim)
-        bodies = joint.GetBody1Rel().GetTargets()
-        if bodies and not joint.GetExcludeFromArticulationAttr().Get():
-            yield str(prim.GetPath()), str(bodies[0])
-
-
-def _farthest(stage: Any, bodies: Sequence[str]) -> str:
-    """The body with the most joints between it and the world."""
-    from pxr import UsdPhysics
-
-    carriers: dict[str, str] = {}
-    for prim in stage.Traverse():
-        if prim.IsA(UsdPhysics.Joint):
-            joint = UsdPhysics.Joint(prim)
-            inner, outer = (relation.GetTargets() for relation in (joint.GetBody0Rel(), joint.GetBody1Rel()))
-            if inner and outer:
-                carriers.setdefault(str(outer[0]), str(inner[0]))
-
-    def depth(body: str) -> int:
-        count = 0
-        while body in carriers and count < len(carriers):
-            body, count = carriers[body], count + 1
-        return count
-
-    return max(bodies, key=depth)
-
-
-def _length(link: Link) -> float:
+def _length(body: Body) -> float:
     """Longest side of the surfaces of a body, to a micrometre [m]."""
-    points = np.concatenate([surface.points for surface in link.body.surfaces])
-    return round(float(np.ptp(points, axis=0).max()), 6)
+    return round(float(np.ptp(np.concatenate([surface.points for surface in body.surfaces]), axis=0).max()), 6)
 
 
-def _animate(prim: Any) -> None:
-    """There and back again by a quintic, as far as the limits of the joint allow."""
-    from pxr import UsdPhysics
-
-    turns = prim.GetTypeName() == "PhysicsRevoluteJoint"
-    api = UsdPhysics.RevoluteJoint(prim) if turns else UsdPhysics.PrismaticJoint(prim)
-    low, high = (value.Get() for value in (api.GetLowerLimitAttr(), api.GetUpperLimitAttr()))
-    low, high = (v if v is not None and np.isfinite(v) else s * 1e3 for v, s in ((low, -1.0), (high, 1.0)))
+def _swing(joint: Joint) -> Array:
+    """There and back again by a quintic, as far as the limits of a joint allow [rad or m]."""
+    low, high = max(joint.lower, -1e3), min(joint.upper, 1e3)
     start = float(np.clip(0.0, low, high))
-    reach = high - start if high - start >= start - low else low - start
-    move = float(np.clip(0.5 * reach, -TURN, TURN)) if turns else 0.5 * reach
-    drive = UsdPhysics.DriveAPI.Apply(prim, "angular" if turns else "linear")
-    target = drive.CreateTargetPositionAttr()
-    for frame in range(round(SECONDS * RATE) + 1):
-        s = np.clip(2.0 * abs(frame / (SECONDS * RATE) - 0.5) / 0.8, 0.0, 1.0)
-        target.Set(start + move * (1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s * s)), frame)
+    move = 0.5 * (high - start if high - start >= start - low else low - start)
+    if joint.kind == "revolute":
+        move = float(np.clip(move, -TURN, TURN))
+    s = np.clip(2.0 * np.abs(TIMES / SECONDS - 0.5) / 0.8, 0.0, 1.0)
+    return np.asarray(start + move * (1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s * s)))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -30,7 +30,7 @@ from .motor_groups import of_each_motor
 from .parameters import DEFAULT, Parameter
 from .problem import Calibrated
 from .recordings.clocks import clock_of
-from .recordings.plausible import refuse_far, refuse_long, refuse_still
+from .recordings.plausible import refuse_long, refuse_unlike
 from .recordings.sensors import Sensor, gauge_parameters, measurement_parameters, sensors_of, start_parameters
 from .search import HALVINGS, Found, profiled, search, step_of
 from .signals import begins_in_motion, refuse_cyclic
@@ -101,8 +101,7 @@ def calibrate_shots(
     rows: list[Parameter] = []
     progress(0.02, "finding the clocks of the recordings")
     for k, (take, (shot, recordings)) in enumerate(zip(takes, performed, strict=True)):
-        refuse_far(shot.character, recordings, nominal[k])
-        refuse_still(shot.character, recordings, nominal[k])
+        refuse_unlike(shot.character, recordings, nominal[k])
         robots = [nominal[k]] if known else [nominal[k], *hardly_shaking(take, options)]
         clocks = [0.0 if known else clock_of(recording, shot.character, robots) for recording in recordings]
         first, last = (0.0 if nominal[k].times[0] < 0.0 else -np.inf), float(nominal[k].times[-1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion_plugins.live import Stream
-from calmotion_plugins.live.limits import MotorLimits, braking_speed
+from calmotion_plugins.live.limits import MotorLimits
 
 TICK = 0.004
 
@@ -30,27 +30,6 @@ def assert_within(found, bounds, rounding=1e-9):
     assert np.all(found <= bounds.upper + rounding) and np.all(found >= bounds.lower - rounding)
     assert np.all(np.abs(speed) <= bounds.velocity * (1.0 + rounding) + 1e-9)
     assert np.all(np.abs(change) <= bounds.acceleration * (1.0 + 1e-6) + 1e-5)
-
-
-@pytest.mark.parametrize("acceleration", [1.0, 40.0, 1e4])
-def test_braking_covers_the_distance_and_no_more(acceleration):
-    for distance in (0.0, 1e-6, 1e-3, 0.5, 3.0):
-        speed, left = float(braking_speed(np.array([distance]), np.array([acceleration]), TICK)[0]), distance
-        while speed > 0.0:
-            left -= TICK * speed
-            speed = max(0.0, speed - acceleration * TICK)
-        assert -1e-12 <= left <= 1e-9 + acceleration * TICK**2
-
-
-def test_any_wanted_speeds_keep_all_limits():
-    random, bounds = np.random.default_rng(0), limits(3)
-    position, speed, found = np.zeros(3), np.zeros(3), []
-    for k in range(10_000):
-        wanted = random.normal(size=3) * 10.0 ** random.uniform(-2, 3) if k % 50 else np.full(3, 1e3)
-        speed, _ = bounds.kept(position, speed, wanted)
-        position = position + TICK * speed
-        found.append(position)
-    assert_within(np.array(found), bounds)
 
 
 def test_samples_in_time_pass_unchanged():

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Character, reach
-from calmotion.recordings import ANGLE, MARKER, SensorRecording
+from calmotion.recordings import ANGLE, MARKER, Channel, SensorRecording
 
 from ..signals import Signals
 
@@ -36,37 +37,9 @@ def refuse_long(recordings: Sequence[SensorRecording], length: float) -> None:
             )  # fmt: skip
 
 
-def refuse_far(character: Character, recordings: Sequence[SensorRecording], robot: Signals) -> None:
-    """Refuse recordings whose markers are far from where the robot has them at any time.
-
-    Args:
-        character: The robot.
-        recordings: The recordings.
-        robot: Signals of the robot of the shot.
-
-    Raises:
-        ShotError: One is.
-    """
-    targets = {target.path: k for k, target in enumerate(character.targets)}
-    size = reach(character)
-    for recording in recordings:
-        for channel in recording.channels:
-            if channel.kind != MARKER or channel.path not in targets:
-                continue
-            measured = np.isfinite(channel.values).any(axis=0)
-            here = np.median(robot.positions[:, targets[channel.path]], axis=0)
-            away = float(np.linalg.norm(np.nanmedian(channel.values[:, measured], axis=0) - here[measured]))
-            if away > FARTHEST * size:
-                raise ShotError(
-                    "the marker is far from the robot", path=recording.file, attribute=channel.name,
-                    found=f"{away:.3g} m away, where the robot reaches {size:.3g} m",
-                    remedy="Write positions in metres and in the world of the shot, or their unit into the map of the "
-                    "recording",
-                )  # fmt: skip
-
-
-def refuse_still(character: Character, recordings: Sequence[SensorRecording], robot: Signals) -> None:
-    """Refuse recordings in which no marker and no angle moves that does in the shot.
+def refuse_unlike(character: Character, recordings: Sequence[SensorRecording], robot: Signals) -> None:
+    """Refuse recordings whose markers are far from where the robot has them at any time, and those in which no marker
+    and no angle moves that does in the shot.
 
     Args:
         character: The robot.
@@ -87,13 +60,29 @@ def refuse_still(character: Character, recordings: Sequence[SensorRecording], ro
             if signal is None:
                 continue
             measured = np.isfinite(channel.values).any(axis=0)
-            moves = float(np.max(np.ptp(signal[:, measured], axis=0)))
-            values = channel.values[:, measured]
+            values, signal = channel.values[:, measured], signal[:, measured]
+            if channel.kind == MARKER:
+                _refuse_far(recording.file, channel, values, signal, reach(character))
+            moves = float(np.max(np.ptp(signal, axis=0)))
             if moves > 0.0:
                 shares.append(float(np.max(np.nanmax(values, axis=0) - np.nanmin(values, axis=0))) / moves)
         if shares and max(shares) < LEAST:
             raise ShotError(
-                "nothing moves in the recording", path=recording.file,
+                "nothing moves in the recording",
+                path=recording.file,
                 found=f"at most {100.0 * max(shares):.2g}% of the motion of the shot",
                 remedy="Record the performance of this shot, and check which columns hold it",
-            )  # fmt: skip
+            )
+
+
+def _refuse_far(file: str, channel: Channel, values: Array, signal: Array, size: float) -> None:
+    away = float(np.linalg.norm(np.nanmedian(values, axis=0) - np.median(signal, axis=0)))
+    if away > FARTHEST * size:
+        raise ShotError(
+            "the marker is far from the robot",
+            path=file,
+            attribute=channel.name,
+            found=f"{away:.3g} m away, where the robot reaches {size:.3g} m",
+            remedy="Write positions in metres and in the world of the shot, or their unit into the map of the "
+            "recording",
+        )

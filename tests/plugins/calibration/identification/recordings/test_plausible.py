@@ -8,7 +8,8 @@ from calmotion import ShotError
 from calmotion.model.run import RunSettings
 from calmotion.recordings import MARKER
 from calmotion_plugins.calibration.identification.calibrate import CalibrationSettings, calibrate_shot
-from calmotion_plugins.calibration.identification.recordings.plausible import refuse_far, refuse_long, refuse_still
+from calmotion_plugins.calibration.identification.recordings.plausible import refuse_long, refuse_unlike
+from calmotion_plugins.calibration.identification.robots import robot_with
 from calmotion_plugins.calibration.identification.signals import signals_of
 
 OPTIONS = RunSettings(step=1 / 240, integrator="generalized-alpha")
@@ -33,30 +34,27 @@ def test_times_in_milliseconds_are_refused_before_the_shot_is_simulated(recorded
         calibrate_shot(recorded_shot, wrong, CalibrationSettings(), OPTIONS)
 
 
-def test_markers_in_millimetres_or_in_another_frame_are_refused(recorded_shot, recordings):
-    signals = signals_of_shot(recorded_shot)
-    refuse_far(recorded_shot.character, recordings, signals)
-    for wrong in (dict(values=1000.0), dict(offset=np.array([0.0, 100.0, np.nan]))):
-        with pytest.raises(ShotError, match="in metres and in the world"):
-            refuse_far(recorded_shot.character, [changed(recording, **wrong) for recording in recordings], signals)
+@pytest.fixture(scope="module")
+def signals(recorded_shot):
+    return signals_of(robot_with(recorded_shot, {}), OPTIONS)
 
 
-def test_a_robot_that_rests_is_no_recording_of_a_shot_that_moves(recorded_shot, recordings):
-    signals = signals_of_shot(recorded_shot)
-    refuse_still(recorded_shot.character, recordings, signals)
-    still = [
-        dataclasses.replace(
-            recording,
-            channels=tuple(dataclasses.replace(c, values=0.01 * (c.values - np.nanmean(c.values, axis=0)))
-                           for c in recording.channels),
-        )
-        for recording in recordings
-    ]  # fmt: skip
-    with pytest.raises(ShotError, match="nothing moves"):
-        refuse_still(recorded_shot.character, still, signals)
+def resting(recording):
+    channels = (dataclasses.replace(c, values=0.01 * (c.values - np.nanmean(c.values, axis=0)))
+                for c in recording.channels if c.kind != MARKER)  # fmt: skip
+    return dataclasses.replace(recording, channels=tuple(channels))
 
 
-def signals_of_shot(shot):
-    from calmotion_plugins.calibration.identification.robots import robot_with
-
-    return signals_of(robot_with(shot, {}), OPTIONS)
+@pytest.mark.parametrize(
+    ("wrong", "match"),
+    [
+        (lambda recording: changed(recording, values=1000.0), "in metres and in the world"),
+        (lambda recording: changed(recording, offset=np.array([0.0, 100.0, np.nan])), "in metres and in the world"),
+        (resting, "nothing moves"),
+    ],
+    ids=["millimetres", "another frame", "rest"],
+)
+def test_recordings_that_cannot_be_of_the_shot_are_refused(recorded_shot, recordings, signals, wrong, match):
+    refuse_unlike(recorded_shot.character, recordings, signals)
+    with pytest.raises(ShotError, match=match):
+        refuse_unlike(recorded_shot.character, [wrong(recording) for recording in recordings], signals)
