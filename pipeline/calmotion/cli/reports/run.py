@@ -153,9 +153,7 @@ def print_run(report: dict[str, Any], console: Console, verbose: bool = False) -
         console: Where it is printed.
         verbose: Whether the search, the steps, the error budget and the notes are printed as well.
     """
-    paths = [row["path"] for kind in ("targets", "limits", "efforts", "contacts") for row in report[kind]]
-    names = {path: f"…/{name}" for path, name in distinct_names(paths).items() if len(path) > LONG_PATH}
-    report = with_texts(report, lambda text: names.get(text, text))
+    report, shortened = _with_short_paths(report)
     print_verdict(console, report)
     print_errors(console, report, verbose)
     print_remaining(console, report)
@@ -168,8 +166,15 @@ def print_run(report: dict[str, Any], console: Console, verbose: bool = False) -
         print_work(console, report)
         print_notes(console, report["notes"])
     print_left_out(console, report["left_out"], verbose)
-    if names:
+    if shortened:
         say(console, SHORTENED)
+
+
+def _with_short_paths(report: dict[str, Any]) -> tuple[dict[str, Any], bool]:
+    """The report with the last names of long prim paths, and whether it has some."""
+    paths = [row["path"] for kind in ("targets", "limits", "efforts", "contacts") for row in report[kind]]
+    names = {path: f"…/{name}" for path, name in distinct_names(paths).items() if len(path) > LONG_PATH}
+    return with_texts(report, lambda text: names.get(text, text)), bool(names)
 
 
 def print_errors(console: Console, report: dict[str, Any], verbose: bool = False) -> None:
@@ -295,10 +300,13 @@ def print_work(console: Console, report: dict[str, Any]) -> None:
 
 
 def _print_answer(report: dict[str, Any], console: Console) -> None:
+    report, shortened = _with_short_paths(report)
     print_verdict(console, report)
     print_remaining(console, report)
     print_errors(console, report)
     print_robustness(console, report)
+    if shortened:
+        say(console, SHORTENED)
 
 
 # The parts of the page of `--html` by their headings.
