@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -16,6 +17,7 @@ _TEXTS = ("id", "version", "name", "tagline", "maintainer", "license", "calmotio
 _LISTS = ("tags", "requires")
 _COMMANDS = "commands"
 _COMMAND_FIELDS = ("module", "help")
+_NO_RANGE = "is not a range of versions"
 
 
 @dataclass(frozen=True)
@@ -129,51 +131,31 @@ def _commands(tables: Any, file: Path) -> tuple[CommandEntry, ...]:
 
 
 def _check_values(manifest: Manifest, file: Path) -> None:
-    from packaging.requirements import InvalidRequirement, Requirement
-    from packaging.specifiers import InvalidSpecifier, SpecifierSet
-    from packaging.version import InvalidVersion, Version
+    from packaging.requirements import Requirement
+    from packaging.specifiers import SpecifierSet
+    from packaging.version import Version
 
-    if not re.fullmatch(r"[a-z][a-z0-9_]*", manifest.id):
-        raise PluginError(
-            "must be a lower-case name",
-            path=str(file),
-            attribute="id",
-            found=manifest.id,
-            remedy="Use a-z, 0-9, _.",
-        )
-    if manifest.id != file.parent.name:
-        raise PluginError(
-            f"must be the folder's name, {file.parent.name}", path=str(file), attribute="id", found=manifest.id
-        )
-    if "\n" in manifest.tagline:
-        raise PluginError("must be one line", path=str(file), attribute="tagline", found=repr(manifest.tagline))
+    name, wrong = manifest.id, [text for text in manifest.requires if not _can_be(Requirement, text)]
+    rules = (
+        ("id", name, re.fullmatch(r"[a-z][a-z0-9_]*", name), "must be a lower-case name", "Use a-z, 0-9, _."),
+        ("id", name, name == file.parent.name, f"must be the folder's name, {file.parent.name}", ""),
+        ("tagline", repr(manifest.tagline), "\n" not in manifest.tagline, "must be one line", ""),
+        ("version", manifest.version, _can_be(Version, manifest.version), "is not a version", "Write 0.1.0."),
+        ("calmotion", (text := manifest.calmotion), _can_be(SpecifierSet, text), _NO_RANGE, 'Write ">=0.1".'),
+        ("requires", ", ".join(wrong), not wrong, "is not a Python requirement", 'Write "trimesh>=4".'),
+    )
+    for attribute, found, holds, problem, remedy in rules:
+        if not holds:
+            raise PluginError(problem, path=str(file), attribute=attribute, found=found, remedy=remedy)
+
+
+def _can_be(kind: Callable[[str], object], text: str) -> bool:
+    """Whether a text is a version, a range of versions or a requirement."""
     try:
-        Version(manifest.version)
-    except InvalidVersion:
-        raise PluginError(
-            "is not a version", path=str(file), attribute="version", found=manifest.version, remedy="Write 0.1.0."
-        ) from None
-    try:
-        SpecifierSet(manifest.calmotion)
-    except InvalidSpecifier:
-        raise PluginError(
-            "is not a range of versions",
-            path=str(file),
-            attribute="calmotion",
-            found=manifest.calmotion,
-            remedy='Write ">=0.1".',
-        ) from None
-    for requirement in manifest.requires:
-        try:
-            Requirement(requirement)
-        except InvalidRequirement:
-            raise PluginError(
-                "is not a Python requirement",
-                path=str(file),
-                attribute="requires",
-                found=requirement,
-                remedy='Write "trimesh>=4".',
-            ) from None
+        kind(text)
+    except ValueError:  # all errors of `packaging` are
+        return False
+    return True
 
 
 def check_requirements(manifest: Manifest, calmotion_version: str) -> None:
