@@ -10,7 +10,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.mesh.repair.closing import REMEDY, Part, closed_parts, concatenated, connected_pieces
 from calmotion.mesh.repair.uniting import NotManifold, united, without_detail
-from calmotion.mesh.sources.bridges import WIDE, bridged, strutted
+from calmotion.mesh.sources.bridges import bridged, strutted
 from calmotion.mesh.sources.slits import without_slits
 from calmotion.mesh.surfaces.closed_surfaces import enclosed_volume, winding_number, winding_numbers
 from calmotion.model import SurfaceMesh
@@ -278,8 +278,6 @@ def _in_one_piece(whole: Part, scale: float, repairs: list[str], body: str, any_
     if len(large) == 1:
         return concatenated([*large, *cavities])
     joined, gap = bridged(large)
-    if joined is None and any_gap:
-        joined, gap = bridged(large, WIDE)
     if joined is None and any_gap:
         joined, gap = strutted(large)
         repairs.append(f"joined {len(large)} separate solids by struts across gaps of up to {1e3 * scale * gap:.2g} mm")

@@ -12,24 +12,20 @@ from calmotion.mesh.repair.uniting import manifold_of, part_of
 from calmotion.mesh.sources.sampling import sampled
 from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles, unit_normals
 
-NARROW, WIDE = 2e-3, 2e-2  # gaps across which triangles that face each other are joined, of the size of the body
+NARROW = 2e-3  # gap across which triangles that face each other are joined, of the size of the body
 _SINK = 0.05  # overlap of a bridge with both sides, of the gap
 _SAMPLES = 4_000  # places on a solid between which a strut is sought
 _RADIUS, _SLENDER = 0.02, 0.3  # least radius of a strut, of the size and of the gap
-# Extent of the bridges of a solid, of its own, below which it would swing on them; how far from its first strut another
-# one is, of its extent, and the widest gap there, of the size
-_SPREAD, _APART, _REACH = 0.3, 0.5, 0.1
+_APART, _REACH = 0.5, 0.1  # how far a second strut is from the first, of the extent; widest gap there, of the size
 
 
-def bridged(solids: Sequence[Part], largest: float = NARROW) -> tuple[Part | None, float]:
-    """The union of solids across gaps, and the widest of these gaps.
+def bridged(solids: Sequence[Part]) -> tuple[Part | None, float]:
+    """The union of solids across narrow gaps, and the widest of these gaps.
 
-    Each triangle that faces another solid across a narrow gap is extruded to a prism up to that solid. Across wider
-    gaps only triangles of the smaller solid are: a large triangle of the other one would thicken it.
+    Each triangle that faces another solid across a narrow gap is extruded to a prism up to that solid.
 
     Args:
         solids: Disjoint, outward, in units of the size of the body.
-        largest: Gap that is bridged, of the size of the body.
 
     Returns:
         None instead of the union where it is not connected.
@@ -41,19 +37,13 @@ def bridged(solids: Sequence[Part], largest: float = NARROW) -> tuple[Part | Non
     for k, solid in enumerate(solids):
         x = solid.points[solid.triangles]
         normals, _ = unit_normals(x)
-        begun = len(prisms)
         for other in [other for i, other in enumerate(solids) if i != k]:
-            if largest > NARROW and solid.volume > other.volume:
-                continue
-            gaps, _ = NearbyTriangles(other.points, other.triangles, largest).faced(x.mean(axis=1), normals, 1e-7)
-            for i in np.flatnonzero(gaps <= largest):
+            gaps, _ = NearbyTriangles(other.points, other.triangles, NARROW).faced(x.mean(axis=1), normals, 1e-7)
+            for i in np.flatnonzero(gaps <= NARROW):
                 gap, normal = float(gaps[i]), normals[i]
                 widest = max(widest, gap)
                 sink = _SINK * gap + 1e-7
                 prisms.append(np.vstack([x[i] - sink * normal, x[i] + (gap + sink) * normal]))
-        if largest > NARROW and begun < len(prisms):
-            if _extent(np.vstack(prisms[begun:])) < _SPREAD * _extent(solid.points):
-                return None, 0.0
     if not prisms:
         return None, 0.0
     made = [manifold3d.Manifold.hull_points(np.ascontiguousarray(prism)) for prism in prisms]
