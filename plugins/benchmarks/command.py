@@ -13,7 +13,7 @@ WHAT = {
     "calibration": ("accuracy.calibration", "known parameters of random arms, found from noisy recordings"),
     "measured": ("accuracy.measured", "real machines: what fits of some recordings predict of the others"),
     "meshing": ("links.meshing", "links of robots: their solids, meshes, frequencies and errors"),
-    "integrators": ("integrators.integrators", "orders of the integrators, and a stiff scene"),
+    "integrators": ("integrators.integrators", "orders of the integrators, against RK4 at a fine step"),
     "stability": ("integrators.stability", "maps of each integrator over stiffness, speed, load and step"),
     "gradients": ("optimizer.gradients", "both adjoints against differences"),
     "optimizer": ("optimizer.optimizer", "Gauss-Newton and a quasi-Newton method"),
