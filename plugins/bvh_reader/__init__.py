@@ -46,9 +46,9 @@ class ReadMotion(Operator):
         motion = read_bvh(path)
         tracks = mapped_tracks(motion, read_mapping(values.map, motion), unit=values.unit, start=values.start)
         context.report(
-            "info", f"{path}: {len(tracks.values)} of {len(motion.channels)} channels drive motors, "
-            f"{tracks.times[-1]:.4g} s"
-        )  # fmt: skip
+            "info",
+            f"{path}: {len(tracks.values)} of {len(motion.channels)} channels drive motors, {tracks.times[-1]:.4g} s",
+        )
         return (tracks,)
 
 

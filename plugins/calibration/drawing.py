@@ -65,8 +65,9 @@ def plot_signals(curves: Sequence[ChannelCurves]) -> Figure:
                 axes.axvspan(begin, end, color="#e4e4e4", zorder=0, label="" if n else "held out")
             axes.plot(curve.times, curve.measured[:, c], ".", color=LIMIT, markersize=1.5, label="measured")
             for values, color, style, label in (
-                (curve.before, BEFORE, "--", "as in the shot"), (curve.after, AFTER, "-", "calibrated"),
-            ):  # fmt: skip
+                (curve.before, BEFORE, "--", "as in the shot"),
+                (curve.after, AFTER, "-", "calibrated"),
+            ):
                 axes.plot(curve.times, values[:, c], color=color, linewidth=0.9, linestyle=style, label=label)
             name = f" {COMPONENTS[c]}" if curve.measured.shape[1] > 1 else ""
             tidy(axes, f"[{curve.unit}]", f"{_title(curve)}{name}")
@@ -81,8 +82,9 @@ def plot_residual_spectra(curves: Sequence[ChannelCurves]) -> Figure:
     figure = new_figure(7.0, 2.2 * len(curves) + 0.4)
     for axes, curve in zip(figure.subplots(len(curves), 1, squeeze=False)[:, 0], curves, strict=True):
         for values, color, label, style in (
-            (curve.before, BEFORE, "as in the shot", "--"), (curve.after, AFTER, "calibrated", "-"),
-        ):  # fmt: skip
+            (curve.before, BEFORE, "as in the shot", "--"),
+            (curve.after, AFTER, "calibrated", "-"),
+        ):
             frequencies, amplitudes = _spectrum(curve.times, curve.measured - values)
             axes.semilogy(frequencies, amplitudes, color=color, linewidth=0.9, linestyle=style, label=label)
         tidy(axes, f"amplitude [{curve.unit}]", _title(curve))

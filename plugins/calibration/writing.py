@@ -183,8 +183,10 @@ class _Writer:
         length = units.length(1.0) if linear else float(np.deg2rad(1.0))
         effort = units.force(1.0) if linear else units.torque(1.0)
         unit = {
-            ARMATURE: units.mass(1.0) if linear else units.inertia(1.0), FRICTION: effort, DELAY: 1.0,
-        }  # fmt: skip
+            ARMATURE: units.mass(1.0) if linear else units.inertia(1.0),
+            FRICTION: effort,
+            DELAY: 1.0,
+        }
         found = [self._values[kind, path, -1] for kind in _MOTOR if (kind, path, -1) in self._values]
         motor = next(own for own in self._character.motors if own.path == path)
         if (POSITION_GAIN, path, -1) in self._values and (motor.rotor.back_emf > 0.0 or path in self._factors):

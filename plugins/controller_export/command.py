@@ -50,20 +50,25 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="how late the controller starts, in s or with a unit (5ms); it counts as loss",
     )  # fmt: skip
     command.add_argument(
-        "--tolerance", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
+        "--tolerance",
+        metavar="LENGTH",
+        type=quantity("m", needs_unit=True, positive=True),
         help="accuracy of the simulation at the targets, with a unit (1mm; default: the tolerance of the shot)",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "--allowed-loss", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
+        "--allowed-loss",
+        metavar="LENGTH",
+        type=quantity("m", needs_unit=True, positive=True),
         help="error that playing the commands may add at the targets, with a unit (2mm; default: the tolerance)",
-    )  # fmt: skip
+    )
     command.add_argument(
         "--no-search", action="store_true", help="do not look for the lowest rate that keeps the allowed loss"
     )
     command.add_argument(
-        "--motion", metavar="FILE",
+        "--motion",
+        metavar="FILE",
         help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
-    )  # fmt: skip
+    )
     command.add_argument(
         "--strict", action="store_true", help="exit with status 1 if the commands lose more than is allowed"
     )

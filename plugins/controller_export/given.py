@@ -45,9 +45,11 @@ def given_export(
     """
     if not isinstance(rate, Real) or not LOWEST_RATE <= float(rate) <= HIGHEST_RATE:
         raise SettingError(
-            f"the rate must be {LOWEST_RATE:g} to {HIGHEST_RATE:g} commands a second", path="--rate", found=rate,
+            f"the rate must be {LOWEST_RATE:g} to {HIGHEST_RATE:g} commands a second",
+            path="--rate",
+            found=rate,
             remedy="Use another rate.",
-        )  # fmt: skip
+        )
     delay = quantity_of(start_delay, "s", "start_delay") or 0.0
     if delay < 0.0:
         raise SettingError(
@@ -72,9 +74,11 @@ def refuse_beyond_format(highest: float, given: GivenExport) -> None:
     """
     if given.rate > highest:
         raise SettingError(
-            f"the player of {given.format} takes at most {highest:g} commands a second", path="--rate",
-            found=given.rate, remedy=f"Use {highest:g} or less.",
-        )  # fmt: skip
+            f"the player of {given.format} takes at most {highest:g} commands a second",
+            path="--rate",
+            found=given.rate,
+            remedy=f"Use {highest:g} or less.",
+        )
 
 
 def refuse_beyond_shot(character: Character, animation: Animation, given: GivenExport) -> None:
@@ -87,7 +91,9 @@ def refuse_beyond_shot(character: Character, animation: Animation, given: GivenE
     end = float(animation.frame_times[-1])
     if given.delay > end:
         raise ShotError(
-            "the controller would start after the end of the shot", path=character.path, attribute="--start-delay",
+            "the controller would start after the end of the shot",
+            path=character.path,
+            attribute="--start-delay",
             found=f"{given.delay:g} s, where the shot lasts {end:g} s",
             remedy="Use a delay that a controller has, such as 5ms.",
-        )  # fmt: skip
+        )

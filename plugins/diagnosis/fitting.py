@@ -100,10 +100,12 @@ def independent(signal: Array) -> float:
 
 
 def _fit_loops(
-    situation: Situation, loops: Sequence[LoopExplanation], error: Array,
+    situation: Situation,
+    loops: Sequence[LoopExplanation],
+    error: Array,
     chosen: dict[tuple[str, int], dict[str, float]],
     found: dict[str, Effect],
-) -> Drive:  # fmt: skip
+) -> Drive:
     """Fit the loops of all joints; returns how they are driven, and adds an effect for each explanation."""
     drive, kept = situation.healthy, []
     encoders = situation.encoders
@@ -202,10 +204,12 @@ def _fit_group(
 
 
 def _shown(
-    situation: Situation, loops: Sequence[LoopExplanation], group: Sequence[int],
+    situation: Situation,
+    loops: Sequence[LoopExplanation],
+    group: Sequence[int],
     values: Mapping[tuple[str, str], float],
     single: bool,
-) -> Array:  # fmt: skip
+) -> Array:
     """What the sensor of one joint, or all of them, show of changed loops."""
     drive = situation.healthy
     for m in group:

@@ -34,9 +34,11 @@ def read_spectrum(file: str) -> tuple[Array, Array]:
         rows = np.loadtxt(file, delimiter=",", skiprows=1, usecols=(0, 1, 2, 3), ndmin=2)
     except (OSError, ValueError) as error:
         raise ShotError(
-            "the table of resonances cannot be read", path=file, found=error,
+            "the table of resonances cannot be read",
+            path=file,
+            found=error,
             remedy="Write it with TEST_RESONANCES, columns freq, psd_x, psd_y, psd_z",
-        ) from error  # fmt: skip
+        ) from error
     if len(rows) < 8:
         raise ShotError(
             "the table of resonances is too short", path=file, found=f"{len(rows)} rows", remedy="Measure again"
@@ -56,9 +58,10 @@ def read_dataset(file: str) -> tuple[SensorRecording, SensorRecording]:
         from pyarrow import ArrowException, parquet
     except ImportError as error:
         raise ShotError(
-            "reading a LeRobot dataset needs pyarrow, which is not installed", path=file,
+            "reading a LeRobot dataset needs pyarrow, which is not installed",
+            path=file,
             remedy='Install it: pip install "pyarrow>=15"',
-        ) from error  # fmt: skip
+        ) from error
     try:
         table = parquet.read_table(file)
     except (OSError, ArrowException) as error:

@@ -158,7 +158,7 @@ def mechanics_of(shot: CompiledShot, times: Array, command: Array) -> Mechanics 
 
 def flexible_robot(
     shot: CompiledShot, times: Array, command: Array, gains: Array, dampings: Array, poses: int = 40
-) -> FlexibleRobot | None:  # fmt: skip
+) -> FlexibleRobot | None:
     """The robot in poses that are spread over a motion of the motors, shape [T, M]; None where no link bends below the
     highest frequency that matters.
 

@@ -63,9 +63,10 @@ def situation_of(
     situation = _along(situation, shot, paths, motors, situation.motion[0])
     joints = tuple(
         replace(own, gain=g.gain, damping=g.damping, guessed=True, load=own.load if g.load.any() else g.load)
-        if g.guessed else own
+        if g.guessed
+        else own
         for own, g in zip(situation.joints, guessed, strict=True)
-    )  # fmt: skip
+    )
     situation = replace(situation, joints=joints)
     if not any(body.flexible for body in shot.character.bodies):
         return situation
@@ -134,9 +135,10 @@ def _commands(
     if unknown or not logged:
         raise ShotError(
             "the commands name joints that the robot does not have" if unknown else "the commands have no joint",
-            path=commands.file, found=unknown[0] if unknown else None,
+            path=commands.file,
+            found=unknown[0] if unknown else None,
             remedy=f"Name columns JOINT.angle, with a joint of {', '.join(paths[:6])}",
-        )  # fmt: skip
+        )
     sent, clean = (planned.copy() if planned is not None else np.zeros((len(times), len(paths))) for _ in range(2))
     for m, path in enumerate(paths):
         if path in logged:
@@ -183,9 +185,11 @@ def _sensors(
         names = paths if channel.kind == ANGLE else targets
         if shot is not None and channel.path not in names:
             raise ShotError(
-                "the recording names what the shot does not have", path=channel.path, found=channel.kind,
+                "the recording names what the shot does not have",
+                path=channel.path,
+                found=channel.kind,
                 remedy=f"Name one of {', '.join(names[:8])}",
-            )  # fmt: skip
+            )
         there = np.flatnonzero(np.isfinite(channel.values).any(axis=0))
         rows = np.isfinite(channel.values[:, there]).all(axis=1) & (channel.times >= 0.0) & (channel.times <= end)
         if rows.sum() < LEAST_SAMPLES:
@@ -203,9 +207,10 @@ def _sensors(
         )
     if not found:
         raise ShotError(
-            "no channel of the recordings can be compared with the motion", path="--recording",
+            "no channel of the recordings can be compared with the motion",
+            path="--recording",
             remedy="Record at least a second of the motion, on a clock that begins with its first frame",
-        )  # fmt: skip
+        )
     return tuple(found)
 
 

@@ -95,9 +95,7 @@ class PlotNeededTempo(Operator):
         from .tempo import write_needed_tempo
 
         folder = context.get(OutputPaths).figures or ""
-        path = write_needed_tempo(
-            folder, context.get(Character), context.get(ExceededLimits), context.properties.dpi
-        )  # fmt: skip
+        path = write_needed_tempo(folder, context.get(Character), context.get(ExceededLimits), context.properties.dpi)
         return (TempoFigure(path),)
 
 

@@ -91,9 +91,11 @@ def three() -> str:
     end = re.compile(r'Object\.defineProperty\(\w+,"__esModule",\{value:!0\}\)\}\)+;').search(viewer, max(begin, 0))
     if begin < 0 or end is None:
         raise ShotError(
-            "trimesh has no viewer with three.js", path="--html", found=f"trimesh {trimesh.__version__}",
+            "trimesh has no viewer with three.js",
+            path="--html",
+            found=f"trimesh {trimesh.__version__}",
             remedy="Install another version: pip install 'trimesh>=4.6,<5'",
-        )  # fmt: skip
+        )
     return viewer[begin + len("<script>") : end.end()]
 
 

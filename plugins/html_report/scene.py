@@ -55,7 +55,7 @@ def scene_of(character: Character, animation: Animation, result: Result, detail:
 
 def _described(
     character: Character, animation: Animation, result: Result, detail: Detail, packing: Packing
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     end = float(animation.frame_times[-1])
     count = max(int(np.ceil(end * detail.rate)) + 1, 2)
     times = np.linspace(0.0, end, count)

@@ -47,9 +47,11 @@ class Viewer(Sink):
                 try_writing(place)
             except OSError as error:
                 raise SettingError(
-                    "this recording cannot be written", path="--rrd", found=f"{place}: {error.strerror}",
+                    "this recording cannot be written",
+                    path="--rrd",
+                    found=f"{place}: {error.strerror}",
                     remedy="Choose another file, or a viewer: rerun+http://127.0.0.1:9876/proxy",
-                ) from error  # fmt: skip
+                ) from error
             self._recording.save(place, default_blueprint=blueprint)
         for motor in live.character.motors:
             for name, color in COLORS.items():

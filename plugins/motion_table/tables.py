@@ -151,9 +151,11 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
         rows, lines = rows[1:], lines[1:]
     if any(name.endswith(_OUTPUTS) for name in head):
         raise ShotError(
-            "this is a table that --csv wrote", path=path, found=head[1] if len(head) > 1 else head[0],
+            "this is a table that --csv wrote",
+            path=path,
+            found=head[1] if len(head) > 1 else head[0],
             remedy="It is a result, for plots and spreadsheets; name a table of joint angles",
-        )  # fmt: skip
+        )
     wrong = next((k for k, row in enumerate(rows) if len(row) != len(head)), None)
     if wrong is not None:
         raise _wrong_row(path, lines[wrong], len(head), "Correct the row")
@@ -290,10 +292,12 @@ def _refuse_bad(path: str, own: TimeColumn, columns: dict[str, Array]) -> None:
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if len(back):
         raise ShotError(
-            "times must increase", path=path, attribute=named,
+            "times must increase",
+            path=path,
+            attribute=named,
             found=f"{times[back[0]]:g} and then {times[back[0] + 1]:g} in row {back[0] + 2}",
             remedy="Sort the rows, and remove those that come twice",
-        )  # fmt: skip
+        )
 
 
 def _refuse_long(path: str, named: str, times: Array) -> None:
@@ -302,10 +306,12 @@ def _refuse_long(path: str, named: str, times: Array) -> None:
     if length > _LONGEST:
         unit = "ns" if step > 1e5 else "us" if step > 1e2 else "ms"
         raise ShotError(
-            "the motion is too long", path=path, attribute=named,
+            "the motion is too long",
+            path=path,
+            attribute=named,
             found=f"{length:.4g} s in {len(times)} rows, {step:.4g} s apart",
             remedy=f"Write times in seconds; if they are {_UNITS[unit]}, read them with --set motion.read.times={unit}",
-        )  # fmt: skip
+        )
 
 
 def _is_number(text: str) -> bool:

@@ -41,11 +41,13 @@ class ReadPrinterAccelerometer(RecordingReader):
     properties: ClassVar[tuple[Property, ...]] = (
         Property("prim", str, "", description="Prim at which the accelerometer sits, in whose axes it measures"),
         Property(
-            "axes", str, "x, y, z",
+            "axes",
+            str,
+            "x, y, z",
             description="Axes of the accelerometer that lie along x, y and z of the prim, such as y, -x, z",
         ),
         Property("unit", str, "mm/s^2", choices=("mm/s^2", "m/s^2", "g"), description="Unit of the log"),
-    )  # fmt: skip
+    )
 
     @classmethod
     def reads(cls, request: RecordingRequest) -> bool:

@@ -84,7 +84,7 @@ def read_bag(request: RecordingRequest, map_file: str) -> SensorRecording:
 
 def _values(
     kind: str, topic: str, message: Any, joints: Mapping[str, str] | None, topics: Mapping[str, str] | None, prim: str
-) -> Iterator[tuple[str, str, tuple[float, ...]]]:  # fmt: skip
+) -> Iterator[tuple[str, str, tuple[float, ...]]]:
     """Kind of channel, prim path and values of what a message tells."""
     if kind == JOINTS:
         for k, name in enumerate(message.name):
@@ -129,15 +129,18 @@ def _check(
 ) -> None:  # fmt: skip
     if not seen:
         raise ShotError(
-            "the bag has no message of a joint, an inertial sensor or a pose", path=file,
+            "the bag has no message of a joint, an inertial sensor or a pose",
+            path=file,
             remedy=f"Record a topic of {JOINTS}, {IMU} or {POSE}",
-        )  # fmt: skip
+        )
     for topic in topics or {}:
         if topic not in seen:
             raise ShotError(
-                "the bag has no such topic", path=file, attribute=f"topics.{topic}",
+                "the bag has no such topic",
+                path=file,
+                attribute=f"topics.{topic}",
                 remedy=f"{nearest(topic, list(seen))}Its topics are {', '.join(seen)}",
-            )  # fmt: skip
+            )
     for name, path in (joints or {}).items():
         if (ANGLE, path) not in found and (EFFORT, path) not in found:
             raise ShotError(
@@ -145,9 +148,11 @@ def _check(
             )
     if not found:
         raise ShotError(
-            "nothing says on which prims the sensors sit", path=file, found=", ".join(seen),
+            "nothing says on which prims the sensors sit",
+            path=file,
+            found=", ".join(seen),
             remedy=f"Write {os.path.splitext(file)[0]}.toml. {EXAMPLE}; or name a single sensor as FILE@/PRIM",
-        )  # fmt: skip
+        )
 
 
 def _mcap(file: str) -> Iterator[Message]:
@@ -168,9 +173,10 @@ def _sqlite(file: str) -> Iterator[Message]:
     folder = Path(os.path.abspath(file)).parent
     if not (folder / "metadata.yaml").is_file():
         raise ShotError(
-            "the folder of the bag has no metadata.yaml", path=file,
+            "the folder of the bag has no metadata.yaml",
+            path=file,
             remedy="Name the .db3 file in the folder that ros2 bag wrote, or run ros2 bag reindex",
-        )  # fmt: skip
+        )
     try:
         store = stores.get_typestore(stores.Stores.ROS2_HUMBLE)
         with library.AnyReader([folder], default_typestore=store) as reader:

@@ -31,9 +31,11 @@ def read_columns(file: str) -> tuple[dict[str, Array], bool]:
         lines = read_text(file).lstrip("\ufeff").splitlines()
     except UnicodeDecodeError as error:
         raise ShotError(
-            "the recording is no text in UTF-8", path=file, found=f"byte {error.start + 1}",
+            "the recording is no text in UTF-8",
+            path=file,
+            found=f"byte {error.start + 1}",
             remedy="Save it as a table of plain text (CSV) in UTF-8",
-        ) from error  # fmt: skip
+        ) from error
     except OSError as error:
         raise ShotError(
             "the recording cannot be read", path=file, found=error.strerror, remedy="Name another file"
@@ -72,11 +74,13 @@ def read_columns(file: str) -> tuple[dict[str, Array], bool]:
                 raise ValueError
         except ValueError:
             raise ShotError(
-                f"a row that does not hold {len(names)} numbers", path=file, attribute=f"line {number}",
+                f"a row that does not hold {len(names)} numbers",
+                path=file,
+                attribute=f"line {number}",
                 found=line[:60],
                 remedy="Correct the row; leave cells without a sample empty, and separate columns with decimal commas "
                 "by semicolons or tabs",
-            ) from None  # fmt: skip
+            ) from None
     return {name: values[:, k] for k, name in enumerate(names)}, degrees
 
 
@@ -109,10 +113,12 @@ def increasing(times: Array, file: str, name: str) -> np.ndarray:
     back = np.flatnonzero(np.diff(times) < 0.0)
     if len(back):
         raise ShotError(
-            "times must not go back", path=file, attribute=name,
+            "times must not go back",
+            path=file,
+            attribute=name,
             found=f"{times[back[0]]:.9g} and then {times[back[0] + 1]:.9g} in row {back[0] + 2}",
             remedy="Sort the rows; give recordings of several runs as several files",
-        )  # fmt: skip
+        )
     return np.concatenate([[True], np.diff(times) > 0.0])
 
 

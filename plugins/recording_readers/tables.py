@@ -37,17 +37,18 @@ NOT_MEASURED = (".error", ".rotation_error", ".input", ".output")  # other colum
 BEFORE = "_before"  # end of those of the motion as animated
 REACTIONS = (".force", ".moment")
 FITTING = {
-    MARKER: ("m", "cm", "mm", "in"), ACCELEROMETER: ("m/s^2", "mm/s^2", "g"),
-    ANGLE: ("rad", "deg", "turn", "m", "cm", "mm"), EFFORT: ("N m", "N mm", "N"),
+    MARKER: ("m", "cm", "mm", "in"),
+    ACCELEROMETER: ("m/s^2", "mm/s^2", "g"),
+    ANGLE: ("rad", "deg", "turn", "m", "cm", "mm"),
+    EFFORT: ("N m", "N mm", "N"),
     STRAIN: ("",),
-}  # fmt: skip
+}
 TIMES = ("s", "ms", "us", "ns")
 DEFAULT_UNIT = {MARKER: "m", ACCELEROMETER: "m/s^2", ANGLE: "rad", EFFORT: "N m", STRAIN: ""}
 KNOWN = ("prim", "to", "kind", "columns", "unit", "noise", "low_pass")
 EXAMPLE = (
-    "Write a table [[channel]] with prim = \"/Arm/Hand/cup\", kind = \"marker\", columns = [\"x\", \"y\", \"-z\"] and "
-    "unit = \"mm\""
-)  # fmt: skip
+    'Write a table [[channel]] with prim = "/Arm/Hand/cup", kind = "marker", columns = ["x", "y", "-z"] and unit = "mm"'
+)
 
 
 def read_table(request: RecordingRequest, map_file: str) -> SensorRecording:
@@ -63,17 +64,21 @@ def read_table(request: RecordingRequest, map_file: str) -> SensorRecording:
     file = request.file
     if request.prim:
         raise ShotError(
-            "a table names the prims of its channels itself", path=file, found=f"@{request.prim}",
+            "a table names the prims of its channels itself",
+            path=file,
+            found=f"@{request.prim}",
             remedy=f"Name the file alone: --recording {file}",
-        )  # fmt: skip
+        )
     columns, degrees = read_columns(file)
     content, beside = map_of(file, map_file, (), EXAMPLE)
     channels, notes = _named(file, columns, degrees) if content is None else _mapped(file, columns, content, beside)
     if not channels:
         raise ShotError(
-            "the recording has no channel", path=file, found=", ".join(list(columns)[:12]),
+            "the recording has no channel",
+            path=file,
+            found=", ".join(list(columns)[:12]),
             remedy=f"Name columns after prims, such as /Arm/Hand/cup.x or /Arm/Elbow.angle, or write {beside}",
-        )  # fmt: skip
+        )
     return SensorRecording(file, hash_of(file), tuple(channels), tuple(notes))
 
 
@@ -103,12 +108,14 @@ def _named(file: str, columns: Mapping[str, Array], degrees: bool) -> tuple[list
     raise_all(
         [
             ShotError(
-                "this is no column of a recording", path=file, attribute=name,
+                "this is no column of a recording",
+                path=file,
+                attribute=name,
                 remedy=f"Name it PRIM.x, .y, .z, .ax, .ay, .az, .angle or .effort, or write a map. {EXAMPLE}",
             )
             for name in wrong
         ]
-    )  # fmt: skip
+    )
     # seconds of the recording: those since 1970 would leave no digits for what is between two samples
     seconds = TIME_UNITS[own.unit] * (own.values - (0.0 if own.names == (TIME,) else own.values[0]))
     keep = increasing(seconds, file, own.names[0])

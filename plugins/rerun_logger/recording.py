@@ -81,9 +81,11 @@ def write_recording(
             _refuse_cut(temporary)
     except (OSError, RuntimeError) as error:  # the second one is that of rerun's threads
         raise ShotError(
-            "the recording cannot be written", path=path, found=str(error) or None,
+            "the recording cannot be written",
+            path=path,
+            found=str(error) or None,
             remedy="Check the free space of the disk, or choose another --rrd.",
-        ) from error  # fmt: skip
+        ) from error
 
 
 def _refuse_cut(file: Path) -> None:

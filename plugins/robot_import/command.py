@@ -21,9 +21,10 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("robot", metavar="ROBOT", help=".urdf file, .xml file of MuJoCo, or USD file")
     command.add_argument("-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
     command.add_argument(
-        "--motion", metavar="FILE",
+        "--motion",
+        metavar="FILE",
         help="motion of the joints: CSV (time_s, and a column for each joint in rad or m), NPZ, or BVH",
-    )  # fmt: skip
+    )
     for flag, metavar, help_text in (
         ("--flexible", "PATTERN=MATERIAL[,WALL]", 'links that bend: "*forearm*=abs,3mm"; see `calmotion materials`'),
         ("--target", "PATTERN", "links or frames whose motion counts (default: the outermost points of the robot)"),
@@ -39,9 +40,10 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="TOML file with more materials; may be repeated",
     )  # fmt: skip
     command.add_argument(
-        "--converters", metavar="DIR",
+        "--converters",
+        metavar="DIR",
         help="environment with urdf-usd-converter and mujoco-usd-converter (default: one that is made once)",
-    )  # fmt: skip
+    )
     plugin_option(command)
     command.add_argument(
         "--set", metavar="NAME=VALUE", action="append", default=[],
@@ -59,9 +61,11 @@ def run(args: argparse.Namespace, output: Output) -> int:
     for name, folder in packages.items():
         if not name or not folder:
             raise SettingError(
-                "a package is named as NAME=FOLDER", path="--package", found=f"{name}{folder}",
+                "a package is named as NAME=FOLDER",
+                path="--package",
+                found=f"{name}{folder}",
                 remedy="Write for example my_robot=/home/me/my_robot.",
-            )  # fmt: skip
+            )
     made = import_robot(
         args.robot, layer=args.output, motion=args.motion, flexible=args.flexible, targets=args.target,
         solid=args.solid, motors=args.motors, packages=packages, material_files=args.materials,

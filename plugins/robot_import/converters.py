@@ -67,9 +67,11 @@ def converter_python(named: str | None, tell: Callable[[str], None]) -> str:
         python = _python_of(Path(named))
         if _lacks(python):
             raise ShotError(
-                "this environment does not have the converters", path=named, found=_lacks(python),
+                "this environment does not have the converters",
+                path=named,
+                found=_lacks(python),
                 remedy=f"Install {' and '.join(PACKAGES)} there, or leave out --converters",
-            )  # fmt: skip
+            )
         return str(python)
     folder = environment_folder()
     if not _is_ready(folder):
@@ -104,16 +106,19 @@ def convert(description: Description, output: str, python: str) -> tuple[str, tu
         done = subprocess.run(command, capture_output=True, text=True, env=_plain_environment(), timeout=LONGEST)
     except subprocess.TimeoutExpired:
         raise ShotError(
-            f"the converter has not ended after {LONGEST / 60:g} minutes", path=description.path,
+            f"the converter has not ended after {LONGEST / 60:g} minutes",
+            path=description.path,
             remedy=f"Make the meshes smaller; `{module}` of the converters' environment shows where it is",
-        ) from None  # fmt: skip
+        ) from None
     lines = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
     files = [path for path in Path(output).glob("*.usd*") if path.is_file()] if os.path.isdir(output) else []
     if done.returncode or len(files) != 1:
         raise ShotError(
-            "the converter refuses the robot", path=description.path, found=_last_words(lines),
+            "the converter refuses the robot",
+            path=description.path,
+            found=_last_words(lines),
             remedy=f"Correct the file; `{module}` of the converters' environment shows the whole message",
-        )  # fmt: skip
+        )
     warnings = [line.partition("] ")[2].partition("] ")[2] or line for line in lines if "Warning" in line]
     warnings = [line for line in warnings if not _ADDED.search(line)]
     lost = [line for line in warnings if line.startswith(_BAD_WORDS)]
@@ -122,9 +127,11 @@ def convert(description: Description, output: str, python: str) -> tuple[str, tu
         if len(broken) == len(lost):
             raise BrokenMeshes(description.path, broken)
         raise ShotError(
-            "a part of the robot cannot be converted", path=description.path, found="; ".join(lost[:3]),
+            "a part of the robot cannot be converted",
+            path=description.path,
+            found="; ".join(lost[:3]),
             remedy="Correct the file: meshes are .stl, .obj or .dae, and their names relative to it",
-        )  # fmt: skip
+        )
     return str(files[0]), tuple(warnings)
 
 
@@ -143,9 +150,11 @@ def compiled_values(path: str, python: str) -> dict[str, Any]:
     if done.returncode:
         words = [line.strip() for line in done.stderr.splitlines() if line.strip()]
         raise ShotError(
-            "MuJoCo does not load the robot", path=path, found=" ".join(words[-2:])[:300] or None,
+            "MuJoCo does not load the robot",
+            path=path,
+            found=" ".join(words[-2:])[:300] or None,
             remedy="Correct the file, until MuJoCo's own viewer opens it",
-        )  # fmt: skip
+        )
     values: dict[str, Any] = json.loads(done.stdout)
     return values
 
@@ -155,9 +164,10 @@ def _make(folder: Path) -> None:
     if python is None:
         versions = "{}.{} to {}.{}".format(*_PYTHONS[0], *_PYTHONS[1])
         raise ShotError(
-            f"the converters need Python {versions}, and there is none", found=sys.version.split()[0],
+            f"the converters need Python {versions}, and there is none",
+            found=sys.version.split()[0],
             remedy=f"Install one, and {' and '.join(PACKAGES)} into an environment of it; name that with --converters",
-        )  # fmt: skip
+        )
     shutil.rmtree(folder, ignore_errors=True)
     for command in (
         [python, "-m", "venv", str(folder)],
@@ -167,9 +177,11 @@ def _make(folder: Path) -> None:
         if done.returncode:
             errors = [line for line in done.stderr.splitlines() if "ERROR" in line or "rror:" in line]
             raise ShotError(
-                "the environment of the converters cannot be made", path=str(folder), found=_last_words(errors),
+                "the environment of the converters cannot be made",
+                path=str(folder),
+                found=_last_words(errors),
                 remedy=f"Install {' and '.join(PACKAGES)} into an environment of your own; name it with --converters",
-            )  # fmt: skip
+            )
     (folder / _READY).write_text("\n".join(PACKAGES), encoding="utf-8")
     folder.chmod(0o755)  # also where the umask lets a group write
 

@@ -81,20 +81,26 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
         return Description(path, MJCF, unread=unread, locks=locks(listed), faults=told)
     if root.tag != "robot":
         raise ShotError(
-            "this is neither a URDF nor an MJCF robot", path=path, found=f"<{root.tag}>",
+            "this is neither a URDF nor an MJCF robot",
+            path=path,
+            found=f"<{root.tag}>",
             remedy="Name a .urdf file, an .xml file of MuJoCo, or a USD file",
-        )  # fmt: skip
+        )
     macro = next((text for node in root.iter() if (text := _macro(node))), None)
     if macro is not None:
         raise ShotError(
-            "this is a xacro, from which a URDF is made first", path=path, found=macro,
+            "this is a xacro, from which a URDF is made first",
+            path=path,
+            found=macro,
             remedy=f"Run `xacro {os.path.basename(path)} > robot.urdf`, and import robot.urdf",
-        )  # fmt: skip
+        )
     if root.find("link") is None:
         raise ShotError(
-            "the robot has no links", path=path, found="<robot> without <link>",
+            "the robot has no links",
+            path=path,
+            found="<robot> without <link>",
             remedy="Name the file that describes the whole robot; from a .xacro, `xacro FILE > robot.urdf` makes it",
-        )  # fmt: skip
+        )
     _refuse_other_joints(root, path)
     _refuse_several_roots(root, path)
     _refuse_circular_followers(root, path)
@@ -157,10 +163,12 @@ def _refuse_several_roots(root: xml.Element, path: str) -> None:
     roots = [name for link in root.findall("link") if (name := link.get("name", "")) not in children]
     if len(roots) > 1:
         raise ShotError(
-            "the robot has several roots, of which only one would be kept", path=path, attribute="link",
+            "the robot has several roots, of which only one would be kept",
+            path=path,
+            attribute="link",
             found=", ".join(roots[:_SHOWN]) + (", ..." if len(roots) > _SHOWN else ""),
             remedy="Tie them to each other by fixed joints, or write a file for each robot",
-        )  # fmt: skip
+        )
 
 
 def _refuse_circular_followers(root: xml.Element, path: str) -> None:
@@ -172,10 +180,12 @@ def _refuse_circular_followers(root: xml.Element, path: str) -> None:
             chain.append(following)
         if following == name:
             raise ShotError(
-                "joints follow each other in a circle", path=path, attribute="mimic",
+                "joints follow each other in a circle",
+                path=path,
+                attribute="mimic",
                 found=" -> ".join(str(joint) for joint in (*chain, name)),
                 remedy="Remove the <mimic> of the joint that the others follow",
-            )  # fmt: skip
+            )
 
 
 def _root(path: str) -> tuple[xml.Element, tuple[str, ...]]:
@@ -194,9 +204,11 @@ def _root(path: str) -> tuple[xml.Element, tuple[str, ...]]:
         ) from error
     except (xml.ParseError, UnicodeDecodeError, ValueError) as error:
         raise ShotError(
-            "the robot is no XML file, or it is damaged", path=path, found=error,
+            "the robot is no XML file, or it is damaged",
+            path=path,
+            found=error,
             remedy=remedy_for(path, URDF) or "Name a .urdf file, or an .xml file of MuJoCo",
-        ) from error  # fmt: skip
+        ) from error
 
 
 def _meshes(root: xml.Element) -> Iterator[tuple[str, str]]:
@@ -241,10 +253,12 @@ def _packages(root: xml.Element, path: str, given: Mapping[str, str]) -> dict[st
             problems.append(
                 ShotError(
                     "the folder of a ROS package is not known" if folder is None else "this is no folder",
-                    path=path, attribute=f"package://{name}", found=folder,
+                    path=path,
+                    attribute=f"package://{name}",
+                    found=folder,
                     remedy=f"{near}Name it: --package {name}=FOLDER",
                 )
-            )  # fmt: skip
+            )
         else:
             found[name] = os.path.abspath(folder)
     raise_all(problems)

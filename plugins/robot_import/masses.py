@@ -74,10 +74,11 @@ def _author_values(
     bodies = [prim for prim in prims_of(stage) if is_rigid_body(prim)]
     if len(bodies) != len(values["bodies"]):
         raise ShotError(
-            "the converter and MuJoCo find different bodies", path=str(stage.GetDefaultPrim().GetPath()),
+            "the converter and MuJoCo find different bodies",
+            path=str(stage.GetDefaultPrim().GetPath()),
             found=f"{len(bodies)} and {len(values['bodies'])}",
             remedy="Write the robot without <replicate> and <attach>",
-        )  # fmt: skip
+        )
     joints: dict[Any, Usd.Prim] = {}
     for prim in joint_prims(stage):
         joints.setdefault(prim.GetPath().GetParentPath(), prim)
@@ -244,14 +245,16 @@ def _refuse_moving_frames(stage: Usd.Stage, frames: Sequence[Usd.Prim]) -> None:
     raise_all(
         [
             ShotError(
-                "a body without mass moves, and carries none", path=frame, attribute="inertial",
+                "a body without mass moves, and carries none",
+                path=frame,
+                attribute="inertial",
                 found=f"the joint {moved[frame].GetName()}",
                 remedy="Write its <inertial>, or a geom with a mass, as MuJoCo demands",
             )
             for frame in sorted(massless & moved.keys())
             if _welded_to(frame, welds) <= massless
         ]
-    )  # fmt: skip
+    )
 
 
 def _welded_to(body: str, welds: Sequence[set[str]]) -> set[str]:

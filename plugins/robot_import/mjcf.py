@@ -101,11 +101,13 @@ def refuse_missing_meshes(found: Sequence[Part]) -> None:
     if lost:
         more = f"; {len(lost) - _SHOWN} more" if len(lost) > _SHOWN else ""
         raise ShotError(
-            "meshes of the robot are missing", path=files[lost[0]].path, attribute="mesh.file",
+            "meshes of the robot are missing",
+            path=files[lost[0]].path,
+            attribute="mesh.file",
             found="; ".join(lost[:_SHOWN]) + more,
             remedy=f"Put the files into {next(filter(None, named), 'the folder of the robot')}, or correct meshdir of "
             "<compiler>",
-        )  # fmt: skip
+        )
 
 
 def elements(found: Sequence[Part]) -> list[Element]:
@@ -152,10 +154,11 @@ def several_joints(found: Sequence[Part]) -> list[str]:
             if free or by_geometry:
                 raise ShotError(
                     "a body with several joints is not supported" + ("" if free else " where inertiafromgeom is true"),
-                    path=part.path, attribute=f"body {body.get('name', '')}",
+                    path=part.path,
+                    attribute=f"body {body.get('name', '')}",
                     found=", ".join(node.get("name", node.tag) for node in joints),
                     remedy="Give each joint a body of its own, one inside the other, with a small mass in between",
-                )  # fmt: skip
+                )
             names.append(body.get("name", "") or "without a name")
     return names
 

@@ -153,9 +153,11 @@ def flexible_links(text: str, known: Mapping[str, Material]) -> FlexibleLinks:
     material, _, thickness = rest.partition(",")
     if not equals or not pattern.strip() or not material.strip():
         raise SettingError(
-            "flexible links are named as PATTERN=MATERIAL or PATTERN=MATERIAL,THICKNESS", path="--flexible", found=text,
+            "flexible links are named as PATTERN=MATERIAL or PATTERN=MATERIAL,THICKNESS",
+            path="--flexible",
+            found=text,
             remedy='Write for example "*forearm*=abs,3mm"; `calmotion materials` lists the materials.',
-        )  # fmt: skip
+        )
     wall = parse_quantity(thickness.strip(), "m") if thickness.strip() else None
     if has_no_unit(thickness):
         number = thickness.strip()
@@ -164,9 +166,11 @@ def flexible_links(text: str, known: Mapping[str, Material]) -> FlexibleLinks:
         )
     if wall is not None and not 0.0 < wall < 1.0:
         raise SettingError(
-            "the thickness of a wall must be above 0 and below 1 m", path="--flexible", found=text,
+            "the thickness of a wall must be above 0 and below 1 m",
+            path="--flexible",
+            found=text,
             remedy="Write a thickness such as 3mm, or leave it out for a solid link.",
-        )  # fmt: skip
+        )
     name, found = material_named(material, known)
     return FlexibleLinks(pattern.strip(), name, found, wall)
 

@@ -165,7 +165,9 @@ class _Author:
         if not found:
             names = sorted({named(prim) for prim in self._bodies})
             raise ShotError(
-                "no link of the robot has such a name", attribute=option, found=pattern,
+                "no link of the robot has such a name",
+                attribute=option,
+                found=pattern,
                 remedy=f"{nearest(pattern.strip('*'), names)}Its links are {', '.join(names)}",
-            )  # fmt: skip
+            )
         return found

@@ -146,18 +146,19 @@ def author_motors(
         kinds = sorted({str(prim.GetTypeName()) for prim in joint_prims(stage)})
         swings = bool(set(kinds) - {"PhysicsFixedJoint"})
         raise ShotError(
-            "the robot has no joint that a motor can drive", path=str(stage.GetDefaultPrim().GetPath()),
+            "the robot has no joint that a motor can drive",
+            path=str(stage.GetDefaultPrim().GetPath()),
             found=", ".join(kinds) or "no joints",
             remedy="Connect its parts by revolute or prismatic joints"
             + ("; or leave it passive: animate the transform of its root, and simulate that shot" if swings else ""),
-        )  # fmt: skip
+        )
     for axis in driven:
         _author(axis, moved.get(axis.path), units, frames_per_second, efforts.get(named(axis.prim)))
 
 
 def _author(
     axis: Axis, track: MotorTracks | None, units: StageUnits, frames_per_second: float, effort: float | None
-) -> None:  # fmt: skip
+) -> None:
     from pxr import UsdPhysics
 
     api = UsdPhysics.DriveAPI.Apply(axis.prim, axis.drive)
@@ -199,10 +200,12 @@ def _by_default(stage: Usd.Stage, axes: Sequence[Axis], moved: Mapping[str, Moto
         return []
     names = [axis.name for axis in free]
     raise ShotError(
-        "the robot has a closed chain, so not all of its joints can be motors", path=loop, attribute="--motors",
+        "the robot has a closed chain, so not all of its joints can be motors",
+        path=loop,
+        attribute="--motors",
         found=f"{len(names)} joints: {', '.join(names[:8])}{', ...' if len(names) > 8 else ''}",
         remedy="Name those that are, as --motors 'hip*' --motors 'knee*', or give a motion of them",
-    )  # fmt: skip
+    )
 
 
 def free_axes(axes: Sequence[Axis]) -> list[Axis]:
@@ -281,9 +284,11 @@ def _named(axes: Sequence[Axis], patterns: Sequence[str]) -> list[Axis]:
         if not fitting:
             names = sorted({axis.name for axis in axes})
             raise ShotError(
-                "no joint that a motor can drive has such a name", attribute="--motors", found=pattern,
+                "no joint that a motor can drive has such a name",
+                attribute="--motors",
+                found=pattern,
                 remedy=f"{nearest(pattern.strip('*'), names)}Its joints are {', '.join(names) or 'all fixed'}",
-            )  # fmt: skip
+            )
         found += fitting
     return found
 
@@ -299,19 +304,22 @@ def _moved(axes: Sequence[Axis], motion: MotorTracks | None) -> dict[str, MotorT
             other = next(iter(found[fitting[0].path].values))
             problems.append(
                 ShotError(
-                    "two columns move the same joint", path=motion.origin, found=f"{other} and {name}",
+                    "two columns move the same joint",
+                    path=motion.origin,
+                    found=f"{other} and {name}",
                     remedy="Remove one of them",
                 )
-            )  # fmt: skip
+            )
         elif len(fitting) != 1:
             names = sorted({axis.name for axis in axes})
             problems.append(
                 ShotError(
                     "several joints have this name" if fitting else "no joint of the robot has this name",
-                    path=motion.origin, found=name,
+                    path=motion.origin,
+                    found=name,
                     remedy=f"{nearest(name, names)}Its joints are {', '.join(names)}",
                 )
-            )  # fmt: skip
+            )
         else:
             found[fitting[0].path] = MotorTracks(motion.origin, motion.times, {name: values})
     raise_all(problems)

@@ -94,9 +94,11 @@ class WriteResult(Operator):
 
         values = context.properties
         return WriteOptions(
-            samples_per_second=values.samples_per_second, splines=values.splines, bake=values.bake,
+            samples_per_second=values.samples_per_second,
+            splines=values.splines,
+            bake=values.bake,
             retime_scene=values.retime_scene,
-        )  # fmt: skip
+        )
 
 
 register, unregister = registration(WriteResult)

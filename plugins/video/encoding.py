@@ -35,9 +35,11 @@ def refuse_unknown_kind(path: str) -> None:
         )
     if suffix == MP4 and shutil.which("ffmpeg") is None:
         raise ShotError(
-            "an .mp4 file needs the program ffmpeg, which is not on the PATH", path="--video", found=path,
+            "an .mp4 file needs the program ffmpeg, which is not on the PATH",
+            path="--video",
+            found=path,
             remedy=f"Install ffmpeg, or name a {WEBP} file, which needs nothing and plays in browsers.",
-        )  # fmt: skip
+        )
 
 
 def encode(path: str, frames: Frames, count: int, rate: float, quality: int) -> None:

@@ -117,7 +117,7 @@ def set_stage(
 
 def draw_panels(
     stage: Stage, runs: Sequence[tuple[Simulation, Color]], moment: Moment, ghost: Color
-) -> list[Image.Image]:  # fmt: skip
+) -> list[Image.Image]:
     """Motions at one moment, each over the intended motion, with the trails of the targets."""
     now = np.array([moment.time])
     camera, reference = stage.camera_at(moment), sample_motion(stage.reference, now)

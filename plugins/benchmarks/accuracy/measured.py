@@ -146,9 +146,11 @@ def machine_in(folder: Path) -> Machine:
     files = [file for file in sorted(folder.glob("*.usda")) if file.with_suffix(".csv").is_file()]
     if len(files) < 2:
         raise ShotError(
-            "a machine needs two recorded shots at least", path=str(folder), found=len(files),
+            "a machine needs two recorded shots at least",
+            path=str(folder),
+            found=len(files),
             remedy="Put NAME.usda and NAME.csv of each into the folder",
-        )  # fmt: skip
+        )
     return Machine({file.stem: read_performed(str(file), [file.with_suffix(".csv")]) for file in files})
 
 

@@ -56,9 +56,11 @@ class ExudynArm:
     MATERIAL = ElasticMaterial("/Arm/Plastic", 1.8e9, 0.35, 1200.0, rayleigh=(0.0, RETARDATION))
 
     def __init__(
-        self, material: ElasticMaterial = MATERIAL, payload: float = PAYLOAD,
+        self,
+        material: ElasticMaterial = MATERIAL,
+        payload: float = PAYLOAD,
         mesh: tuple[int, int, tuple[float, float]] = (CELLS, 2, (1.0, 1.0)),
-    ) -> None:  # fmt: skip
+    ) -> None:
         sys.exudynFast = True  # type: ignore[attr-defined]  # its build without range checks
         import exudyn
         from exudyn.FEM import FEMinterface, HCBstaticModeSelection, ObjectFFRFreducedOrderInterface
@@ -96,12 +98,13 @@ class ExudynArm:
         root, tip = (
             mbs.AddMarker(
                 eu.MarkerSuperElementRigid(
-                    bodyNumber=flexible["oFFRFreducedOrder"], meshNodeNumbers=end,
+                    bodyNumber=flexible["oFFRFreducedOrder"],
+                    meshNodeNumbers=end,
                     weightingFactors=np.full(len(end), 1.0 / len(end)),
                 )
             )
             for end in self.ends
-        )  # fmt: skip
+        )
         # a hub that is turned about z, on which the arm is welded
         node = mbs.AddNode(eu.Rigid2D(referenceCoordinates=[0.0, 0.0, 0.0]))
         hub = mbs.AddObject(eu.ObjectRigidBody2D(mass=1.0, inertia=1e-2, nodeNumber=node))
@@ -131,7 +134,7 @@ class ExudynArm:
                 )
             )
             for output in (outputs.Position, outputs.RotationMatrix)
-        ]  # fmt: skip
+        ]
         mbs.Assemble()
         settings = exu.SimulationSettings()
         settings.timeIntegration.numberOfSteps, settings.timeIntegration.endTime = steps, seconds

@@ -89,11 +89,13 @@ class FaultyArm:
     def gains(self) -> tuple[Array, Array]:
         """Of the loops as the model has them [N m/rad], [N m s/rad], by the inertia of the stretched arm."""
         reach, m = self.upper + self.fore, self.link_masses
-        about = np.array([
-            self.load * reach**2 + m[1] * (self.upper + 0.5 * self.fore) ** 2 + m[0] * self.upper**2 / 3.0,
-            self.load * reach**2 + m[1] * (self.upper + 0.5 * self.fore) ** 2 + m[0] * self.upper**2 / 3.0,
-            self.load * self.fore**2 + m[1] * self.fore**2 / 3.0,
-        ])  # fmt: skip
+        about = np.array(
+            [
+                self.load * reach**2 + m[1] * (self.upper + 0.5 * self.fore) ** 2 + m[0] * self.upper**2 / 3.0,
+                self.load * reach**2 + m[1] * (self.upper + 0.5 * self.fore) ** 2 + m[0] * self.upper**2 / 3.0,
+                self.load * self.fore**2 + m[1] * self.fore**2 / 3.0,
+            ]
+        )
         gain = (2.0 * np.pi * self.loops) ** 2 * about
         return gain, 2.0 * self.HEALTHY * np.sqrt(gain * about)
 

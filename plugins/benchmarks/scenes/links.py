@@ -59,9 +59,11 @@ def read_links(source: str) -> list[Link]:
             prims = [by_path] if by_path else named[:1]
         if not prims:
             raise ShotError(
-                "has no such link", path=file, found=wanted or "no prim with PhysicsRigidBodyAPI",
+                "has no such link",
+                path=file,
+                found=wanted or "no prim with PhysicsRigidBodyAPI",
                 remedy="Name a prim of the file, as in robot.usda:left_elbow_link",
-            )  # fmt: skip
+            )
         carriers, others = _frames(reading, stage)
         links = []
         for prim in prims:

@@ -65,33 +65,40 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     command.add_argument("-o", "--output", metavar="LAYER", help="USD layer to write")
     command.add_argument(
-        "--parameters", metavar="KIND", nargs="+",
+        "--parameters",
+        metavar="KIND",
+        nargs="+",
         help="what to estimate: modulus, damping, density, mass, centre, position_gain, velocity_gain, gear_stiffness, "
         "armature, friction, viscous_friction, load_friction, max_torque, delay, encoder_offset, each also as "
         "KIND:PATTERN for some prim paths "
         "(default: all but density, centre and encoder_offset)",
-    )  # fmt: skip
+    )
     prior_option(command)
     command.add_argument(
         "--no-validation", action="store_true", help="fit all samples; by default every fifth part is held out"
     )
     command.add_argument(
-        "--step", metavar="TIME", type=quantity("s", positive=True),
+        "--step",
+        metavar="TIME",
+        type=quantity("s", positive=True),
         help="first time step, in s or with a unit (2ms); it is halved until the estimates do not depend on it",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "--tolerance", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
+        "--tolerance",
+        metavar="LENGTH",
+        type=quantity("m", needs_unit=True, positive=True),
         help="accuracy of the simulation at the targets, with a unit (1mm; default: the tolerance of the shot)",
-    )  # fmt: skip
+    )
     command.add_argument(
         "--integrator", metavar="NAME", help="bdf2, newmark or generalized-alpha (default: the last one)"
     )
     command.add_argument("--figures", metavar="DIR", help="draw measured and simulated signals into this folder")
     html_option(command)
     command.add_argument(
-        "--motion", metavar="FILE",
+        "--motion",
+        metavar="FILE",
         help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
-    )  # fmt: skip
+    )
 
 
 def prior_option(command: argparse.ArgumentParser) -> None:
@@ -102,9 +109,10 @@ def prior_option(command: argparse.ArgumentParser) -> None:
         "(delay=0.005, bias=0.3, place=0.002, clock_drift=1e-4); may be repeated",
     )  # fmt: skip
     command.add_argument(
-        "--by-motor-type", action="store_true",
+        "--by-motor-type",
+        action="store_true",
         help="motors of one type (calm:motor:type) share their gains, friction, armature, gear and delay",
-    )  # fmt: skip
+    )
 
 
 def _prior(text: str) -> tuple[str, float]:
@@ -120,8 +128,10 @@ def parameter_arguments(args: argparse.Namespace) -> dict[str, Any]:
     from ..identification.parameters import DEFAULT
 
     return {
-        "parameters": args.parameters or DEFAULT, "priors": dict(args.prior), "by_motor_type": args.by_motor_type,
-    }  # fmt: skip
+        "parameters": args.parameters or DEFAULT,
+        "priors": dict(args.prior),
+        "by_motor_type": args.by_motor_type,
+    }
 
 
 def run(args: argparse.Namespace, output: Output) -> int:
@@ -171,9 +181,11 @@ def _performed(args: argparse.Namespace) -> list[tuple[str, tuple[str, ...]]]:
         )
     if args.shot is None and named[0][0] is None:
         raise SettingError(
-            "no shot is named for a recording", path="--recording", found=named[0][1][0],
+            "no shot is named for a recording",
+            path="--recording",
+            found=named[0][1][0],
             remedy="Name the shot as SHOT, or before its recordings with --shot",
-        )  # fmt: skip
+        )
     found = [(args.shot if name is None else name, files) for name, files in named]
     for name, files in found:
         if not files:

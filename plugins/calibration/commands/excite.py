@@ -98,10 +98,12 @@ def _print(report: dict[str, Any], console: Console) -> None:
         for row in report["parameters"]
     ]  # fmt: skip
     print_table(
-        console, "Standard deviations to expect",
-        ["parameter", "of", "in the shot", "before", "after a chirp", "after this motion", "identifiable"], rows,
+        console,
+        "Standard deviations to expect",
+        ["parameter", "of", "in the shot", "before", "after a chirp", "after this motion", "identifiable"],
+        rows,
         texts=2,
-    )  # fmt: skip
+    )
     say(console, f"wrote {report['layer']}")
     say(
         console,
@@ -114,9 +116,11 @@ def _print(report: dict[str, Any], console: Console) -> None:
         for row in report["motors"]
     ]  # fmt: skip
     print_table(
-        console, "What the motors do (rad or m, s, N m or N)",
-        ["motor", "excursion", "velocity", "acceleration", "effort", "of its limits"], rows,
-    )  # fmt: skip
+        console,
+        "What the motors do (rad or m, s, N m or N)",
+        ["motor", "excursion", "velocity", "acceleration", "effort", "of its limits"],
+        rows,
+    )
     say(console, f"{report['motions']} motions compared in {report['wall_s']:.3g} s")
     for text in _collisions(report):
         say(console, text)

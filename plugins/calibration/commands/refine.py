@@ -45,9 +45,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--parameters", metavar="KIND", nargs="+", help="what is estimated, as of calmotion calibrate")
     prior_option(command)
     command.add_argument(
-        "--tolerance", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
+        "--tolerance",
+        metavar="LENGTH",
+        type=quantity("m", needs_unit=True, positive=True),
         help="accuracy of the simulation at the targets, with a unit (1mm; default: the tolerance of the shot)",
-    )  # fmt: skip
+    )
     command.add_argument(
         "--step", metavar="TIME", type=quantity("s", positive=True), help="first time step of the calibration"
     )
@@ -89,21 +91,27 @@ def _print(report: dict[str, Any], console: Console) -> None:
         for row in report["targets"]
     ]  # fmt: skip
     print_table(
-        console, "Largest error at the targets",
-        ["target", f"of take {report['take']}", "of the new curves", "to expect (median)", "95%"], rows,
-    )  # fmt: skip
+        console,
+        "Largest error at the targets",
+        ["target", f"of take {report['take']}", "of the new curves", "to expect (median)", "95%"],
+        rows,
+    )
     rows = [
         [
-            row["name"], quantity_in(row["prior"]["value"], row["unit"]),
-            *measured(row["value"], row["standard_deviation"], row["unit"]), "yes" if row["identifiable"] else "no",
+            row["name"],
+            quantity_in(row["prior"]["value"], row["unit"]),
+            *measured(row["value"], row["standard_deviation"], row["unit"]),
+            "yes" if row["identifiable"] else "no",
         ]
         for row in report["parameters"]
         if row["of_robot"]
-    ]  # fmt: skip
+    ]
     print_table(
-        console, f"The robot after take {report['take']}",
-        ["parameter", "before", "now", "standard deviation", "identifiable"], rows,
-    )  # fmt: skip
+        console,
+        f"The robot after take {report['take']}",
+        ["parameter", "before", "now", "standard deviation", "identifiable"],
+        rows,
+    )
     for file in (report["layer"], report["root"], report["model"], report["model_root"]):
         if file:
             say(console, f"wrote {file}")

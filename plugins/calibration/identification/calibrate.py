@@ -70,9 +70,11 @@ def calibrate_shot(
 
 
 def calibrate_shots(
-    performed: Sequence[tuple[CompiledShot, Sequence[SensorRecording]]], settings: CalibrationSettings,
-    options: RunSettings, progress: Callable[[float, str], None] = lambda fraction, message: None,
-) -> Calibration:  # fmt: skip
+    performed: Sequence[tuple[CompiledShot, Sequence[SensorRecording]]],
+    settings: CalibrationSettings,
+    options: RunSettings,
+    progress: Callable[[float, str], None] = lambda fraction, message: None,
+) -> Calibration:
     """Estimate the parameters of a robot from recordings of one or several shots.
 
     Args:
@@ -173,9 +175,10 @@ def _estimates(found: Found) -> tuple[Estimate, ...]:
         text = ""
         if not identifiable and p.kind in ROBOT_KINDS:
             text = (
-                f"{advice[k].sentence} narrow it to {100.0 * advice[k].sigma:.2g}% of its prior" if k in advice
+                f"{advice[k].sentence} narrow it to {100.0 * advice[k].sigma:.2g}% of its prior"
+                if k in advice
                 else "no single marker, accelerometer, encoder or torque would show it in this motion"
-            )  # fmt: skip
+            )
         rows.append(
             Estimate(
                 p.kind,
@@ -190,7 +193,7 @@ def _estimates(found: Found) -> tuple[Estimate, ...]:
                 identifiable,
                 text,
                 identifiable and bool(found.disagrees[k]),
-            )  # fmt: skip
+            )
         )
     return tuple(rows)
 
@@ -221,7 +224,7 @@ def _fits(
                 _rms(off[sensor.validated]),
                 int((np.abs(off[fitted]) > 3.0 * sensor.sigma).sum()),
                 float(np.abs(off[sensor.validated if sensor.validated.any() else fitted]).max(initial=0.0)),
-            )  # fmt: skip
+            )
         )
         used = sensor.used
         times = measurement.robot_times(sensor, y)[used]

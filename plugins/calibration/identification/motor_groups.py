@@ -56,7 +56,7 @@ def of_each_motor(
                     value=value,
                     prior=scale * own.prior,
                     standard_deviation=scale * own.standard_deviation,
-                )  # fmt: skip
+                )
             )
             owners.append(k)
     spread = covariance[np.ix_(owners, owners)]

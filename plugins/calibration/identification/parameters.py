@@ -169,15 +169,19 @@ def refuse_unknown(wanted: Sequence[str], priors: Mapping[str, float]) -> None:
         for name in names:
             if name not in known:
                 raise ShotError(
-                    "there is no such kind of parameter", attribute=attribute, found=name,
+                    "there is no such kind of parameter",
+                    attribute=attribute,
+                    found=name,
                     remedy=f"{nearest(name, known)}Use {', '.join(known)}",
-                )  # fmt: skip
+                )
     for name, value in priors.items():
         if not 0.0 < value < np.inf:
             raise ShotError(
-                "the standard deviation of a prior must be positive", attribute="--prior", found=f"{name}={value:g}",
+                "the standard deviation of a prior must be positive",
+                attribute="--prior",
+                found=f"{name}={value:g}",
                 remedy=f"Use a relative one, such as {name}={PRIORS[name]:g}, or leave the parameter out",
-            )  # fmt: skip
+            )
 
 
 def _of_kind(shot: CompiledShot, kind: str, pattern: str, prior: float) -> list[Parameter]:

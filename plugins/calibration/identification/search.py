@@ -250,9 +250,10 @@ def _starts(problem: Calibrated, tell: Callable[[float, str], None]) -> list[Arr
     problem.simulations += len(points)
     if not found:
         raise ShotError(
-            "neither the robot nor a stiffer or softer one can be simulated", path=problem.shot.character.path,
+            "neither the robot nor a stiffer or softer one can be simulated",
+            path=problem.shot.character.path,
             remedy="Run `calmotion simulate` on the shot, which says why",
-        )  # fmt: skip
+        )
     found.sort(key=lambda item: item[0])
     return [z for _, z, _ in found[:BEST]]
 

@@ -66,9 +66,7 @@ class Signals:
         accelerations = make_interp_spline(self.times, self.positions, k=5).derivative(2)(self.times)
         return np.asarray(np.einsum("tkij,tki->tkj", self.rotations, accelerations - self.gravity))
 
-    def at(
-        self, kind: str, index: Place, times: Array, order: int = 0, low_pass: LowPass | None = None
-    ) -> Array:  # fmt: skip
+    def at(self, kind: str, index: Place, times: Array, order: int = 0, low_pass: LowPass | None = None) -> Array:
         """A quantity at times of the robot's clock, shape [n, c], or its derivative by time.
 
         Args:

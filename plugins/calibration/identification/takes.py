@@ -75,10 +75,12 @@ def takes_of(shots: Sequence[CompiledShot], settings: CalibrationSettings) -> tu
         missing = {p.name for p in takes[0].parameters} ^ {p.name for p in parameters}
         if missing:
             raise ShotError(
-                "the shots are not of one robot: a parameter is not in both", path=shot.character.path,
-                attribute="--shot", found=min(missing),
+                "the shots are not of one robot: a parameter is not in both",
+                path=shot.character.path,
+                attribute="--shot",
+                found=min(missing),
                 remedy="Give them the same bodies, materials and motors, or name the shared ones with --parameters",
-            )  # fmt: skip
+            )
     names = [p.name for p in takes[0].parameters]
     takes = [
         replace(take, parameters=tuple(sorted(take.parameters, key=lambda p: names.index(p.name)))) for take in takes

@@ -162,18 +162,22 @@ def sensor_of(text: str) -> PlannedSensor:
     match = _FORM.fullmatch(text)
     if match is None or match[1] not in NOISE:
         raise SettingError(
-            "there is no such sensor", path="--sensor", found=text,
+            "there is no such sensor",
+            path="--sensor",
+            found=text,
             remedy=f"Write KIND, KIND@/PRIM or KIND@/PRIM=NOISE; kinds are {', '.join(NOISE)}.",
-        )  # fmt: skip
+        )
     kind, path, noise = match.groups()
     sigma, rate = NOISE[kind]
     if noise is not None:
         sigma = parse_quantity(noise, _UNITS[kind])
         if not sigma > 0.0:
             raise SettingError(
-                "the noise of a sensor must be positive", path="--sensor", found=text,
+                "the noise of a sensor must be positive",
+                path="--sensor",
+                found=text,
                 remedy="Write its standard deviation, such as marker=0.3mm.",
-            )  # fmt: skip
+            )
     return PlannedSensor(kind, path or "", sigma, rate)
 
 
@@ -192,5 +196,7 @@ def _refuse_other_drives(character: Character) -> None:
         if not motor.attribute.startswith("drive:"):
             raise ShotError(
                 "a test motion can be written only to drives; this motor follows the animation of bodies or a skeleton",
-                path=motor.path, attribute=motor.attribute, remedy="Apply PhysicsDriveAPI to the joint",
-            )  # fmt: skip
+                path=motor.path,
+                attribute=motor.attribute,
+                remedy="Apply PhysicsDriveAPI to the joint",
+            )

@@ -143,7 +143,7 @@ def refine(
     optimized = optimize(improved, outputs=OutputPaths(layer=target), **common)
     return RefinedShot(
         calibrated, played, optimized, takes_of(root), expected_errors(optimized), time.perf_counter() - begin
-    )  # fmt: skip
+    )
 
 
 def _refuse(shot: str, layer: str) -> None:

@@ -131,10 +131,11 @@ def order_of(names: Sequence[str], curves: MotorCurves) -> list[int]:
     """
     if len(curves.motors) != 6 or any(motor.linear for motor in curves.motors):
         raise ShotError(
-            "a controller of Universal Robots drives six hinges", attribute="--to",
+            "a controller of Universal Robots drives six hinges",
+            attribute="--to",
             found=f"{len(curves.motors)} motors: {', '.join(curves.names)}",
             remedy="Use ros2 or csv for this robot",
-        )  # fmt: skip
+        )
     if not names:
         return [curves.names.index(name) for name in JOINTS] if set(JOINTS) == set(curves.names) else list(range(6))
     paths = [motor.path for motor in curves.motors]
@@ -142,15 +143,19 @@ def order_of(names: Sequence[str], curves: MotorCurves) -> list[int]:
     for name in names:
         if name not in curves.names and name not in paths:
             raise ShotError(
-                "no motor has this name", attribute=_ATTRIBUTE, found=name,
+                "no motor has this name",
+                attribute=_ATTRIBUTE,
+                found=name,
                 remedy=f"{nearest(name, curves.names)}Use the names {', '.join(curves.names)}",
-            )  # fmt: skip
+            )
         order.append(curves.names.index(name) if name in curves.names else paths.index(name))
     if sorted(order) != list(range(6)):
         raise ShotError(
-            "each of the six joints must be named once", attribute=_ATTRIBUTE, found=", ".join(names),
+            "each of the six joints must be named once",
+            attribute=_ATTRIBUTE,
+            found=", ".join(names),
             remedy="Name base, shoulder, elbow, wrist 1, 2 and 3 in this order",
-        )  # fmt: skip
+        )
     return order
 
 

@@ -43,10 +43,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "may be repeated",
     )  # fmt: skip
     command.add_argument(
-        "--commands", metavar="FILE",
+        "--commands",
+        metavar="FILE",
         help="the commands as they were sent: a table with columns time_s and JOINT.angle, on the clock of the "
         "recordings; without it the motion of the shot",
-    )  # fmt: skip
+    )
     command.add_argument(
         "--figures", metavar="DIR", help="draw motion and error, their spectra, and error over speed and torque here"
     )

@@ -60,7 +60,7 @@ class Backlash(AddedExplanation):
 
     def _one(
         self, situation: Situation, drive: Drive, m: int, width: float, left: Array | None = None
-    ) -> tuple[Array, Array]:  # fmt: skip
+    ) -> tuple[Array, Array]:
         """Deviation of a joint, and what sensors show of it."""
         T, M = situation.command.shape
         load, motor = np.zeros((2, 3, T, M))

@@ -61,8 +61,9 @@ class Stream(AddedExplanation):
             near, turns = 1.2 / situation.times[-1] / 2.5**turn, 0.3 / 2.5**turn
             tried = [
                 (rate + a, (phase - a * 0.5 * situation.times[-1] + b) % 1.0)
-                for a in near * np.linspace(-1.0, 1.0, 7) for b in turns * np.linspace(-1.0, 1.0, 5)
-            ]  # fmt: skip
+                for a in near * np.linspace(-1.0, 1.0, 7)
+                for b in turns * np.linspace(-1.0, 1.0, 5)
+            ]
         _, rate, phase = best
         moved = situation.moved(drive, self._asked(situation, rate, phase)) - healthy
         rows = ({"name": "rate", "path": "", "value": rate, "unit": "Hz"},)

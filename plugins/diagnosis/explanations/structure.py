@@ -128,7 +128,7 @@ class Links(Structure):
 
     def _run(
         self, situation: Situation, drive: Drive, command: Array, values: Array, bends: bool
-    ) -> tuple[dict[int, tuple[Array, Array, Array]], Array]:  # fmt: skip
+    ) -> tuple[dict[int, tuple[Array, Array, Array]], Array]:
         """Motion of the targets, and deviations of the joints, shape [T, M]."""
         robot, h = situation.flexible, situation.h
         assert robot is not None
@@ -160,9 +160,10 @@ class Links(Structure):
         assert situation.flexible is not None
         lowest = situation.flexible.lowest(situation.finite(situation.healthy)[0], float(values[0]))
         named = (
-            ("frequency", lowest, "Hz"), ("factor", values[0], "of the model"),
+            ("frequency", lowest, "Hz"),
+            ("factor", values[0], "of the model"),
             ("damping_factor", values[1], "of the model"),
-        )  # fmt: skip
+        )
         return tuple({"name": n, "path": "", "value": float(v), "unit": u} for n, v, u in named)
 
     def remedy(self, situation: Situation, parameters: Sequence[Mapping[str, Any]]) -> str:

@@ -39,9 +39,11 @@ def openjd_template(jobs: Sequence[Job], folder: str = "", name: str = "Calmotio
         for text in (job.shot, job.folder, *job.arguments):
             if "{{" in text or any(ord(letter) < 32 for letter in text):
                 raise ShotError(
-                    "a template cannot hold this text", path="--openjd", found=repr(text),
+                    "a template cannot hold this text",
+                    path="--openjd",
+                    found=repr(text),
                     remedy="Remove {{ and control characters from it",
-                )  # fmt: skip
+                )
     parts = [jobs[k : k + MOST_TASKS] for k in range(0, len(jobs), MOST_TASKS)]
     return {
         "specificationVersion": SPECIFICATION,
@@ -49,12 +51,14 @@ def openjd_template(jobs: Sequence[Job], folder: str = "", name: str = "Calmotio
         "parameterDefinitions": [
             _output(jobs[0].folder, folder),
             {
-                "name": _PROGRAM, "type": "STRING", "default": "calmotion",
+                "name": _PROGRAM,
+                "type": "STRING",
+                "default": "calmotion",
                 "description": "The program, where it is not in the path of the workers",
             },
         ],
         "steps": [_step(part, k if len(parts) > 1 else None) for k, part in enumerate(parts)],
-    }  # fmt: skip
+    }
 
 
 def _output(results: str, folder: str) -> dict[str, Any]:
@@ -90,15 +94,19 @@ def _refuse_other_files(path: str, jobs: Sequence[Job]) -> None:
     """Refuse a template in the place of a shot or of the results, or under a name that farms do not read."""
     if not path.lower().endswith(_SUFFIXES):
         raise SettingError(
-            "the template is not named like one", path="--openjd", found=path,
+            "the template is not named like one",
+            path="--openjd",
+            found=path,
             remedy=f"Give it the extension {' or '.join(_SUFFIXES)}.",
-        )  # fmt: skip
+        )
     for job in jobs:
         if os.path.realpath(path) in (os.path.realpath(job.shot), os.path.realpath(job.folder)):
             raise SettingError(
                 "the template would be written over a shot, or be in the place of the folder of the results",
-                path="--openjd", found=path, remedy="Choose another file.",
-            )  # fmt: skip
+                path="--openjd",
+                found=path,
+                remedy="Choose another file.",
+            )
 
 
 def _step(jobs: Sequence[Job], number: int | None) -> dict[str, Any]:

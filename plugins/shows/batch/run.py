@@ -72,9 +72,11 @@ def batch(
     unknown = [name for name in extras if name not in EXTRAS]
     if unknown or (workers is not None and not (isinstance(workers, Integral) and workers > 0)):
         raise SettingError(
-            "a batch does not support this", path="extras" if unknown else "--workers",
-            found=unknown[0] if unknown else workers, remedy=f"Use {', '.join(EXTRAS)}" if unknown else "Use 1 or more",
-        )  # fmt: skip
+            "a batch does not support this",
+            path="extras" if unknown else "--workers",
+            found=unknown[0] if unknown else workers,
+            remedy=f"Use {', '.join(EXTRAS)}" if unknown else "Use 1 or more",
+        )
     jobs = jobs_for(shots, target, command, arguments, extras, dict(environment or {}))
     return run_jobs(jobs, target, command, on, workers, progress, cancel)
 
@@ -160,7 +162,7 @@ class _State:
 
 def _work(
     executor: Executor, limit: int | None, jobs: Sequence[Job], state: _State, cancel: Callable[[], bool] | None
-) -> None:  # fmt: skip
+) -> None:
     """Run jobs until each has a result."""
     calls = deque[tuple[Any, ...]]((attempt, job) for job in jobs)
     for ended in finished(executor, calls, limit):

@@ -76,9 +76,7 @@ def executor_on(
             executor.shutdown(wait=True)
 
 
-def finished(
-    executor: Executor, calls: deque[Call], limit: int | None
-) -> Iterator[tuple[Call, Future[Any]] | None]:  # fmt: skip
+def finished(executor: Executor, calls: deque[Call], limit: int | None) -> Iterator[tuple[Call, Future[Any]] | None]:
     """Run calls, to which more may be added meanwhile.
 
     Yields:
@@ -120,9 +118,11 @@ def _client(address: str) -> Iterator[Any]:
         client = Client(f"tcp://{address}", timeout=_CONNECT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise ShotError(
-            "the Dask scheduler does not answer", path=f"{_DASK}{address}", found=str(error) or None,
+            "the Dask scheduler does not answer",
+            path=f"{_DASK}{address}",
+            found=str(error) or None,
             remedy="Start it (dask scheduler) and name its address",
-        ) from error  # fmt: skip
+        ) from error
     try:
         with suppress(TimeoutError, OSError):
             client.wait_for_workers(1, timeout=_APPEAR)
@@ -134,9 +134,11 @@ def _client(address: str) -> Iterator[Any]:
             )
         if wrong is not None:
             raise ShotError(
-                "a worker has another version of Calmotion", path=wrong[0], found=wrong[1],
+                "a worker has another version of Calmotion",
+                path=wrong[0],
+                found=wrong[1],
                 remedy=f"Install Calmotion {__version__} there",
-            )  # fmt: skip
+            )
         yield client
     finally:
         with deferred():

@@ -53,9 +53,11 @@ def forwarded_options(command: argparse.ArgumentParser, tempo: bool = True) -> N
         "--avoid-reversals", metavar="WEIGHT", nargs="?", const="10", help="avoid reversals of gears with backlash"
     )
     group.add_argument(
-        "--goal", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
+        "--goal",
+        metavar="LENGTH",
+        type=quantity("m", needs_unit=True, positive=True),
         help="error at the targets that is accepted after optimising, with a unit (2mm)",
-    )  # fmt: skip
+    )
     command.set_defaults(retime=None)
     if tempo:
         group.add_argument(

@@ -57,12 +57,13 @@ def _print(report: dict[str, Any], console: Console) -> None:
     for title, rows in (("Clips", report["clips"]), ("Transitions", report["transitions"])):
         cells = [
             [
-                _name(row), f"{row['seconds']:.2f} s",
+                _name(row),
+                f"{row['seconds']:.2f} s",
                 *("" if row[key] is None else length(row[key]) for key in ("error_before_m", "error_m")),
                 row["may_be_played"],
             ]
             for row in rows
-        ]  # fmt: skip
+        ]
         print_table(console, title, ["name", *heads], cells)
     for member in members:
         if member["problem"]:

@@ -114,16 +114,19 @@ def read_clips(plan: Plan, plugins: Sequence[str] = ()) -> list[Clip]:
     other = next((m for clip in clips for m in clip.shot.character.motors if m.source != "drive"), None)
     if other is not None:
         raise ShotError(
-            "transitions are written to drives, and this motor is animated otherwise", path=other.path,
-            found=f"animated by its {other.source}", remedy="Animate it by the target position of its drive",
-        )  # fmt: skip
+            "transitions are written to drives, and this motor is animated otherwise",
+            path=other.path,
+            found=f"animated by its {other.source}",
+            remedy="Animate it by the target position of its drive",
+        )
     for clip in clips[1:]:
         if clip.shot.motors != first.motors or clip.shot.character.path != first.character.path:
             raise ShotError(
-                "clips of different robots cannot follow one another", path=clip.shot.path,
+                "clips of different robots cannot follow one another",
+                path=clip.shot.path,
                 found=f"{clip.shot.character.path} with {len(clip.shot.motors)} motors",
                 remedy=f"Use shots of {first.character.path} with the motors of {first.path}",
-            )  # fmt: skip
+            )
     return clips
 
 
@@ -143,10 +146,12 @@ def _clip(name: str, shot: Shot) -> Clip:
         motor = int(np.argmax(np.abs(rates[row])))
         if np.abs(rates[row, motor]) > AT_REST * max(float(largest.max()), 1e-9):
             raise ShotError(
-                f"the clip does not {where} at rest", path=path, attribute=shot.motors[motor],
+                f"the clip does not {where} at rest",
+                path=path,
+                attribute=shot.motors[motor],
                 found=f"{rates[row, motor]:.3g} rad/s (or m/s)",
                 remedy="Let it hold its pose for two frames there",
-            )  # fmt: skip
+            )
     return Clip(name, shot, values[0], values[-1], largest, np.max(np.abs(accelerations), axis=0))
 
 
@@ -174,10 +179,11 @@ def transition(one: Clip, two: Clip, pace: tuple[Array, Array], shortest: float)
     if not math.isfinite(length):
         motor = int(np.argmax(np.maximum(*needed)))
         raise ShotError(
-            "no transition can move this motor, which moves in no clip", path=one.shot.motors[motor],
+            "no transition can move this motor, which moves in no clip",
+            path=one.shot.motors[motor],
             found=f"{one.end[motor]:.4g} at the end of {one.name}, {two.start[motor]:.4g} at the start of {two.name}",
             remedy="Give it calm:motor:maxVelocity and maxAcceleration",
-        )  # fmt: skip
+        )
     # two frames of rest at each end
     moving = math.ceil(length / frame - 1e-9)
     times: Array = frame * np.arange(moving + 5, dtype=np.float64)

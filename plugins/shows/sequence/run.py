@@ -143,7 +143,7 @@ def sequence(
 
 def _written(
     plan: Plan, clips: Sequence[Clip], folder: str, arguments: Sequence[str]
-) -> tuple[dict[str, float], list[Job]]:  # fmt: skip
+) -> tuple[dict[str, float], list[Job]]:
     """Write the shots of all members; their lengths [s], and their jobs."""
     from calmotion.usd import write_performance
 

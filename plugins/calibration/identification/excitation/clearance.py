@@ -116,7 +116,7 @@ class Clearance:
 
     def _distances(
         self, shot: CompiledShot, pairs: Sequence[tuple[int, int]], count: int | None = None, most: Array | float = FAR
-    ) -> Array | None:  # fmt: skip
+    ) -> Array | None:
         """The distances of pairs of components, at the most so much, in a motion or in its first instants; None where
         its motion is not known."""
         prepared = prepare(shot, self._options)
@@ -127,10 +127,12 @@ class Clearance:
         every = max(1, round(1.0 / (RATE * grid.h)))
         c, q = (part[::every][:count] for part in rigid_poses(model, angles, prepared.world))
         turns = [Rotation.from_quat(q[:, k], scalar_first=True) for k in range(q.shape[1])]
-        return np.array([
-            self._distance(a, b, c, turns, far)
-            for (a, b), far in zip(pairs, np.broadcast_to(most, len(pairs)).tolist(), strict=True)
-        ])  # fmt: skip
+        return np.array(
+            [
+                self._distance(a, b, c, turns, far)
+                for (a, b), far in zip(pairs, np.broadcast_to(most, len(pairs)).tolist(), strict=True)
+            ]
+        )
 
     def _distance(self, a: int, b: int, c: Array, turns: Sequence[Rotation], far: float) -> float:
         """The smallest distance of two components, at least, and at most so far."""

@@ -70,9 +70,11 @@ class ExcitationSettings:
 
 
 def excite_shot(
-    shot: CompiledShot, settings: ExcitationSettings, options: RunSettings,
+    shot: CompiledShot,
+    settings: ExcitationSettings,
+    options: RunSettings,
     progress: Callable[[float, str], None] = lambda fraction, message: None,
-) -> Excitation:  # fmt: skip
+) -> Excitation:
     """Find a test motion.
 
     Args:
@@ -102,10 +104,12 @@ def excite_shot(
     best = _searched(trial, settings, progress)
     if chirp is None or best is None:
         raise ShotError(
-            "no test motion keeps all limits", path=shot.character.path, attribute="calm:motor:maxTorque",
+            "no test motion keeps all limits",
+            path=shot.character.path,
+            attribute="calm:motor:maxTorque",
             found=f"{SEARCHES} motions simulated",
             remedy="Check the limits, and whether bodies almost touch: the robot can hardly leave its first pose",
-        )  # fmt: skip
+        )
     predicted = tuple(
         Predicted(
             p.name,
@@ -138,9 +142,11 @@ def _searched(trial: _Trial, settings: ExcitationSettings, progress: Callable[[f
     for k in range(SEARCHES):
         progress(0.4 + 0.2 * k, "looking for the best motion")
         point = least_point(
-            lambda numbers: _score(responses.jacobian(family.tones_of(numbers)), wanted), family.size,
-            max(1, settings.tries // SEARCHES), random,
-        )  # fmt: skip
+            lambda numbers: _score(responses.jacobian(family.tones_of(numbers)), wanted),
+            family.size,
+            max(1, settings.tries // SEARCHES),
+            random,
+        )
         found = trial.rate(family.tones_of(point))
         if found is not None and (best is None or found.score < best.score):
             best = found
@@ -192,7 +198,7 @@ class _Trial:
             tuple(item.file for item in self._recordings),
             sensors_of(shot.character, self._recordings, clocks, -1.0, float(family.times[-1]) + AFTER, False),
             measurement_parameters(self._recordings, clocks, settings.priors),
-        )  # fmt: skip
+        )
 
     def problem(self, values: Array) -> Calibrated:
         """The robot and its sensors with a motion."""
@@ -275,6 +281,6 @@ def _uses(shot: CompiledShot, family: Family, rated: _Rated) -> tuple[MotorUse, 
                 float(shares[1]),
                 float(shares[2]),
                 effort / motor.max_torque if np.isfinite(motor.max_torque) else 0.0,
-            )  # fmt: skip
+            )
         )
     return tuple(rows)

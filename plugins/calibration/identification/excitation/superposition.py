@@ -46,9 +46,9 @@ class Superposition:
             )
             found.append((_readings(pulsed, self._times), height))
         self._rest = found[0][0][0]  # by how the robot sags: at the first frame nothing has begun to move
-        self._responses = np.concatenate([
-            ((own - self._rest) / height if height else 0.0 * own).reshape(len(own), -1) for own, height in found
-        ])  # fmt: skip
+        self._responses = np.concatenate(
+            [((own - self._rest) / height if height else 0.0 * own).reshape(len(own), -1) for own, height in found]
+        )
         measurement, here = pulsed.measurement, pulsed.signals(np.zeros(len(pulsed.lower)))
         sensors, z = measurement.sensors, np.zeros(len(measurement.parameters))
         # derivatives by biases and places, which do not depend on the motion: those of the first sample
@@ -64,10 +64,12 @@ class Superposition:
         )  # fmt: skip
         # as many samples as a frame has, each with its noise
         rates = [frame / (own.channel.times[1] - own.channel.times[0]) for own in sensors]
-        self._weights = np.concatenate([
-            np.full(own.channel.values.shape[1], np.sqrt(rate) / own.sigma)
-            for own, rate in zip(sensors, rates, strict=True)
-        ])  # fmt: skip
+        self._weights = np.concatenate(
+            [
+                np.full(own.channel.values.shape[1], np.sqrt(rate) / own.sigma)
+                for own, rate in zip(sensors, rates, strict=True)
+            ]
+        )
 
     def jacobian(self, values: Array) -> Array:
         """Derivatives by all parameters of what is read at the frames, over its noise, shape [N, n].

@@ -62,9 +62,11 @@ def bounds_of(character: Character, animation: Animation, amplitude: float, trav
         still = next(m.path for m, speed in zip(motors, speeds, strict=True) if speed <= 0.0)
         raise ShotError(
             "the shot moves no motor of this kind, so that it does not say how fast a test motion may be",
-            path=still, attribute="calm:motor:maxVelocity", found="no motion",
+            path=still,
+            attribute="calm:motor:maxVelocity",
+            found="no motion",
             remedy="Name a shot in which the robot moves as fast as it may",
-        )  # fmt: skip
+        )
     joints = [character.joints[motor.joint] for motor in motors]
     most = np.where(linear, travel, amplitude)
     below = np.array([min(a, q - joint.lower) for a, q, joint in zip(most, start, joints, strict=True)])
@@ -72,15 +74,19 @@ def bounds_of(character: Character, animation: Animation, amplitude: float, trav
     for motor, q, low, high, joint in zip(motors, start, below, above, joints, strict=True):
         if low < 0.0 or high < 0.0:
             raise ShotError(
-                "the first pose is outside the range of this joint", path=motor.path, attribute="physics:lowerLimit",
+                "the first pose is outside the range of this joint",
+                path=motor.path,
+                attribute="physics:lowerLimit",
                 found=f"{q:.4g}, where the range is {joint.lower:.4g} to {joint.upper:.4g}",
                 remedy="Correct the limits, or the first frame of the shot",
-            )  # fmt: skip
+            )
     return Bounds(
-        -below, above, np.minimum(speeds, [m.max_velocity for m in motors]),
+        -below,
+        above,
+        np.minimum(speeds, [m.max_velocity for m in motors]),
         np.minimum(accelerations, [m.max_acceleration for m in motors]),
         np.array([m.max_torque for m in motors], float),
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,10 +199,11 @@ def family_of(character: Character, animation: Animation, frequencies: Array, bo
     if not len(leading) or len(times) < 4 * PER_PERIOD:
         raise ShotError(
             "no motor may move" if not len(leading) else "the test motion has too few frames",
-            path=character.path, attribute="calm:motor:optimize" if not len(leading) else "--duration",
+            path=character.path,
+            attribute="calm:motor:optimize" if not len(leading) else "--duration",
             found=f"{len(leading)} motors and {len(times)} frames",
             remedy="Set calm:motor:optimize to true on some motors, or take a longer --duration",
-        )  # fmt: skip
+        )
     wanted = np.asarray(frequencies)[np.asarray(frequencies) > 0.0]
     most = 1.0 / (PER_PERIOD * frame)
     low = max(2.0 / times[-1], LOWEST * float(wanted.min(initial=2.0)))

@@ -52,9 +52,7 @@ def strongest_mode(values: Array, rate: float) -> Decay | None:
         values, rate = decimate(values, factor, axis=0, zero_phase=True), rate / factor
     values = values[:MOST] - values[len(values) // 2 :].mean(axis=0)
     count, columns = len(values), len(values) // 2
-    hankel = np.concatenate(
-        [np.lib.stride_tricks.sliding_window_view(part, columns) for part in values.T], axis=0
-    )  # fmt: skip
+    hankel = np.concatenate([np.lib.stride_tricks.sliding_window_view(part, columns) for part in values.T], axis=0)
     vectors = np.linalg.svd(hankel, full_matrices=False)[2][:ORDER].T
     poles = np.linalg.eigvals(np.linalg.lstsq(vectors[:-1], vectors[1:], rcond=None)[0])
     poles = poles[np.abs(poles) > 1e-6]

@@ -31,10 +31,11 @@ def refuse_long(recordings: Sequence[SensorRecording], length: float) -> None:
         lasts = recording.end - recording.start
         if lasts > LONGEST * length:
             raise ShotError(
-                "the recording is far longer than the shot", path=recording.file,
+                "the recording is far longer than the shot",
+                path=recording.file,
                 found=f"{lasts:.4g} s of recording, {length:.4g} s of the shot",
                 remedy="Write times in seconds, or their unit into the map of the recording; cut it to the performance",
-            )  # fmt: skip
+            )
 
 
 def refuse_unlike(character: Character, recordings: Sequence[SensorRecording], robot: Signals) -> None:

@@ -111,9 +111,11 @@ def sensors_of(
 
 
 def measurement_parameters(
-    recordings: Sequence[SensorRecording], clocks: Sequence[float], priors: Mapping[str, float] | None = None,
+    recordings: Sequence[SensorRecording],
+    clocks: Sequence[float],
+    priors: Mapping[str, float] | None = None,
     take: int = 0,
-) -> tuple[Parameter, ...]:  # fmt: skip
+) -> tuple[Parameter, ...]:
     """Clocks of the recordings, biases of accelerometers and places of markers; the recordings of one shot share the
     latter two.
 
@@ -174,9 +176,10 @@ def start_parameters(
 
 def decay_paths(sensor: Sensor, signals: Signals) -> list[str]:
     return [
-        f"{own_path(sensor)}, {what} in mode {k + 1}" for k in range(signals.modes.shape[1])
+        f"{own_path(sensor)}, {what} in mode {k + 1}"
+        for k in range(signals.modes.shape[1])
         for what in ("deflection", "speed")
-    ]  # fmt: skip
+    ]
 
 
 def _nominal(sensor: Sensor, clocks: Sequence[float], nominal: Signals) -> Array:
