@@ -46,9 +46,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="file to write; replaces one of that name (default: named after the shot, in this folder)",
     )
     command.add_argument(
-        "--start-delay", metavar="TIME", type=quantity("s"), default=0.0,
+        "--start-delay",
+        metavar="TIME",
+        type=quantity("s"),
+        default=0.0,
         help="how late the controller starts, in s or with a unit (5ms); it counts as loss",
-    )  # fmt: skip
+    )
     command.add_argument(
         "--tolerance",
         metavar="LENGTH",

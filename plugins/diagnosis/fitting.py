@@ -161,9 +161,12 @@ def _applied(
 
 
 def _fit_group(
-    situation: Situation, loops: Sequence[LoopExplanation], group: Sequence[int], error: Array,
+    situation: Situation,
+    loops: Sequence[LoopExplanation],
+    group: Sequence[int],
+    error: Array,
     chosen: Mapping[tuple[str, int], Mapping[str, float]],
-) -> dict[tuple[str, str], float] | None:  # fmt: skip
+) -> dict[tuple[str, str], float] | None:
     """The values of the parameters of some joints that share them; None where they are not worth it."""
     own: dict[tuple[str, str], Parameter] = {}
     for loop in loops:

@@ -69,9 +69,12 @@ def read_dataset(file: str) -> tuple[SensorRecording, SensorRecording]:
     missing = [name for name in (ACTION, STATE, TIME) if name not in table.column_names]
     if missing:
         raise ShotError(
-            "the dataset has no such column", path=file, attribute=missing[0], found=", ".join(table.column_names),
+            "the dataset has no such column",
+            path=file,
+            attribute=missing[0],
+            found=", ".join(table.column_names),
             remedy=f"Name a file of data/ with {ACTION}, {STATE} and {TIME}",
-        )  # fmt: skip
+        )
     times = np.asarray(table[TIME].to_pylist(), float)
     asked, moved = (np.asarray(table[name].to_pylist(), float) for name in (ACTION, STATE))
     rows = np.ones(len(times), bool)

@@ -138,9 +138,12 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
     if _is_number(head[0]):
         if not names:
             raise ShotError(
-                "the table has no names of joints", path=path, attribute="line 1", found=",".join(head[:4]),
+                "the table has no names of joints",
+                path=path,
+                attribute="line 1",
+                found=",".join(head[:4]),
                 remedy=f"{_REMEDY}; or use {_WITHOUT}",
-            )  # fmt: skip
+            )
         head = list(names)
     else:
         if len(names) == len(head):  # names of other columns, as the remedy says
@@ -195,9 +198,12 @@ def _column(
 
 def _wrong_row(path: str, line: tuple[int, str], count: int, remedy: str) -> ShotError:
     return ShotError(
-        f"a row that does not hold {count} numbers", path=path, attribute=f"line {line[0]}", found=line[1][:60],
+        f"a row that does not hold {count} numbers",
+        path=path,
+        attribute=f"line {line[0]}",
+        found=line[1][:60],
         remedy=remedy,
-    )  # fmt: skip
+    )
 
 
 def _named_unit(name: str) -> tuple[str, float]:
@@ -219,9 +225,12 @@ def _npz(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
         own = [name.decode() if isinstance(name, bytes) else str(name) for name in given]
         if positions.shape[1] != len(own):
             raise ShotError(
-                "positions must have a column for each name in joint_names", path=path, attribute="positions",
-                found=f"shape {positions.shape} and {len(own)} names", remedy="Write both, or use " + _WITHOUT,
-            )  # fmt: skip
+                "positions must have a column for each name in joint_names",
+                path=path,
+                attribute="positions",
+                found=f"shape {positions.shape} and {len(own)} names",
+                remedy="Write both, or use " + _WITHOUT,
+            )
         _refuse_repeated(path, own)
         columns = {name: positions[:, k] for k, name in enumerate(own) if name != "-"}
         columns |= {TIME: _numbers(path, TIME, arrays[TIME], 1)} if TIME in arrays else {}
@@ -265,9 +274,12 @@ def _numbers(path: str, name: str, array: np.ndarray, axes: int) -> Array:
     if array.ndim != axes or array.dtype.kind not in "iuf":
         wanted = ("one number", "one number for each time", "a number for each time and joint")[axes]
         raise ShotError(
-            f"must be {wanted}", path=path, attribute=name, found=f"shape {array.shape} of {array.dtype}",
+            f"must be {wanted}",
+            path=path,
+            attribute=name,
+            found=f"shape {array.shape} of {array.dtype}",
             remedy=_REMEDY,
-        )  # fmt: skip
+        )
     return np.asarray(array, np.float64)
 
 
@@ -278,15 +290,21 @@ def _refuse_bad(path: str, own: TimeColumn, columns: dict[str, Array]) -> None:
     for name, values in ((named, times), *columns.items()):
         if len(values) != len(times):
             raise ShotError(
-                f"has another number of values than {named}", path=path, attribute=name,
-                found=f"{len(values)} and {len(times)}", remedy="Correct the table",
-            )  # fmt: skip
+                f"has another number of values than {named}",
+                path=path,
+                attribute=name,
+                found=f"{len(values)} and {len(times)}",
+                remedy="Correct the table",
+            )
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             raise ShotError(
-                "is not finite", path=path, attribute=name, found=f"{values[bad[0]]} in row {bad[0] + 1}",
+                "is not finite",
+                path=path,
+                attribute=name,
+                found=f"{values[bad[0]]} in row {bad[0] + 1}",
                 remedy="Correct or remove the row",
-            )  # fmt: skip
+            )
     if len(times) < 2:
         raise ShotError("a motion needs two rows at least", path=path, found=f"{len(times)} rows", remedy=_REMEDY)
     back = np.flatnonzero(np.diff(times) <= 0.0)

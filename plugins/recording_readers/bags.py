@@ -124,9 +124,12 @@ def _map(file: str, map_file: str) -> tuple[dict[str, str] | None, dict[str, str
 
 
 def _check(
-    file: str, joints: Mapping[str, str] | None, topics: Mapping[str, str] | None, seen: Mapping[str, str],
+    file: str,
+    joints: Mapping[str, str] | None,
+    topics: Mapping[str, str] | None,
+    seen: Mapping[str, str],
     found: Mapping[tuple[str, str], _Samples],
-) -> None:  # fmt: skip
+) -> None:
     if not seen:
         raise ShotError(
             "the bag has no message of a joint, an inertial sensor or a pose",

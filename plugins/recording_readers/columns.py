@@ -51,9 +51,12 @@ def read_columns(file: str) -> tuple[dict[str, Array], bool]:
         comments = [line for n, line in numbered if line.startswith("#") and n < rows[0][0]]
         if not comments:
             raise ShotError(
-                "the recording does not name its columns", path=file, attribute="line 1", found=head[:60],
+                "the recording does not name its columns",
+                path=file,
+                attribute="line 1",
+                found=head[:60],
                 remedy="Write a first line with their names, such as time_s,/Arm/Hand/cup.x",
-            )  # fmt: skip
+            )
         head, body = comments[-1].lstrip("# "), rows
     if not body:
         raise ShotError(
@@ -93,9 +96,12 @@ def column_of(columns: Mapping[str, Array], name: str, file: str) -> Array:
     sign, own = (-1.0, name[1:]) if name.startswith("-") and name not in columns else (1.0, name)
     if own not in columns:
         raise ShotError(
-            "the recording has no such column", path=file, attribute=own, found=", ".join(list(columns)[:12]),
+            "the recording has no such column",
+            path=file,
+            attribute=own,
+            found=", ".join(list(columns)[:12]),
             remedy=f"{nearest(own, list(columns))}Correct the map",
-        )  # fmt: skip
+        )
     return np.asarray(sign * columns[own])
 
 

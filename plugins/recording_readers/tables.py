@@ -87,9 +87,12 @@ def _named(file: str, columns: Mapping[str, Array], degrees: bool) -> tuple[list
     own = TimeColumn((TIME,), columns[TIME], "s", True) if TIME in columns else time_column(columns)
     if own is None:
         raise ShotError(
-            "the recording has no column of times", path=file, attribute=TIME, found=", ".join(list(columns)[:12]),
+            "the recording has no column of times",
+            path=file,
+            attribute=TIME,
+            found=", ".join(list(columns)[:12]),
             remedy=f"Name it {TIME}, in seconds, or write a map: {os.path.splitext(os.path.basename(file))[0]}.toml",
-        )  # fmt: skip
+        )
     groups: dict[tuple[str, str], dict[int, Array]] = {}
     counted = counters({name: values for name, values in columns.items() if not name.startswith("/")})
     skipped, wrong = [], []
@@ -149,22 +152,31 @@ def _mapped(
         kind, path, given = table.get("kind"), table.get("prim"), table.get("columns")
         if not isinstance(kind, str) or kind not in COMPONENTS:
             raise ShotError(
-                "there is no such kind of channel", path=map_file, attribute=f"{place}.kind", found=kind,
+                "there is no such kind of channel",
+                path=map_file,
+                attribute=f"{place}.kind",
+                found=kind,
                 remedy=f"{nearest(str(kind), COMPONENTS)}Use {', '.join(COMPONENTS)}",
-            )  # fmt: skip
+            )
         ends = [("prim", path)] + ([("to", table.get("to"))] if kind == STRAIN else [])
         for entry, end in ends:
             if not isinstance(end, str) or not end.startswith("/"):
                 raise ShotError(
-                    "must be a prim path", path=map_file, attribute=f"{place}.{entry}", found=end,
+                    "must be a prim path",
+                    path=map_file,
+                    attribute=f"{place}.{entry}",
+                    found=end,
                     remedy='Write to = "/Arm/Link/gauge_end", the other end of the gauge' if entry == "to" else EXAMPLE,
-                )  # fmt: skip
+                )
         given = [given] if isinstance(given, str) else given
         if not isinstance(given, list) or len(given) != COMPONENTS[kind]:
             raise ShotError(
-                f"a channel of this kind has {COMPONENTS[kind]} columns", path=map_file, attribute=f"{place}.columns",
-                found=given, remedy=EXAMPLE,
-            )  # fmt: skip
+                f"a channel of this kind has {COMPONENTS[kind]} columns",
+                path=map_file,
+                attribute=f"{place}.columns",
+                found=given,
+                remedy=EXAMPLE,
+            )
         unit = unit_of(str(table.get("unit", DEFAULT_UNIT[kind])), FITTING[kind], map_file, f"{place}.unit")
         values = unit * np.stack([column_of(columns, str(column), file) for column in given], axis=1)
         made = _channel(kind, str(path), times, values, keep, noise_in(table, unit, map_file, f"{place}."))
@@ -178,9 +190,12 @@ def _times(columns: Mapping[str, Array], content: Mapping[str, Any], file: str, 
     table = content.get("time", {"column": TIME})
     if not isinstance(table, dict):
         raise ShotError(
-            "must be a table", path=map_file, attribute="time", found=table,
+            "must be a table",
+            path=map_file,
+            attribute="time",
+            found=table,
             remedy='Write [time] with column = "t" and unit = "ms", or with rate = 1000.0 (samples a second)',
-        )  # fmt: skip
+        )
     if "rate" in table:
         problem, remedy = "must be a number of samples a second", "Write it in Hz, such as 1000.0"
         rate = positive(table["rate"], map_file, "time.rate", problem, remedy)

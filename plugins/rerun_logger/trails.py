@@ -58,8 +58,11 @@ def log_trail(
     look = rr.LineStrips3D.from_fields(colors=fading(style.color, PIECES), radii=widths)
     recording.log(entity, look, static=True)
     nothing = np.empty((0, 3), dtype=np.float32)
-    strips = [path if drawn else nothing for row, flags in zip(paths, shown, strict=True)
-              for path, drawn in zip(row, flags, strict=True)]  # fmt: skip
+    strips = [
+        path if drawn else nothing
+        for row, flags in zip(paths, shown, strict=True)
+        for path, drawn in zip(row, flags, strict=True)
+    ]
     recording.send_columns(entity, [frames], rr.LineStrips3D.columns(strips=strips).partition([PIECES] * len(times)))
     dot = f"{entity}/now"
     recording.log(dot, rr.Points3D.from_fields(colors=[style.color], radii=[rr.Radius.ui_points(4.0)]), static=True)

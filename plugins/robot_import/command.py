@@ -36,9 +36,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--solid", metavar="MATERIAL", help="material of the links without inertia, whose density gives their mass"
     )
     command.add_argument(
-        "--materials", metavar="FILE", action="append", default=[],
+        "--materials",
+        metavar="FILE",
+        action="append",
+        default=[],
         help="TOML file with more materials; may be repeated",
-    )  # fmt: skip
+    )
     command.add_argument(
         "--converters",
         metavar="DIR",
@@ -46,9 +49,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     plugin_option(command)
     command.add_argument(
-        "--set", metavar="NAME=VALUE", action="append", default=[],
+        "--set",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
         help="set a property of an operator, such as motion.read.angles=deg",
-    )  # fmt: skip
+    )
     report_options(command)
 
 

@@ -40,9 +40,12 @@ class BrokenMeshes(ShotError):
 
     def __init__(self, robot: str, meshes: Sequence[str]) -> None:
         super().__init__(
-            "meshes of the robot cannot be converted", path=robot, attribute="mesh", found=", ".join(meshes[:4]),
+            "meshes of the robot cannot be converted",
+            path=robot,
+            attribute="mesh",
+            found=", ".join(meshes[:4]),
             remedy="Write them anew with a mesh editor, as .stl for example",
-        )  # fmt: skip
+        )
         self.files = tuple(dict.fromkeys(meshes))
 
 

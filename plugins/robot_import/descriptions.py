@@ -148,12 +148,15 @@ def _refuse_other_joints(root: xml.Element, path: str) -> None:
     loose = root_joints(root)
     problems = [
         ShotError(
-            f"a {joint.get('type')} joint is not supported", path=path, attribute=joint.get("name", "joint"),
-            found=joint.get("type"), remedy=f"Write one of {', '.join(_JOINTS)}",
+            f"a {joint.get('type')} joint is not supported",
+            path=path,
+            attribute=joint.get("name", "joint"),
+            found=joint.get("type"),
+            remedy=f"Write one of {', '.join(_JOINTS)}",
         )
         for joint in root.findall("joint")
         if joint.get("type") not in _JOINTS and joint not in loose
-    ]  # fmt: skip
+    ]
     raise_all(problems)
 
 
@@ -289,9 +292,12 @@ def _refuse_missing_meshes(root: xml.Element, path: str, packages: Mapping[str, 
         shown = "; ".join(f"{name} of {link}" for link, name in missing[:_SHOWN])
         more = f"; {len(missing) - _SHOWN} more" if len(missing) > _SHOWN else ""
         raise ShotError(
-            "meshes of the robot are missing", path=path, attribute="mesh", found=shown + more,
+            "meshes of the robot are missing",
+            path=path,
+            attribute="mesh",
+            found=shown + more,
             remedy="Put the files there, or name the folder of their package: --package NAME=FOLDER",
-        )  # fmt: skip
+        )
 
 
 def _efforts(root: xml.Element) -> dict[str, float]:

@@ -179,9 +179,12 @@ def author_locks(stage: Usd.Stage, units: StageUnits, locks: Mapping[str, float]
         target = UsdPhysics.DriveAPI.Apply(axis.prim, axis.drive).CreateTargetPositionAttr()
         if target.GetNumTimeSamples():
             raise ShotError(
-                "the motion moves a joint that an equality holds", path=axis.path, attribute=target.GetName(),
-                found=f"{locks[axis.name]:g}", remedy="Leave it out of the motion, or remove the equality",
-            )  # fmt: skip
+                "the motion moves a joint that an equality holds",
+                path=axis.path,
+                attribute=target.GetName(),
+                found=f"{locks[axis.name]:g}",
+                remedy="Leave it out of the motion, or remove the equality",
+            )
         target.Set(locks[axis.name] / units.length(1.0) if axis.linear else float(np.degrees(locks[axis.name])))
         axis.prim.AddAppliedSchema("CalmMotorAPI")
         axis.prim.CreateAttribute("calm:motor:optimize", Sdf.ValueTypeNames.Bool).Set(False)

@@ -146,9 +146,12 @@ class _Author:
         solid = self._options.solid
         if solid is None:
             raise ShotError(
-                "links have geometry and no inertia", path=str(without[0].GetPath()), attribute="inertial", found=names,
+                "links have geometry and no inertia",
+                path=str(without[0].GetPath()),
+                attribute="inertial",
+                found=names,
                 remedy="Write their <inertial>, or name the material that they are made of: --solid abs",
-            )  # fmt: skip
+            )
         for prim in without:
             api = UsdPhysics.MassAPI.Apply(prim)
             api.CreateDensityAttr(solid.density / self._units.density(1.0))

@@ -70,9 +70,12 @@ def _parts(
             for file in dict.fromkeys(os.path.join(folder, name) for folder in folders):
                 if is_special(file):
                     raise ShotError(
-                        "this is not a file but a named pipe, a socket or a device", path=path,
-                        attribute=f"{node.tag}.file", found=name, remedy="Name a file",
-                    )  # fmt: skip
+                        "this is not a file but a named pipe, a socket or a device",
+                        path=path,
+                        attribute=f"{node.tag}.file",
+                        found=name,
+                        remedy="Name a file",
+                    )
                 if node.tag != "texture":  # a picture changes no motion
                     files.append(file)
                 if node.tag in ("include", "model") and os.path.isfile(file) and file not in seen:

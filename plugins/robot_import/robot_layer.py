@@ -123,9 +123,12 @@ class _Author:
             for prim in bodies:
                 if str(prim.GetPath()) in flexible:
                     raise ShotError(
-                        "two patterns of flexible links name this one", path=str(prim.GetPath()),
-                        attribute="--flexible", found=given.pattern, remedy="Make one of them narrower",
-                    )  # fmt: skip
+                        "two patterns of flexible links name this one",
+                        path=str(prim.GetPath()),
+                        attribute="--flexible",
+                        found=given.pattern,
+                        remedy="Make one of them narrower",
+                    )
                 flexible.add(str(prim.GetPath()))
                 self._leave_out_default_density(prim)
                 prim.AddAppliedSchema("CalmFlexibleBodyAPI")

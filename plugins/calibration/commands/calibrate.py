@@ -54,15 +54,21 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     shot_arguments(command, optional=True)
     command.add_argument(
-        "--shot", dest="of_shot", metavar="FILE", action=_Named,
+        "--shot",
+        dest="of_shot",
+        metavar="FILE",
+        action=_Named,
         help="a shot of the robot, in place of SHOT; the recordings that follow are of it. May be repeated: the robot "
         "is the same, and gains may differ from shot to shot by known factors",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "--recording", metavar="FILE", action=_Named, required=True,
+        "--recording",
+        metavar="FILE",
+        action=_Named,
+        required=True,
         help="what was recorded: a table with columns named after prims or with a TOML map beside it, or an "
         "accelerometer log of a 3D printer as FILE@/PRIM; may be repeated",
-    )  # fmt: skip
+    )
     command.add_argument("-o", "--output", metavar="LAYER", help="USD layer to write")
     command.add_argument(
         "--parameters",

@@ -36,26 +36,38 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     shot_arguments(command)
     command.add_argument(
-        "-o", "--output", metavar="LAYER", required=True,
+        "-o",
+        "--output",
+        metavar="LAYER",
+        required=True,
         help="USD layer to write; it opens the shot with the motion",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "--sensor", metavar="KIND[@/PRIM][=NOISE]", action="append", default=[],
+        "--sensor",
+        metavar="KIND[@/PRIM][=NOISE]",
+        action="append",
+        default=[],
         help="what will record it: marker, accelerometer, angle or effort, at all targets or motors or at a prim, with "
         "the standard deviation of its noise in SI or with a unit; may be repeated (default: accelerometer and angle)",
-    )  # fmt: skip
+    )
     command.add_argument(
         "--parameters", metavar="KIND", nargs="+", help="what is to be estimated, as of calmotion calibrate"
     )
     prior_option(command)
     command.add_argument(
-        "--duration", metavar="TIME", type=quantity("s", positive=True), default=4.0,
+        "--duration",
+        metavar="TIME",
+        type=quantity("s", positive=True),
+        default=4.0,
         help="length of the motion; a second of rest behind it counts as well (default: 4 s)",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "--amplitude", metavar="ANGLE", type=quantity("rad", positive=True), default=None,
+        "--amplitude",
+        metavar="ANGLE",
+        type=quantity("rad", positive=True),
+        default=None,
         help="largest excursion of a hinge from the first pose, in rad or with a unit (default: 10deg)",
-    )  # fmt: skip
+    )
     command.add_argument(
         "--tries",
         metavar="N",
@@ -111,10 +123,13 @@ def _print(report: dict[str, Any], console: Console) -> None:
         f"calmotion calibrate {report['layer']} --recording FILE -o LAYER",
     )
     rows = [
-        [row["path"], *(f"{row[name]:.3g}" for name in ("excursion", "velocity", "acceleration", "effort")),
-         f"{max(row[f'{name}_share'] for name in ('range', 'velocity', 'acceleration', 'effort')):.0%}"]
+        [
+            row["path"],
+            *(f"{row[name]:.3g}" for name in ("excursion", "velocity", "acceleration", "effort")),
+            f"{max(row[f'{name}_share'] for name in ('range', 'velocity', 'acceleration', 'effort')):.0%}",
+        ]
         for row in report["motors"]
-    ]  # fmt: skip
+    ]
     print_table(
         console,
         "What the motors do (rad or m, s, N m or N)",

@@ -35,13 +35,19 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     shot_arguments(command)
     command.add_argument(
-        "--recording", metavar="FILE", action="append", required=True,
+        "--recording",
+        metavar="FILE",
+        action="append",
+        required=True,
         help="recording of this take, as of calmotion calibrate; may be repeated",
-    )  # fmt: skip
+    )
     command.add_argument(
-        "-o", "--output", metavar="LAYER", required=True,
+        "-o",
+        "--output",
+        metavar="LAYER",
+        required=True,
         help="USD layer with the curves of the next take; the model goes beside it as <stem>_model.usda",
-    )  # fmt: skip
+    )
     command.add_argument("--parameters", metavar="KIND", nargs="+", help="what is estimated, as of calmotion calibrate")
     prior_option(command)
     command.add_argument(
@@ -85,11 +91,14 @@ def _print(report: dict[str, Any], console: Console) -> None:
     )
     rows = [
         [
-            row["path"], length(row["max_error_played_m"]), length(row["max_error_m"]),
-            length(row["expected_max_error_m"]), length(row["expected_p95_max_error_m"]),
+            row["path"],
+            length(row["max_error_played_m"]),
+            length(row["max_error_m"]),
+            length(row["expected_max_error_m"]),
+            length(row["expected_p95_max_error_m"]),
         ]
         for row in report["targets"]
-    ]  # fmt: skip
+    ]
     print_table(
         console,
         "Largest error at the targets",

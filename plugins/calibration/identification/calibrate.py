@@ -62,9 +62,12 @@ class CalibrationSettings:
 
 
 def calibrate_shot(
-    shot: CompiledShot, recordings: Sequence[SensorRecording], settings: CalibrationSettings, options: RunSettings,
+    shot: CompiledShot,
+    recordings: Sequence[SensorRecording],
+    settings: CalibrationSettings,
+    options: RunSettings,
     progress: Callable[[float, str], None] = lambda fraction, message: None,
-) -> Calibration:  # fmt: skip
+) -> Calibration:
     """`calibrate_shots` of one shot."""
     return calibrate_shots([(shot, recordings)], settings, options, progress)
 

@@ -58,9 +58,12 @@ class Calibrated:
     """
 
     def __init__(
-        self, takes: Sequence[Take], measurement: Measurement, options: RunSettings,
+        self,
+        takes: Sequence[Take],
+        measurement: Measurement,
+        options: RunSettings,
         tell: Callable[[], None] = lambda: None,
-    ):  # fmt: skip
+    ):
         self.takes, self.measurement, self.options, self.tell = tuple(takes), measurement, options, tell
         self.shot, self.parameters = self.takes[0].shot, self.takes[0].parameters
         self._last: tuple[Array, Motions] | None = None
@@ -129,11 +132,14 @@ class Calibrated:
         self.differences, self._own = found, True
         columns = [
             -measurement.weighted(change)
-            for change in zip(*[
-                found.of(lambda signals, sensor=sensor: measurement.predicted(signals, sensor, y))  # type: ignore[misc]
-                for sensor in measurement.sensors
-            ], strict=True)
-        ]  # fmt: skip
+            for change in zip(
+                *[
+                    found.of(lambda signals, sensor=sensor: measurement.predicted(signals, sensor, y))  # type: ignore[misc]
+                    for sensor in measurement.sensors
+                ],
+                strict=True,
+            )
+        ]
         by_measurement = -measurement.weighted(
             [measurement.derivatives(here, sensor, y) for sensor in measurement.sensors]
         )

@@ -38,10 +38,13 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     shot_arguments(command, optional=True)
     command.add_argument(
-        "--recording", metavar="FILE", action="append", required=True,
+        "--recording",
+        metavar="FILE",
+        action="append",
+        required=True,
         help="what was recorded, as of calmotion calibrate; its clock begins with the first frame, or with --commands; "
         "may be repeated",
-    )  # fmt: skip
+    )
     command.add_argument(
         "--commands",
         metavar="FILE",

@@ -131,13 +131,19 @@ def _problem(report: Mapping[str, Any]) -> dict[str, Any]:
         return dict(report["error"])
     if report.get("tolerance_kept") and report.get("improved") is False:
         return {
-            "problem": "the curves leave a larger error than the animation", "path": "", "attribute": "improved",
-            "found": "False", "remedy": "See the limits of the motors; slow the animation down, or correct the limits",
-        }  # fmt: skip
+            "problem": "the curves leave a larger error than the animation",
+            "path": "",
+            "attribute": "improved",
+            "found": "False",
+            "remedy": "See the limits of the motors; slow the animation down, or correct the limits",
+        }
     return {
-        "problem": "the simulation does not keep the tolerance", "path": "", "attribute": "tolerance_kept",
-        "found": str(report.get("tolerance_kept")), "remedy": "See the error budget, or raise --tolerance",
-    }  # fmt: skip
+        "problem": "the simulation does not keep the tolerance",
+        "path": "",
+        "attribute": "tolerance_kept",
+        "found": str(report.get("tolerance_kept")),
+        "remedy": "See the error budget, or raise --tolerance",
+    }
 
 
 def _worker() -> str:

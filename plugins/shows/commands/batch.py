@@ -37,9 +37,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     command.add_argument("shots", metavar="SHOTS", nargs="+", help="USD files")
     command.add_argument(
-        "-o", "--output", metavar="DIR", required=True,
+        "-o",
+        "--output",
+        metavar="DIR",
+        required=True,
         help="folder for layers, manifests, logs and the report; the same command goes on after an interruption",
-    )  # fmt: skip
+    )
     report_options(command)
     command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
     html_option(command)

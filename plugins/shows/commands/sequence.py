@@ -21,9 +21,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     command.add_argument("clips", metavar="CLIPS", help='TOML file: [clips] with NAME = "SHOT.usda" for each')
     command.add_argument(
-        "-o", "--output", metavar="DIR", required=True,
+        "-o",
+        "--output",
+        metavar="DIR",
+        required=True,
         help="folder for layers, manifests and the table of what each transition costs",
-    )  # fmt: skip
+    )
     report_options(command)
     command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
     command.add_argument("--on", metavar="WHERE", default="local", help="as of `calmotion batch`")

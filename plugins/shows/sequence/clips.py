@@ -135,9 +135,12 @@ def _clip(name: str, shot: Shot) -> Clip:
     end = float(animation.frame_times[-1])
     if shot.character.retarget.cyclic:
         raise ShotError(
-            "a cyclic shot has no end that another clip could follow", path=path, attribute="calm:retarget:cyclic",
-            found=True, remedy="Set it to false in a layer over the shot",
-        )  # fmt: skip
+            "a cyclic shot has no end that another clip could follow",
+            path=path,
+            attribute="calm:retarget:cyclic",
+            found=True,
+            remedy="Set it to false in a layer over the shot",
+        )
     curves = [held_curve(track, end) for track in animation.tracks]
     times = np.linspace(0.0, end, 8 * len(animation.frame_times))
     values, rates, accelerations = (np.stack([curve(times, k) for curve in curves], axis=1) for k in range(3))

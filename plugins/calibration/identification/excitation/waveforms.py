@@ -175,10 +175,13 @@ class Family:
         rate = np.gradient(offsets, self.times)
         bend = np.gradient(rate, self.times)
         with np.errstate(divide="ignore", invalid="ignore"):
-            shares = np.array([
-                np.nanmax([offsets.max() / bounds.upper[motor], offsets.min() / bounds.lower[motor], 0.0]),
-                np.abs(rate).max() / bounds.velocity[motor], np.abs(bend).max() / bounds.acceleration[motor],
-            ])  # fmt: skip
+            shares = np.array(
+                [
+                    np.nanmax([offsets.max() / bounds.upper[motor], offsets.min() / bounds.lower[motor], 0.0]),
+                    np.abs(rate).max() / bounds.velocity[motor],
+                    np.abs(bend).max() / bounds.acceleration[motor],
+                ]
+            )
         return float(shares.max()), shares
 
 
