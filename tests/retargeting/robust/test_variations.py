@@ -69,7 +69,13 @@ VARIATIONS = {
 }
 
 
-@pytest.mark.parametrize("name", VARIATIONS)
+SLOW = ("two robots", "an even number of robots", "a motor alone", "a target alone", "targets of other weights",
+        "very much allowed")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long) if name in SLOW else name for name in VARIATIONS]
+)
 def test_the_error_on_the_model_keeps_its_bound_and_that_on_others_does_not_grow(arm, animation, bodies, name):
     of, robust = VARIATIONS[name]
     shot = compile_shot(of(arm), animation, bodies)
