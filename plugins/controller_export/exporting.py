@@ -287,10 +287,6 @@ class _Exporter:
         )  # fmt: skip
 
     def _loss(self, commands: Commands, step: float, delay: float = 0.0) -> Loss:
-        if self._hooks.cancel and self._hooks.cancel():
-            from calmotion.workflow import Cancelled
-
-            raise Cancelled(f"{self._outcome.shot.path}: cancelled")
         return self._playback.loss(commands, step, delay)
 
     def _converged(self, commands: Commands, rate: float) -> tuple[float, Loss]:
@@ -324,5 +320,4 @@ class _Exporter:
             return lowest_rate(at, self._allowed, known, self._highest)
 
     def _tell(self, fraction: float, message: str) -> None:
-        if self._hooks.progress:
-            self._hooks.progress(Progress("Play the commands", fraction, message))
+        self._hooks.tell("Play the commands", fraction, message)

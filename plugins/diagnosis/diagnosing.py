@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from calmotion.host import open_host
@@ -109,15 +110,6 @@ def diagnose(
         source = Source("", "", RunSettings(), measured=measured_prims(read))
         compiled = compiled_in(compiled_run(shot, source, chosen, hooks).run.get)
     situation = situation_of(compiled, read, sent)
-
-    def tell(fraction: float) -> None:
-        if cancel is not None and cancel():
-            from calmotion.workflow import Cancelled
-
-            raise Cancelled("the diagnosis was cancelled")
-        if progress is not None:
-            progress(Progress("Compare explanations", fraction, ""))
-
-    made = DiagnosedShot(diagnosis_of(situation, tell), (), 0.0)
+    made = DiagnosedShot(diagnosis_of(situation, partial(hooks.tell, "Compare explanations")), (), 0.0)
     drawn = () if figures is None else made.draw(figures)
     return DiagnosedShot(made.diagnosis, drawn, time.perf_counter() - begin)

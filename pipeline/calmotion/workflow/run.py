@@ -59,6 +59,17 @@ class Hooks:
     on_operator: Callable[[OperatorResult], None] | None = None
     cancel: Callable[[], bool] | None = None
 
+    def tell(self, stage: str, fraction: float, message: str = "") -> None:
+        """Say how far a stage that is not of the run has come.
+
+        Raises:
+            Cancelled: The caller wants it to stop.
+        """
+        if self.cancel is not None and self.cancel():
+            raise Cancelled(f"{stage}: cancelled")
+        if self.progress is not None:
+            self.progress(Progress(stage, fraction, message))
+
 
 class _Stop(KeyboardInterrupt):
     """The caller's `cancel`, in the form in which the optimiser keeps its best curves."""

@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from calmotion.host import SettingError, Settings, merge, nearest, quantity_of
@@ -148,17 +149,8 @@ def calibrate(
         outcomes.append(compiled_with_sensors(opened[-1], read, options, target, operators, chosen, hooks))
         taken.append((compiled_in(outcomes[-1].run.get), read))
     outcome = outcomes[0]
-
-    def tell(fraction: float, message: str) -> None:
-        if cancel is not None and cancel():
-            from calmotion.workflow import Cancelled
-
-            raise Cancelled(f"{opened[0].path}: cancelled")
-        if progress is not None:
-            progress(Progress("Estimate the parameters", fraction, message))
-
     given = CalibrationSettings(tuple(parameters), dict(priors or {}), validate, by_motor_type=by_motor_type)
-    calibration = calibrate_shots(taken, given, options, tell)
+    calibration = calibrate_shots(taken, given, options, partial(hooks.tell, "Estimate the parameters"))
     written = None if target is None else _written(outcome, calibration, target)
     drawn = () if figures is None else _drawn(outcome, calibration, os.fspath(figures), chosen)
     return CalibratedShot(calibration, written, drawn, time.perf_counter() - begin, outcome)

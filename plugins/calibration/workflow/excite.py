@@ -7,6 +7,7 @@ import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from calmotion.errors import ShotError
@@ -125,15 +126,6 @@ def excite(
     options = RunSettings(step=quantity_of(step, "s", "step"))
     target = None if layer is None else os.fspath(layer)
     outcome = compiled_with_sensors(with_sensors(shot), named, options, target, operators, chosen, hooks)
-
-    def tell(fraction: float, message: str) -> None:
-        if cancel is not None and cancel():
-            from calmotion.workflow import Cancelled
-
-            raise Cancelled("cancelled")
-        if progress is not None:
-            progress(Progress("Find a test motion", fraction, message))
-
     character = outcome.require(Character)
     _refuse_other_drives(character)
     length, largest = quantity_of(duration, "s", "duration"), quantity_of(amplitude, "rad", "amplitude")
@@ -144,7 +136,7 @@ def excite(
             _placed(wanted, character), tuple(parameters), dict(priors or {}), length, largest, tries=tries,
             by_motor_type=by_motor_type,
         ),
-        options, tell,
+        options, partial(hooks.tell, "Find a test motion"),
     )  # fmt: skip
     if target is not None:
         from calmotion.usd import write_performance
