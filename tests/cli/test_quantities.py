@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from calmotion.cli.quantities import about, angle, counted, frequency, length, measured, quantity_in
+from calmotion.cli.tables import about, angle, counted, frequency, length, measured, quantity_in
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.model import WORLD
-from calmotion.multibody.analysis.dead_centres import dead_centres
+from calmotion.multibody.analysis.joint_faults import dead_centres
 from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace

@@ -129,17 +129,23 @@ def _material(file: str, name: str, table: Any) -> Material:
     wrong = next((key for key in table if key not in (*_NUMBERS, *texts, "aliases")), None)
     if wrong is not None:
         raise ShotError(
-            "there is no such property of a material", path=file, attribute=f"{name}.{wrong}", found=wrong,
+            "there is no such property of a material",
+            path=file,
+            attribute=f"{name}.{wrong}",
+            found=wrong,
             remedy=f"{nearest(wrong, _NUMBERS)}{_REMEDY}",
-        )  # fmt: skip
+        )
     numbers = {}
     for key, (low, high) in _NUMBERS.items():
         value = table.get(key)
         if not isinstance(value, (int, float)) or isinstance(value, bool) or not low < value < high:
             raise ShotError(
-                f"must be a number between {low:g} and {high:g}", path=file, attribute=f"{name}.{key}", found=value,
+                f"must be a number between {low:g} and {high:g}",
+                path=file,
+                attribute=f"{name}.{key}",
+                found=value,
                 remedy=_REMEDY,
-            )  # fmt: skip
+            )
         numbers[key] = float(value)
     for key in texts:
         if not isinstance(table.get(key, ""), str):

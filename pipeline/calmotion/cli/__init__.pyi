@@ -23,11 +23,11 @@ from calmotion.cli.output import print_error as print_error
 from calmotion.cli.pages import page_of_report as page_of_report
 from calmotion.cli.parser import entry as entry
 from calmotion.cli.progress import ProgressDisplay as ProgressDisplay
-from calmotion.cli.quantities import angle as angle
-from calmotion.cli.quantities import counted as counted
-from calmotion.cli.quantities import length as length
-from calmotion.cli.quantities import measured as measured
-from calmotion.cli.quantities import quantity_in as quantity_in
+from calmotion.cli.tables import angle as angle
 from calmotion.cli.tables import console_on as console_on
+from calmotion.cli.tables import counted as counted
+from calmotion.cli.tables import length as length
+from calmotion.cli.tables import measured as measured
 from calmotion.cli.tables import print_table as print_table
+from calmotion.cli.tables import quantity_in as quantity_in
 from calmotion.cli.tables import say as say

@@ -81,9 +81,12 @@ def html_option(command: argparse.ArgumentParser | argparse._ArgumentGroup) -> N
 def plugin_option(command: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     """Add `--plugins`."""
     command.add_argument(
-        "--plugins", metavar="DIR", action="append", default=[],
+        "--plugins",
+        metavar="DIR",
+        action="append",
+        default=[],
         help="folder with more plugins; may be repeated",
-    )  # fmt: skip
+    )
 
 
 def run_options(command: argparse.ArgumentParser) -> None:

@@ -9,8 +9,7 @@ from typing import Any
 
 from rich.console import Console
 
-from calmotion.cli.quantities import counted
-from calmotion.cli.tables import with_texts
+from calmotion.cli.tables import counted, with_texts
 from calmotion.host import Host
 from calmotion.model.outputs import PageContent, Section, TextTable
 from calmotion.support.naming import as_written

@@ -118,15 +118,21 @@ def _commands(tables: Any, file: Path) -> tuple[CommandEntry, ...]:
         for key, value in table.items():
             if not (isinstance(value, str) and value.strip() and "\n" not in value):
                 raise PluginError(
-                    "must be a line of text", path=str(file), attribute=f"{place}.{key}", found=repr(value),
+                    "must be a line of text",
+                    path=str(file),
+                    attribute=f"{place}.{key}",
+                    found=repr(value),
                     remedy=example,
-                )  # fmt: skip
+                )
         inside = file.parent.joinpath(*table["module"].split("."))
         if not (inside.with_name(f"{inside.name}.py").is_file() or (inside / "__init__.py").is_file()):
             raise PluginError(
-                "the plugin has no such module", path=str(file), attribute=f"{place}.module", found=table["module"],
+                "the plugin has no such module",
+                path=str(file),
+                attribute=f"{place}.module",
+                found=table["module"],
                 remedy=f"Name a module in the folder {file.parent.name}, such as command for command.py.",
-            )  # fmt: skip
+            )
     return tuple(CommandEntry(name, **table) for name, table in tables.items())
 
 

@@ -104,8 +104,11 @@ def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArr
     if tets.min() < 0 or tets.max() >= len(points):
         raise ShotError(
             "a tetrahedron names a point that does not exist",
-            path=path, attribute="tetVertexIndices", found=int(tets.max()), remedy=remedy,
-        )  # fmt: skip
+            path=path,
+            attribute="tetVertexIndices",
+            found=int(tets.max()),
+            remedy=remedy,
+        )
     if not np.isfinite(points[tets]).all():
         raise ShotError("a point is not finite", path=path, attribute="points", remedy=remedy)
     volumes, flat = tet_volumes(points, tets), flat_tets(points, tets)

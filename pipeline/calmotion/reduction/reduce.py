@@ -272,6 +272,9 @@ def _check_material(material: ElasticMaterial) -> None:
     ):
         if not low < value < high:
             raise ShotError(
-                f"{name} of an elastic material {meaning}", path=material.path, attribute=name, found=value,
+                f"{name} of an elastic material {meaning}",
+                path=material.path,
+                attribute=name,
+                found=value,
                 remedy="Author a physical value in stage units",
-            )  # fmt: skip
+            )

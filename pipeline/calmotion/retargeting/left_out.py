@@ -120,9 +120,12 @@ PRUNED = 0.2  # share of it that the removed offsets may cost together
 
 
 def search_rows(
-    problem: RetargetProblem, character: Character, curves: Sequence[MotorCurve], options: RunSettings,
+    problem: RetargetProblem,
+    character: Character,
+    curves: Sequence[MotorCurve],
+    options: RunSettings,
     idle_gain_m: float | None,
-) -> list[Simplification]:  # fmt: skip
+) -> list[Simplification]:
     """The rows of a search that ended.
 
     Args:

@@ -132,9 +132,12 @@ def _first_step(shot: CompiledShot, options: RunSettings, shake: Callable[[StepR
     """The step of the first search [s], by how far a run of the input is from what is intended [m]."""
     enough = allowed_step_error(shot.character, options, omitted_error(shot.bodies))
     step, _ = largest_step(
-        partial(simulate_at, shot, options), FIRST, LAST, lambda run: max(enough, FIRST_STEP * shake(run)),
+        partial(simulate_at, shot, options),
+        FIRST,
+        LAST,
+        lambda run: max(enough, FIRST_STEP * shake(run)),
         refused_gap(shot.character, options),
-    )  # fmt: skip
+    )
     return step
 
 

@@ -148,9 +148,12 @@ def _meshed_before(body: Body, attachments: Sequence[AttachmentFrame], root: int
 
 
 def bodies_in_parallel(
-    work: Callable[[int], Found], bodies: Sequence[int], character: Character,
-    progress: Callable[[float, str], None] | None = None, what: str = "",
-) -> list[Found]:  # fmt: skip
+    work: Callable[[int], Found],
+    bodies: Sequence[int],
+    character: Character,
+    progress: Callable[[float, str], None] | None = None,
+    what: str = "",
+) -> list[Found]:
     """The results of dense and sparse linear algebra on several bodies, in their order; one thread of BLAS for each.
 
     Args:

@@ -10,9 +10,8 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import LimitUse, Motion, Simplification, Simulation
 from calmotion.model.limits.bounds import Excess
-from calmotion.multibody.analysis.dead_centres import dead_centres
+from calmotion.multibody.analysis.joint_faults import dead_centres, unheld_joints
 from calmotion.multibody.analysis.reactions import reactions
-from calmotion.multibody.analysis.unheld_joints import unheld_joints
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
 from calmotion.simulation.forward import ForwardRun

@@ -139,6 +139,9 @@ def refuse_lfs_pointers(files: Iterable[str | os.PathLike[str]], *, path: str = 
     if pointers:
         more = f", and {len(pointers) - _SHOWN} more" if len(pointers) > _SHOWN else ""
         raise ShotError(
-            f"this is {_KINDS['lfs'][0]}", path=path or pointers[0], attribute=attribute,
-            found=", ".join(pointers[:_SHOWN]) + more, remedy=_PULL,
-        )  # fmt: skip
+            f"this is {_KINDS['lfs'][0]}",
+            path=path or pointers[0],
+            attribute=attribute,
+            found=", ".join(pointers[:_SHOWN]) + more,
+            remedy=_PULL,
+        )

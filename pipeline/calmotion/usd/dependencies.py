@@ -90,9 +90,12 @@ def refuse_place(path: str, named_by: str, attribute: str = "") -> None:
     reason = forbidden_place(path)
     if reason is not None:
         raise ShotError(
-            reason, path=named_by, attribute=attribute, found=f"@{path}@",
+            reason,
+            path=named_by,
+            attribute=attribute,
+            found=f"@{path}@",
             remedy="Copy the file beside the shot, and name it by a relative path",
-        )  # fmt: skip
+        )
 
 
 def refuse_special(path: str, named_by: str = "") -> None:

@@ -109,12 +109,15 @@ GEARS = (
     # PhysX: value + gearing * leader + offset = 0
     *(
         GearSpelling(
-            "PhysX", f"physxMimicJoint:{axis}:referenceJoint", f"physxMimicJoint:{axis}:offset",
-            f"physxMimicJoint:{axis}:gearing", sign=-1.0,
+            "PhysX",
+            f"physxMimicJoint:{axis}:referenceJoint",
+            f"physxMimicJoint:{axis}:offset",
+            f"physxMimicJoint:{axis}:gearing",
+            sign=-1.0,
         )
         for axis in MIMIC_AXES
     ),
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)

@@ -81,10 +81,13 @@ def _of_shot(shot: str, plugins: Sequence[str]) -> list[ShotError]:
         if item.level == ERROR:
             problems.append(
                 ShotError(
-                    item.problem, path=item.path, attribute=item.attribute, found=item.found or None,
+                    item.problem,
+                    path=item.path,
+                    attribute=item.attribute,
+                    found=item.found or None,
                     remedy=item.remedy or f"Correct what {item.rule} found",
                 )
-            )  # fmt: skip
+            )
     return problems
 
 

@@ -19,9 +19,12 @@ _NAMES = (("-o", "layer"), ("--csv", "csv"), ("--rrd", "rrd"), ("--figures", "fi
 _FOLDERS = ("--figures", "--modes")
 _ROOT = "-o, its root layer"
 _KINDS = (
-    (WrittenLayer, "-o", "layer"), (CsvFile, "--csv", "csv"), (Recording, "--rrd", "rrd"),
-    (Figures, "--figures", "figures"), (Video, "--video", "video"),
-)  # fmt: skip
+    (WrittenLayer, "-o", "layer"),
+    (CsvFile, "--csv", "csv"),
+    (Recording, "--rrd", "rrd"),
+    (Figures, "--figures", "figures"),
+    (Video, "--video", "video"),
+)
 
 
 def files_of(outputs: OutputPaths) -> dict[str, str]:

@@ -95,9 +95,12 @@ def first_run(tell: Callable[[str], None]) -> Iterator[None]:
         return
     _share()
     helper = subprocess.Popen(
-        [sys.executable, "-m", "calmotion", "warmup", "--quiet"], env=os.environ | {HELPER: str(os.getpid())},
-        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+        [sys.executable, "-m", "calmotion", "warmup", "--quiet"],
+        env=os.environ | {HELPER: str(os.getpid())},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     try:
         yield
     finally:

@@ -1,7 +1,7 @@
 """Dead centres out of the margins of closed loops."""
 
 import numpy as np
-from calmotion.multibody.analysis.dead_centres import dead_centres
+from calmotion.multibody.analysis.joint_faults import dead_centres
 
 
 def test_sharp_minima_far_below_what_is_usual_are_named():

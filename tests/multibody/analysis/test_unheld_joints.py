@@ -6,7 +6,7 @@ import calmotion as cm
 import numpy as np
 import pytest
 from arms import chain, compiled
-from calmotion.multibody.analysis.unheld_joints import unheld_joints
+from calmotion.multibody.analysis.joint_faults import unheld_joints
 from neutral_hinges import push_rod, turning
 from pxr import UsdPhysics
 from small_shots import ELBOW, FORE, TARGET_POSITION, write_arm

@@ -1,7 +1,7 @@
 """The start of a step: Taylor's formula and what it missed."""
 
 import numpy as np
-from calmotion.multibody.integrators.predictor import MISSED, predict, remember_missed
+from calmotion.multibody.integrators.coefficients import MISSED, predict, remember_missed
 from calmotion.multibody.model.system import allocate_state
 from particles import particle_system
 

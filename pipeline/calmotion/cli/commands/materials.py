@@ -15,9 +15,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     command.add_argument("name", nargs="?", metavar="NAME", help="show only this material, with its source")
     command.add_argument(
-        "--materials", metavar="FILE", action="append", default=[],
+        "--materials",
+        metavar="FILE",
+        action="append",
+        default=[],
         help="TOML file with more materials; may be repeated",
-    )  # fmt: skip
+    )
     json_option(command)
     command.add_argument("--toml", action="store_true", help="print TOML, to be changed and used with --materials")
 

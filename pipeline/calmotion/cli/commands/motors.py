@@ -20,9 +20,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     command.add_argument("name", nargs="?", metavar="NAME", help="show only this motor, each value with its source")
     command.add_argument(
-        "--motors", metavar="FILE", action="append", default=[],
+        "--motors",
+        metavar="FILE",
+        action="append",
+        default=[],
         help="TOML file with more motors, to check it; shots use those of motors.toml in the configuration folder",
-    )  # fmt: skip
+    )
     json_option(command)
     command.add_argument("--toml", action="store_true", help="print TOML, to be changed and saved as motors.toml")
 

@@ -106,6 +106,9 @@ def _tell(result: SimulationResult, report: dict[str, Any], args: argparse.Names
         error = f"largest error {largest} of {path} at {moment:.2f} s"
         print(
             f"{time.strftime('%H:%M:%S')} {did}: {error}, {verdict}{''.join(steps)}",
-            *(f"  {problem.error}" for problem in result.problems), sep="\n", file=output.stream, flush=True,
-        )  # fmt: skip
+            *(f"  {problem.error}" for problem in result.problems),
+            sep="\n",
+            file=output.stream,
+            flush=True,
+        )
     return status_of(result, report, args)

@@ -7,8 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
-from calmotion.cli.quantities import length
-from calmotion.cli.tables import print_table, say
+from calmotion.cli.tables import length, print_table, say
 
 
 def print_support(console: Console, reactions: Sequence[dict[str, Any]]) -> None:

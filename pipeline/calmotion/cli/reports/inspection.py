@@ -8,11 +8,10 @@ from collections.abc import Iterable
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.quantities import angle, counted, frequency, length
 from calmotion.cli.reports.limits import print_left_out, print_limits, print_tempo
 from calmotion.cli.reports.run import print_notes
 from calmotion.cli.reports.verdict import NOTHING_SHAKES
-from calmotion.cli.tables import print_table, say
+from calmotion.cli.tables import angle, counted, frequency, length, print_table, say
 from calmotion.model.motor import DRIVE, ON_ERROR, ON_JOINT, PRESCRIBED, SERVO
 from calmotion.model.outputs import ERROR, WARNING
 from calmotion.model.result import EARLIER_MESH, SECTIONS

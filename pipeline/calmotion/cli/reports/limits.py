@@ -8,8 +8,7 @@ from typing import Any
 
 from rich.console import Console
 
-from calmotion.cli.quantities import about, counted, length
-from calmotion.cli.tables import print_table, say
+from calmotion.cli.tables import about, counted, length, print_table, say
 from calmotion.model.limits.kinds import kinds_of_limits
 
 

@@ -9,7 +9,6 @@ from typing import Any
 
 from rich.console import Console
 
-from calmotion.cli.quantities import about, angle, length
 from calmotion.cli.reports.feet import print_contacts, print_support
 from calmotion.cli.reports.limits import print_left_out, print_limits, print_retiming
 from calmotion.cli.reports.verdict import (
@@ -20,7 +19,7 @@ from calmotion.cli.reports.verdict import (
     print_verdict,
     shakes,
 )
-from calmotion.cli.tables import SHORTENED, print_table, say, with_texts
+from calmotion.cli.tables import SHORTENED, about, angle, length, print_table, say, with_texts
 from calmotion.model.result import GOAL_REACHED
 from calmotion.support.naming import distinct_names
 

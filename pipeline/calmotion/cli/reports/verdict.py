@@ -7,9 +7,8 @@ from typing import Any
 
 from rich.console import Console
 
-from calmotion.cli.quantities import about, counted, length
 from calmotion.cli.reports.limits import print_reason
-from calmotion.cli.tables import say
+from calmotion.cli.tables import about, counted, length, say
 from calmotion.model.tolerance import CHOICES, MEASURED, MESH, REDUCTION, STEP, SUBSPACE
 from calmotion.support.naming import distinct_names
 

@@ -31,11 +31,14 @@ def contact_notes(character: Character, meshes: FEMeshes) -> Iterator[str]:
         joints = [joint for joint in character.joints if mesh.body in (joint.body0, joint.body1)]
         frames = [
             AttachmentFrame(
-                joint.path, joint.frame0 if joint.body0 == mesh.body else joint.frame1, "interface",
+                joint.path,
+                joint.frame0 if joint.body0 == mesh.body else joint.frame1,
+                "interface",
                 surfaces.get(joint.path),
             )
-            for joint in joints if not joint.redundant
-        ]  # fmt: skip
+            for joint in joints
+            if not joint.redundant
+        ]
         for at in frames:
             if at.surface is not None:
                 continue

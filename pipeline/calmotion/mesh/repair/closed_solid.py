@@ -144,15 +144,21 @@ def _checked(surface: SurfaceMesh, repairs: list[str]) -> SurfaceMesh:
     if triangles.min() < 0 or triangles.max() >= len(points):
         worst = int(triangles.min()) if triangles.min() < 0 else int(triangles.max())
         raise ShotError(
-            f"a triangle refers to a point that does not exist ({len(points)} points)", path=surface.path,
-            attribute="faceVertexIndices", found=worst, remedy="Correct the indices",
-        )  # fmt: skip
+            f"a triangle refers to a point that does not exist ({len(points)} points)",
+            path=surface.path,
+            attribute="faceVertexIndices",
+            found=worst,
+            remedy="Correct the indices",
+        )
     bad = ~np.isfinite(points).all(axis=1)
     if bad[triangles].any():
         raise ShotError(
-            "a point is not finite", path=surface.path, attribute="points",
-            found=f"point {int(triangles[bad[triangles]].min())}", remedy="Correct it, or remove its faces",
-        )  # fmt: skip
+            "a point is not finite",
+            path=surface.path,
+            attribute="points",
+            found=f"point {int(triangles[bad[triangles]].min())}",
+            remedy="Correct it, or remove its faces",
+        )
     if bad.any():
         repairs.append(f"{surface.path}: ignored {int(bad.sum())} unused points that are not finite")
         points = np.where(bad[:, None], points[triangles[0, 0]], points)

@@ -66,9 +66,12 @@ def hollowed(solid: Solid, thickness: float, section: str, path: str) -> Solid:
         f"{100.0 * volume / solid.volume:.3g}% of the volume that its surface encloses"
     )
     return replace(
-        solid, points=whole.points * scale + center, triangles=whole.triangles.astype(np.int32), volume=volume,
+        solid,
+        points=whole.points * scale + center,
+        triangles=whole.triangles.astype(np.int32),
+        volume=volume,
         repairs=(*solid.repairs, note),
-    )  # fmt: skip
+    )
 
 
 def _offset(outer: Part, wall: float, end: Array | None) -> Part | None:

@@ -16,8 +16,11 @@ from calmotion.model.limits.base import CurveLimit, MotorLimit
 @cache
 def kinds_of_limits() -> dict[str, MotorLimit]:
     """Those of the modules of this folder, by name: of curves by their order, then the others."""
-    modules = [import_module(f"{limits.__name__}.{module.name}") for module in iter_modules(limits.__path__)
-               if f"{limits.__name__}.{module.name}" != __name__]  # fmt: skip
+    modules = [
+        import_module(f"{limits.__name__}.{module.name}")
+        for module in iter_modules(limits.__path__)
+        if f"{limits.__name__}.{module.name}" != __name__
+    ]
     kinds = {kind for module in modules for kind in vars(module).values() if isinstance(kind, type)}
     found = [kind() for kind in kinds if issubclass(kind, MotorLimit) and not isabstract(kind)]
     found.sort(key=lambda kind: (kind.order if isinstance(kind, CurveLimit) else 99, kind.name))

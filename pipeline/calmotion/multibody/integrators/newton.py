@@ -15,7 +15,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.multibody.integrators import bdf2, newmark
-from calmotion.multibody.integrators.predictor import predict, remember_missed
+from calmotion.multibody.integrators.coefficients import predict, remember_missed
 from calmotion.multibody.integrators.workspace import Scratch, Workspace
 from calmotion.multibody.kernels.assembly import assemble
 from calmotion.multibody.kernels.sliders import LENGTH, slides_freely

@@ -11,8 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from calmotion.arrays import Array
 from calmotion.multibody.integrators import newton
-from calmotion.multibody.integrators.coefficients import IMPLICIT
-from calmotion.multibody.integrators.predictor import MISSED
+from calmotion.multibody.integrators.coefficients import IMPLICIT, MISSED
 from calmotion.multibody.integrators.trajectory import Inputs, Record
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.so3 import turns_between

@@ -10,8 +10,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.multibody.failure import NOWHERE, Reason, SimulationFailure
 from calmotion.multibody.integrators import bdf2, newton
-from calmotion.multibody.integrators.coefficients import IMPLICIT
-from calmotion.multibody.integrators.predictor import MISSED, remember_missed
+from calmotion.multibody.integrators.coefficients import IMPLICIT, MISSED, remember_missed
 from calmotion.multibody.integrators.refinement import refined_step
 from calmotion.multibody.integrators.trajectory import (
     Inputs,

@@ -177,9 +177,12 @@ def adjoint(
 
 
 def sweep_adjoint(
-    lin: Linearization, Xbar: Array, effort_gradient: Array | None, memory: SweepMemory,
+    lin: Linearization,
+    Xbar: Array,
+    effort_gradient: Array | None,
+    memory: SweepMemory,
     load_gradient: Array | None = None,
-) -> tuple[Array, Array]:  # fmt: skip
+) -> tuple[Array, Array]:
     """The transpose of `tangent.sweep_tangent`; derivatives by angle and rate of each joint's motor, shape [T, J] each.
 
     Args:

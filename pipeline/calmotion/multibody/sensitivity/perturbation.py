@@ -109,9 +109,12 @@ def end_difference(system: System, states: State) -> Perturbation:
     rotation = np.zeros((len(system.parent), 3))
     turns_between(states.q[1], states.q[-1], rotation)
     return Perturbation(
-        states.c[-2:] - states.c[:2], rotation, states.u[-2:] - states.u[:2], states.V[-2:] - states.V[:2],
+        states.c[-2:] - states.c[:2],
+        rotation,
+        states.u[-2:] - states.u[:2],
+        states.V[-2:] - states.V[:2],
         states.turn[-1] - states.turn[1],
-    )  # fmt: skip
+    )
 
 
 def perturbed(system: System, before2: State, before: State, change: Perturbation) -> tuple[State, State]:

@@ -92,9 +92,12 @@ class LinearProblem:
         return self.vjp(curved, changes) + self.regulariser.penalty_product(direction)
 
     def precondition(
-        self, fixed: BoolArray, sharpened: Sharpened | None = None, limits: LimitTerms | None = None,
+        self,
+        fixed: BoolArray,
+        sharpened: Sharpened | None = None,
+        limits: LimitTerms | None = None,
         values: dict[str, Array] | None = None,
-    ) -> Callable[[Array], Array]:  # fmt: skip
+    ) -> Callable[[Array], Array]:
         """The rigid robot's Gauss-Newton matrix, or a better one, inverted over the entries that are not fixed.
 
         Args:

@@ -110,9 +110,12 @@ class RobotRun:
         at.__dict__["parts"] = self.parts
         self._linear.clear()
         self._linear[first] = LinearRobot(
-            at, linear, errors, tuple(residual.slopes(run) for residual in robot.residuals),
+            at,
+            linear,
+            errors,
+            tuple(residual.slopes(run) for residual in robot.residuals),
             {name: quantity.slopes(run) for name, quantity in robot.limited.items()},
-        )  # fmt: skip
+        )
         return self._linear[first]
 
     def continuous_adjoint(self) -> tuple[Array, Array]:

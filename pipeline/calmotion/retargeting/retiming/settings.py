@@ -44,9 +44,12 @@ def refuse_tempo(character: Character, animation: Animation, settings: TempoSett
     path, end = character.path, float(animation.frame_times[-1])
     if character.retarget.cyclic:
         raise ShotError(
-            "the tempo of a shot that loops cannot change", path=path, attribute="calm:retarget:cyclic", found=True,
+            "the tempo of a shot that loops cannot change",
+            path=path,
+            attribute="calm:retarget:cyclic",
+            found=True,
             remedy="Set it to false and author some loops one after the other, or leave --retime out.",
-        )  # fmt: skip
+        )
     if animation.tempo is not None:
         raise ShotError(
             "the shot has results at another tempo already",
@@ -60,9 +63,12 @@ def refuse_tempo(character: Character, animation: Animation, settings: TempoSett
     ):
         if not fits:
             raise ShotError(
-                "this stretch is out of range", path=path, attribute=f"calm:retime:{name}", found=value,
+                "this stretch is out of range",
+                path=path,
+                attribute=f"calm:retime:{name}",
+                found=value,
                 remedy="Use 1 or more for slowest, and more than 0 and at most 1 for fastest.",
-            )  # fmt: skip
+            )
     outside = [time for time in settings.pinned if not 0.0 <= time <= end]
     if outside:
         raise ShotError(

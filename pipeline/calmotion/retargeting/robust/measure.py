@@ -31,9 +31,12 @@ def silent(fraction: float, message: str) -> None:
 
 
 def errors_on(
-    shot: CompiledShot, options: RunSettings, curves: Curves, scenarios: Sequence[Scenario],
+    shot: CompiledShot,
+    options: RunSettings,
+    curves: Curves,
+    scenarios: Sequence[Scenario],
     progress: Progress = silent,
-) -> dict[str, Array]:  # fmt: skip
+) -> dict[str, Array]:
     """Largest errors of the targets on each robot.
 
     Args:

@@ -9,7 +9,7 @@ from calmotion.errors import IntegrationError, ShotError
 from calmotion.model import Character
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import tolerance_of
-from calmotion.multibody.analysis.joint_gaps import OpenJoint, first_open_joint
+from calmotion.multibody.analysis.joint_faults import OpenJoint, first_open_joint
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model

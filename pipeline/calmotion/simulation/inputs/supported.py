@@ -33,15 +33,21 @@ def refuse_unsupported(character: Character, animation: Animation, options: RunS
     for name, value, least in ((own, step, FINEST), ("--pre-roll", options.pre_roll, 0.0)):
         if value is not None and not least <= value < np.inf:
             raise ShotError(
-                "this time is out of range", path=character.path, attribute=name, found=f"{value:g} s",
+                "this time is out of range",
+                path=character.path,
+                attribute=name,
+                found=f"{value:g} s",
                 remedy=f"Use {least:g} s or more, or leave it out.",
-            )  # fmt: skip
+            )
     longest = max(LONGEST_PRE_ROLL, float(animation.frame_times[-1]))
     if options.pre_roll is not None and options.pre_roll > longest:
         raise ShotError(
-            "the pre-roll is too long", path=character.path, attribute="--pre-roll",
-            found=f"{options.pre_roll:g} s", remedy=f"Use {longest:g} s or less, or leave it out.",
-        )  # fmt: skip
+            "the pre-roll is too long",
+            path=character.path,
+            attribute="--pre-roll",
+            found=f"{options.pre_roll:g} s",
+            remedy=f"Use {longest:g} s or less, or leave it out.",
+        )
     if character.retarget.cyclic:
         refuse_open_loops(character, animation)
         if options.pre_roll:

@@ -110,9 +110,12 @@ def _between(times: Array, few: Array, efforts: MotorEfforts | None) -> MotorEff
 
 
 def _fastest(
-    times: Array, curve: CubicSpline, limits: TempoLimits, efforts: MotorEfforts | None,
+    times: Array,
+    curve: CubicSpline,
+    limits: TempoLimits,
+    efforts: MotorEfforts | None,
     stretches: tuple[float, float],
-) -> Array:  # fmt: skip
+) -> Array:
     """The largest squares of the tempo at T instants, between the inverse squares of two stretches."""
     most, least = stretches[0] ** -2, stretches[1] ** -2
     length, middle = np.diff(times)[:, None], 0.5 * (times[:-1] + times[1:])

@@ -169,9 +169,12 @@ def shot_clock(stage: Usd.Stage, given: MotorTracks | None) -> Clock:
 
 
 def motor_tracks(
-    reading: Reading, drives: Sequence[Drive], clock: Clock, given: MotorTracks | None = None,
+    reading: Reading,
+    drives: Sequence[Drive],
+    clock: Clock,
+    given: MotorTracks | None = None,
     standing: Sequence[HingeStack] | None = None,
-) -> tuple[Track, ...]:  # fmt: skip
+) -> tuple[Track, ...]:
     """The tracks of the motors, each read from its source.
 
     Args:

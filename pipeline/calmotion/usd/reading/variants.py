@@ -102,12 +102,15 @@ def naming_variants(stage: Usd.Stage) -> Iterator[None]:
         raise_all(
             [
                 ShotError(
-                    one.problem, path=one.path, attribute=one.attribute, found=one.found,
+                    one.problem,
+                    path=one.path,
+                    attribute=one.attribute,
+                    found=one.found,
                     remedy=f"{chosen}; or {one.remedy[:1].lower()}{one.remedy[1:]}",
                 )
                 for one in each(error)
             ]
-        )  # fmt: skip
+        )
 
 
 def _others(stage: Usd.Stage) -> list[tuple[Sdf.Path, str, str]]:

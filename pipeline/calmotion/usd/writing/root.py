@@ -132,9 +132,12 @@ RETARGET = "CalmRetargetAPI"
 
 
 def write_performance(
-    output: str, provenance: Provenance, character: Character, motion: tuple[Array, Array] | None,
+    output: str,
+    provenance: Provenance,
+    character: Character,
+    motion: tuple[Array, Array] | None,
     settings: Mapping[str, str],
-) -> str:  # fmt: skip
+) -> str:
     """Write a layer that opens a shot with another motion and other settings of its character.
 
     Args:

@@ -112,10 +112,13 @@ def print_of(reading: Reading, prim: Usd.Prim, wall: float, section: str) -> tup
     schemas.require(perimeters == -1 or perimeters >= 1, prim, _PERIMETERS, perimeters, problem)
     if infill == -1.0:
         schemas.require(
-            perimeters == -1, prim, _PERIMETERS, perimeters,
+            perimeters == -1,
+            prim,
+            _PERIMETERS,
+            perimeters,
             "says how thick the skin of a printed part is, but the part has no infill",
             f"Author {_INFILL} as well (1 for a part that is printed solid), or remove it",
-        )  # fmt: skip
+        )
         return wall, None
     problem = "must be a share between 0 and 1, or -1 for a part without infill"
     schemas.require(0.0 <= infill <= 1.0, prim, _INFILL, infill, problem, "Author 0.2 for 20%, or remove the attribute")
@@ -247,8 +250,11 @@ def _mesh_scale(reading: Reading, prim: Usd.Prim, pose: Pose) -> float:
     """Metres per unit of an external mesh, which is in the body's own axes."""
     alike = bool(np.allclose(pose.scale, pose.scale[0], rtol=1e-5) and pose.scale[0] >= 0.0)
     schemas.require(
-        alike, prim, "calm:flexible:meshFile", pose.scale.tolist(),
+        alike,
+        prim,
+        "calm:flexible:meshFile",
+        pose.scale.tolist(),
         "an external mesh needs a body without a mirrored scale or one that differs by axis",
         "Freeze the scale of the body, or put the mesh into the shot",
-    )  # fmt: skip
+    )
     return float(reading.units.length(pose.scale[0]))

@@ -78,9 +78,12 @@ def coupled_joint(
     near = nearest(targets[0], among) if targets else ""
     both = " and ".join(COUPLED[str(prim.GetTypeName())])
     raise ShotError(
-        what, path=str(prim.GetPath()), attribute=attribute, found=", ".join(targets) or None,
+        what,
+        path=str(prim.GetPath()),
+        attribute=attribute,
+        found=", ".join(targets) or None,
         remedy=f"{near}Name a {kind} of the robot, another joint in each of {both}",
-    )  # fmt: skip
+    )
 
 
 ALONG = 0.99  # cosine: an axis that is farther off does not lie along the joint's
