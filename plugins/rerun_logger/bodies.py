@@ -114,14 +114,7 @@ def moved_inside(surface: SurfaceMesh, depth: float) -> Array:
 def log_scenery(recording: rr.RecordingStream, character: Character) -> None:
     """What stands about the robot, once."""
     for surface in character.scenery:
-        sources, triangles, normals = split_at_creases(surface.points, surface.triangles)
-        mesh = rr.Mesh3D(
-            vertex_positions=surface.points[sources].astype(np.float32),
-            triangle_indices=triangles,
-            vertex_normals=normals.astype(np.float32),
-            albedo_factor=display_color(surface.color),
-        )
-        recording.log(SCENERY + surface.path, mesh, static=True)
+        log_mesh(recording, SCENERY + surface.path, surface, surface.points[None], display_color(surface.color))
 
 
 def log_mesh(
@@ -130,8 +123,8 @@ def log_mesh(
     surface: SurfaceMesh,
     points: Array,
     color: tuple[int, int, int, int] | NDArray[np.uint8],
-    colors: NDArray[np.uint8] | None,
-    frames: rr.TimeColumn,
+    colors: NDArray[np.uint8] | None = None,
+    frames: rr.TimeColumn | None = None,
 ) -> None:
     """One surface.
 
@@ -139,6 +132,7 @@ def log_mesh(
         points: One row when it does not deform, else one a frame.
         color: Of the whole surface, or one a frame, shape [f, 4].
         colors: Of its points, one row a frame, instead.
+        frames: Their times; None for what stays as it is.
     """
     sources, triangles, normals = split_at_creases(surface.points, surface.triangles)
     fixed: dict[str, Any] = {"triangle_indices": triangles, "vertex_normals": normals.astype(np.float32)}
