@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from calmotion.arrays import Array, Indices
@@ -33,7 +32,6 @@ from matplotlib.figure import Figure
 PANEL = 340  # pixels across a panel, before it is drawn into the figure
 SMOOTH = 2  # factor of the rendering, which is then averaged
 TRAIL_S = 0.5
-STILL = 1e-3  # of a body that does not move: range of its place [m] and of its quaternion
 WIDTH = 12.0
 LETTERS = 150  # of titles that stand beside each other
 
@@ -67,8 +65,7 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
     reference = sample_motion(result.reference, times)
     motions = [sample_motion(run.motion, times) for run, _, _ in runs]
     every = (result.reference, *(run.motion for run, _, _ in runs))
-    moving = without_still_surfaces(character, sample_motion(result.reference, animation.frame_times))
-    clouds = [moving_cloud(moving, result.skins, motion) for motion in (reference, *motions)]
+    clouds = [moving_cloud(character, result.skins, motion) for motion in (reference, *motions)]
     cloud = np.concatenate([*clouds, *(trail_of(motion, time).reshape(-1, 3) for motion in every for time in times)])
     probe = fit_camera(view, cloud, PANEL, PANEL, 0.0).project(cloud)[:, :2]
     aspect = float(np.clip(np.ptp(probe[:, 1]) / max(np.ptp(probe[:, 0]), 1e-9), 0.35, 1.8))
@@ -94,19 +91,6 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
     text = "Simulated motion over the intended motion (green) at the largest errors of the input"
     figure.suptitle(text, fontsize=NORMAL, color=TEXT)
     return figure
-
-
-def without_still_surfaces(character: Character, motion: Motion) -> Character:
-    """The character with the surfaces of the bodies that move, so that a picture of these is near; else as it is.
-
-    Args:
-        motion: By which they move.
-    """
-    moved = np.ptp(motion.positions, axis=0).max(axis=1) + np.ptp(motion.rotations, axis=0).max(axis=1)
-    if not np.any(moved > STILL):
-        return character
-    bodies = zip(character.bodies, moved, strict=True)
-    return replace(character, bodies=tuple(body if m > STILL else replace(body, surfaces=()) for body, m in bodies))
 
 
 def panel_titles(character: Character, runs: Sequence[Simulation], targets: Indices, times: Array) -> list[list[str]]:

@@ -99,8 +99,6 @@ def set_stage(
     view = choose_viewpoint(character, result.skins, runs[0])
     cloud = np.concatenate([moving_cloud(character, result.skins, motion, ROWS) for motion in (reference, *runs)])
     floor = floor_below(model, reference)
-    if floor is not None:  # the shadow below the character is part of the picture
-        cloud = np.concatenate([cloud, cloud - np.maximum(cloud @ model.up - floor, 0.0)[:, None] * model.up])
     cloud = np.concatenate([cloud, near_scenery(character, cloud)])
     probe = fit_camera(view, cloud, width, width, 0.0).project(cloud)[:, :2]
     aspect = float(np.clip(1.08 * np.ptp(probe[:, 1]) / max(np.ptp(probe[:, 0]), 1e-9), *shape))

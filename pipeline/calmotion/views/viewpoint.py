@@ -13,6 +13,7 @@ from calmotion.views.playback import deformed_points, modes_of, rotation_matrice
 
 SIDE = np.radians(38.0)
 ELEVATION = np.radians(17.0)
+STILL = 1e-3  # of a body that does not move: range of its place [m] and of its quaternion
 ROOM = 1.2  # largest growth of a picture for the scenery
 
 
@@ -72,16 +73,19 @@ def choose_viewpoint(character: Character, skins: tuple[Skin | None, ...], motio
 
 
 def moving_cloud(character: Character, skins: tuple[Skin | None, ...], motion: Motion, rows: int = 40) -> Array:
-    """Targets, and the corners of the convex hulls of all drawn surfaces, at instants of a motion, shape [n, 3].
+    """Targets, and the corners of the convex hulls of the drawn surfaces of bodies that move, at instants of a motion,
+    shape [n, 3]; of all bodies, where none moves.
 
     A picture that has the corners of a hull has all of its surface; robots have surfaces of a hundred thousand points.
     """
     clouds = [motion.target_positions.reshape(-1, 3)]
     instants = np.unique(np.linspace(0, len(motion.times) - 1, 12).astype(int))
     matrices = rotation_matrices(motion.rotations[instants])
+    moved = np.ptp(motion.positions, axis=0).max(axis=1) + np.ptp(motion.rotations, axis=0).max(axis=1)
+    seen = moved > STILL if np.any(moved > STILL) else np.ones(len(moved), bool)
     for index, body in enumerate(character.bodies):
         for s, surface in enumerate(body.surfaces):
-            if surface.drawn:
+            if surface.drawn and seen[index]:
                 corners, modes = hull_corners(surface.points), modes_of(skins[index], s)
                 own = None if modes is None else modes[corners]
                 points = deformed_points(surface.points[corners], own, motion.elastic[index][instants])
