@@ -17,7 +17,7 @@ from PIL import Image
 HERE = Path(__file__).resolve().parent
 DPI = 125  # 1500 pixels across
 COLORS = 255  # a palette is a third of the size
-VIDEO = ("width=560", "rate=12.5Hz", "quality=55")  # below a megabyte
+VIDEO = ("width=560", "rate=12.5Hz", "quality=42")  # below a megabyte
 ROUNDS = 4  # of k-means over the palette; without them the few pixels of the marks take other colors
 
 
