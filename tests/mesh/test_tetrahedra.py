@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -10,10 +11,20 @@ from calmotion.errors import ShotError
 from calmotion.mesh import tetrahedra as t
 from calmotion.mesh.bisection import bisected
 from calmotion.mesh.mass import mass_of_solid, mass_of_tets
-from calmotion.mesh.mesh_shaping import Surface, shaped
+from calmotion.mesh.mesh_shaping import Surface, fitted, shaped
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
-from calmotion.mesh.tetrahedra import boundary_triangles, measure_quality, min_dihedral_deg, surface_area, tet_volumes
+from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles
+from calmotion.mesh.tetrahedra import (
+    boundary_triangles,
+    measure_quality,
+    min_dihedral_deg,
+    surface_area,
+    surface_volume,
+    tet_volumes,
+    without_contacts,
+)
 from calmotion.model import Body, FEMesh, FlexibleSettings
+from round_bars import LENGTH, RADIUS, bar_surface, coarse_bar
 
 REGULAR = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 
@@ -238,3 +249,56 @@ def test_a_mesh_that_has_the_volume_by_chance_is_fitted(helpers, mesh, plastic):
     found = shaped(mesh, body, surface_of(helpers, 1.001 * mesh.quality.volume), ())
     assert found.quality.volume_error > 3e-3 and not np.array_equal(found.points, mesh.points)
     assert found.quality.volume == pytest.approx(np.prod(SIZE), rel=1e-4)
+
+
+def joined(helpers, *places):
+    """Unit cubes at places, with the points that they have in common."""
+    points, tets = helpers.box((1, 1, 1), (1, 1, 1))
+    stacked = np.vstack([points + np.asarray(place, float) for place in places])
+    return t.welded_tets(stacked, np.vstack([tets + k * len(points) for k in range(len(places))]), 1e-9)[:2]
+
+
+def test_a_mesh_whose_neighbours_share_faces_stays_as_it_is(helpers):
+    points, tets = joined(helpers, *product((0, 1), (0, 1), (0, 1)))
+    same, also = without_contacts(points, tets)
+    assert same is points and also is tets
+
+
+@pytest.mark.parametrize(("place", "doubled"), [((1, 1, 0), 2), ((1, 1, 1), 1)], ids=["edge", "point"])
+def test_cubes_that_touch_come_apart(helpers, place, doubled):
+    points, tets = joined(helpers, (0, 0, 0), place)
+    assert t.connected_parts(tets) == 1
+    apart, parted = without_contacts(points, tets)
+    assert len(apart) == len(points) + doubled and t.connected_parts(parted) == 2
+    assert len(np.unique(apart, axis=0)) == len(apart)  # two points in one place cannot be told apart
+    volumes = t.tet_volumes(points, tets)
+    assert t.tet_volumes(apart, parted) == pytest.approx(volumes, rel=0.2)
+    assert (t.tet_volumes(apart, parted) >= 0.5 * volumes).all()
+
+
+def test_each_element_keeps_its_corners(helpers):
+    rng = np.random.default_rng(3)
+    cells = np.argwhere(rng.random((4, 4, 4)) < 0.5)
+    points, tets = joined(helpers, *cells)
+    apart, parted = without_contacts(points, tets)
+    assert len(apart) > len(points) and parted.dtype == tets.dtype
+    assert np.linalg.norm(apart[parted] - points[tets], axis=-1).max() < 0.05
+    # every point is one of elements that hang together by faces at it
+    again, same = without_contacts(apart, parted)
+    assert again is apart and same is parted
+
+
+def second_moment(points, tets):
+    """Integral of z^2 over the tetrahedra."""
+    z = points[tets][:, :, 2]
+    return float((tet_volumes(points, tets) / 20.0 * ((z**2).sum(axis=1) + z.sum(axis=1) ** 2)).sum())
+
+
+def test_a_coarse_round_bar_has_the_volume_and_the_second_moment_of_a_fine_one(helpers):
+    surface, (points, tets) = bar_surface(), coarse_bar(helpers)
+    volume, moment = surface_volume(*surface), 0.25 * np.pi * RADIUS**4 * LENGTH
+    assert tet_volumes(points, tets).sum() < 0.97 * volume and second_moment(points, tets) < 0.94 * moment
+    found = fitted(points, tets, NearbyTriangles(*surface, 0.2 * RADIUS))
+    assert tet_volumes(found, tets).min() > 0.0
+    assert tet_volumes(found, tets).sum() == pytest.approx(volume, rel=2e-3)
+    assert second_moment(found, tets) == pytest.approx(moment, rel=5e-3)

@@ -1,11 +1,16 @@
 """How far a search is."""
 
+import dataclasses
+
 import numpy as np
 import pytest
+from calmotion.model import Track
 from calmotion.model.run import RunSettings
+from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.search_progress import SearchProgress, SuccessiveSearches, share_of_pass
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.tolerance.reduced_bodies import RunMemory
 from calmotion.tolerance.simulation import FINDING
 
 
@@ -63,3 +68,55 @@ def test_the_progress_of_a_real_search_has_no_large_jump(arm, animation, bodies)
     found = [fraction for fraction, message in seen if message not in (FINDING, "choosing the time step")]
     assert np.all(np.diff(found) >= 0.0)
     assert np.diff([*found, 1.0]).max() < 0.4, found  # it has three iterations
+
+
+OPTIONS = RunSettings(step=1 / 240, tolerance=1e-4)
+
+
+def quiet(fraction, message):
+    pass
+
+
+@pytest.fixture(scope="module")
+def left(arm, animation, bodies):
+    memory = RunMemory()
+    return memory, optimize_shot(compile_shot(arm, animation, bodies), OPTIONS, quiet, memory=memory)
+
+
+def begun_with(found, animation):
+    """An animation whose current curves have the changes that were found."""
+    current = [
+        Track(animation.frame_times, curve.frame_values) if curve.changed else track
+        for curve, track in zip(found.curves, animation.tracks, strict=True)
+    ]
+    return dataclasses.replace(animation, current=tuple(current))
+
+
+def products(result):
+    return result.search.linearized_sweeps
+
+
+def test_the_directions_of_the_last_search_save_sweeps(arm, animation, bodies, left):
+    memory, found = left
+    assert len(memory.search.recycled.p) > 0 and memory.search.sharpened is None
+    again = compile_shot(arm, begun_with(found, animation), bodies)
+    kept = optimize_shot(again, OPTIONS, quiet, memory=dataclasses.replace(memory))
+    plain = optimize_shot(again, OPTIONS, quiet)
+    assert products(kept) <= products(plain) < products(found)
+    assert kept.objective_after <= 1.02 * plain.objective_after
+
+
+def test_other_unknowns_take_nothing(left):
+    memory, _ = left
+    other = dataclasses.replace(memory.search, breaks=memory.search.breaks[:-1])
+
+    class Problem:
+        class space:  # noqa: N801
+            motors = memory.search.motors
+
+            class basis:  # noqa: N801
+                breaks = memory.search.breaks
+
+    search = dataclasses.make_dataclass("Search", ["x", "radius"])(np.zeros(3), np.inf)
+    assert other.begun(Problem, search) is search
+    assert memory.search.begun(Problem, search) is search, "of another size"

@@ -1,7 +1,9 @@
+"""Simplifications in a report: all, or a line."""
+
 import io
 
 import pytest
-from calmotion.cli.reports.limits import print_limits, print_reason
+from calmotion.cli.reports.limits import print_left_out, print_limits, print_reason
 from calmotion.cli.tables import console_on
 
 
@@ -56,3 +58,35 @@ def test_limits_that_cost_nothing_are_not_listed():
     stream = io.StringIO()
     print_limits(console_on(stream), [row("/Arm", 2.0, 1.0, 1.0), row("/Leg", 2.0, 3.0, 2.0, cost=2e-3)], True)
     assert "/Arm" not in stream.getvalue() and "costs 2 mm rms" in stream.getvalue()
+
+
+def printed(rows, whole):
+    stream = io.StringIO()
+    print_left_out(console_on(stream), rows, whole)
+    return stream.getvalue().splitlines()
+
+
+def row_left(what, error, skipped=False):
+    return {"what": what, "why": "because", "estimated_error_m": error, "skipped": skipped}
+
+
+def test_each_has_its_reason_and_its_error_and_a_skipped_step_says_so():
+    rows = [row_left("modes above 40 Hz", 2e-5), row_left("no pre-roll", None), row_left("Draw", None, True)]
+    assert printed(rows, True) == [
+        "simplified: modes above 40 Hz (because); estimated error 0.02 mm", "simplified: no pre-roll (because)",
+        "skipped: Draw (because)",
+    ]  # fmt: skip
+
+
+def test_by_itself_a_report_has_one_line_with_the_largest_error():
+    rows = [
+        row_left("turning", None),
+        row_left("modes", 2e-5),
+        row_left("time step 5 ms", 3e-4),
+        row_left("Draw", None, True),
+    ]
+    assert printed(rows, False) == [
+        "simplified: 3 parts of the model; largest estimated error 0.3 mm (time step 5 ms). --verbose lists all"
+    ]
+    assert printed([row_left("turning", None)], False) == ["simplified: 1 part of the model. --verbose lists all"]
+    assert printed([row_left("Draw", None, True)], False) == []

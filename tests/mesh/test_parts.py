@@ -1,8 +1,11 @@
-"""Elements across several materials: exact for linear strains, right on meshes that ignore where one ends."""
+"""Which part of an assembly holds a place."""
 
 import numpy as np
 import pytest
 import trimesh
+from calmotion.mesh.mass import mass_of_tets
+from calmotion.mesh.parts import holders, makeup_of, part_of_places, places_of, skin_share
+from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.model.character import ElasticMaterial
 from calmotion.model.meshes import Core, Part, core_of
 from calmotion.reduction.basis.natural_modes import clamped_modes
@@ -10,6 +13,76 @@ from calmotion.reduction.damping import ratio_of_parts
 from calmotion.reduction.discretization_error import frequency_errors
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, strain_gram
+
+
+def part(mesh, name):
+    return Part(f"/Body/{name}", f"/Looks/{name}", np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int32), 1, 1, 0)
+
+
+def box(low, high, name):
+    return part(trimesh.creation.box(bounds=[low, high]), name)
+
+
+def test_an_insert_is_inside_the_shell_around_it_whatever_their_order():
+    shell, insert = box((0, 0, 0), (1, 1, 1), "shell"), box((0.4, 0.4, 0.4), (0.6, 0.6, 0.6), "insert")
+    places = np.array([[0.5, 0.5, 0.5], [0.1, 0.5, 0.5], [0.55, 0.45, 0.5]])
+    assert holders(places, (shell, insert)).tolist() == [1, 0, 1]
+    assert holders(places, (insert, shell)).tolist() == [0, 1, 0]
+
+
+def test_between_parts_and_far_from_all_the_nearest_one_counts():
+    parts = box((0, 0, 0), (1, 1, 1), "a"), box((1.1, 0, 0), (2, 1, 1), "b")
+    places = np.array([[1.02, 0.5, 0.5], [1.08, 0.5, 0.5], [9.0, 0.5, 0.5], [-7.0, 0.0, 0.0]])
+    assert holders(places, parts).tolist() == [0, 1, 1, 0]
+
+
+def test_tetrahedra_across_a_side_are_divided_by_it(helpers):
+    parts = box((0, 0, 0), (0.37, 1, 1), "a"), box((0.37, 0, 0), (1, 1, 1), "b")
+    points, tets = helpers.box((4, 2, 2), (1.0, 1.0, 1.0))
+    points = np.asarray(points)
+    held = part_of_places(points, tets, parts, places_of(6))
+    volume = tet_volumes(points, tets) @ (held == 0).mean(axis=1)
+    assert abs(volume - 0.37) < 0.01
+    middle = points[tets][:, :, 0]
+    assert (held[middle.max(axis=1) < 0.3] == 0).all() and (held[middle.min(axis=1) > 0.4] == 1).all()
+
+
+SIZE = np.array([0.2, 0.02, 0.03])
+
+
+@pytest.mark.parametrize("counts", [(8, 1, 1), (20, 2, 3), (40, 4, 6)])
+@pytest.mark.parametrize("skin", [0.9e-3, 2e-3])
+def test_the_skin_of_a_box_has_its_volume_on_any_mesh(helpers, counts, skin):
+    points, tets = helpers.box(counts, tuple(SIZE))
+    share = skin_share(np.asarray(points), tets, Core(skin, 0.2, 0.1))
+    found = tet_volumes(points, tets) @ (0.2 + 0.8 * share.shares.mean(axis=1))
+    inner = float(np.prod(SIZE - 2.0 * skin))
+    assert found == pytest.approx(float(np.prod(SIZE)) - 0.8 * inner, rel=0.01)
+
+
+def test_places_are_in_the_tetrahedron_and_mean_its_center(helpers):
+    points, tets = helpers.box((2, 1, 1), tuple(SIZE))
+    places = skin_share(np.asarray(points), tets, Core(1e-3, 0.2, 0.1)).places
+    assert places.min() > 0.0 and places.sum(axis=1) == pytest.approx(1.0)
+    assert places.mean(axis=0) == pytest.approx(0.25, abs=1e-12)
+
+
+def test_a_skin_that_is_thicker_than_the_body_is_all_of_it(helpers):
+    points, tets = helpers.box((8, 1, 1), tuple(SIZE))
+    assert skin_share(np.asarray(points), tets, Core(0.02, 0.2, 0.1)).shares == pytest.approx(1.0)
+
+
+def test_the_mass_of_a_print_is_less_and_its_moments_are_larger_for_it(helpers):
+    points, tets = helpers.box((20, 2, 3), tuple(SIZE))
+    points = np.asarray(points)
+    solid = mass_of_tets(points, tets, 1000.0)
+    makeup = makeup_of(points, tets, ElasticMaterial("/PLA", 2e9, 0.3, 1000.0, core=Core(1e-3, 0.2, 0.1)))
+    printed = mass_of_tets(points, tets, 1000.0, makeup=makeup)
+    assert 0.2 * solid.mass < printed.mass < 0.6 * solid.mass
+    assert printed.center == pytest.approx(solid.center, abs=2e-4)
+    assert printed.inertia[0, 0] / printed.mass > 1.1 * solid.inertia[0, 0] / solid.mass
+    assert mass_of_tets(points, tets, 1000.0, 0.05, makeup).mass == pytest.approx(0.05)
+
 
 LENGTH, WIDTH = 0.4, 0.02
 MODULUS, DENSITY = 2.0e9, 1200.0
@@ -76,14 +149,14 @@ def test_energies_of_large_deflections_begin_with_the_stiffness(helpers):
     assert np.linalg.eigvalsh(gram).min() > -1e-9 * np.linalg.eigvalsh(gram).max()
 
 
-def part(points, faces, name, modulus, density, damping=0.01):
+def part_filling(points, faces, name, modulus, density, damping=0.01):
     return Part(f"/Bar/{name}", f"/Looks/{name}", points, faces, modulus, density, damping)
 
 
 def cut(low, high, name, modulus, density, damping=0.01):
     """A part of the bar from one fraction of its extent to another."""
     made = trimesh.creation.box(bounds=np.array([low, high]) * [LENGTH, WIDTH, WIDTH])
-    return part(np.asarray(made.vertices), np.asarray(made.faces, np.int32), name, modulus, density, damping)
+    return part_filling(np.asarray(made.vertices), np.asarray(made.faces, np.int32), name, modulus, density, damping)
 
 
 def first_frequency(points, tets, parts):

@@ -6,7 +6,7 @@ import calmotion as cm
 import numpy as np
 import pytest
 from arms import chain, compiled
-from calmotion.multibody.analysis.joint_faults import unheld_joints
+from calmotion.multibody.analysis.joint_faults import dead_centres, unheld_joints
 from neutral_hinges import push_rod, turning
 from pxr import UsdPhysics
 from small_shots import ELBOW, FORE, TARGET_POSITION, write_arm
@@ -41,3 +41,16 @@ def test_a_carriage_that_nothing_drives_keeps_its_place_and_the_report_says_so(t
     # the arm turns about y, along which the carriage is free: nothing pushes it
     np.testing.assert_allclose(motion.positions[:, fore, 1], 0.0, atol=1e-9)
     assert np.ptp(motion.positions[:, fore, 2]) > 0.1
+
+
+def test_sharp_minima_far_below_what_is_usual_are_named():
+    t = np.linspace(0.0, 2.0 * np.pi, 201)
+    margins = 1e-3 * np.abs(np.cos(t)) + 1e-9
+    margins[0] = 0.0  # before the first step nothing is known
+    assert dead_centres(margins) == [50, 150]
+
+
+def test_smooth_minima_and_trees_without_closed_chains_are_not_named():
+    t = np.linspace(0.0, 2.0 * np.pi, 201)
+    assert dead_centres(1e-3 * (2.0 + np.cos(t))) == []
+    assert dead_centres(np.zeros(201)) == [] and dead_centres(np.zeros(2)) == []
