@@ -42,8 +42,10 @@ def errors_table(character: Character, result: Result) -> str:
     runs = {" before": result.before, " after": result.after} if result.after is not None else {"": result.before}
     heads = [f"{measure}{when}" for measure in ("largest", "rms") for when in runs]
     rows = [f"| target | {' | '.join(heads)} |", f"|---|{'---:|' * len(heads)}"]
-    for k, target in enumerate(character.targets):
-        cells = []
+    largest = np.max(result.before.position_errors[result.before.motion.judged], axis=0, initial=0.0)
+    weights = [target.position_weight for target in character.targets]
+    for k in sorted(range(len(weights)), key=lambda k: (-weights[k], -largest[k])):  # the main target first
+        target, cells = character.targets[k], []
         for measure in (np.max, lambda e: np.sqrt(np.mean(e**2))):
             for simulation in runs.values():
                 cells.append(error_cell(simulation, k, target.rotation_weight > 0.0, measure))
