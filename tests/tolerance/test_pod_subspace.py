@@ -11,12 +11,12 @@ from calmotion.model.run import RunSettings
 from calmotion.model.tempo import TimeMap
 from calmotion.model.tolerance import SUBSPACE
 from calmotion.simulation.bodies import with_elasticity
-from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance import pod_subspace
 from calmotion.tolerance.integrator_choice import FAST
 from calmotion.tolerance.pod_subspace import ProjectedShot, project_to_subspace, reference_run
 from calmotion.tolerance.step_error import distance, simulate_at
+from made_shots import reduced_shot
 
 STEP, ALLOWED = 1 / 240, 2e-5
 

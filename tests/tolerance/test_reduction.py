@@ -8,13 +8,14 @@ from calmotion.model.character import with_settings
 from calmotion.model.run import RunSettings
 from calmotion.simulation import body_reduction
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.body_reduction import reduced_shot, reduction_for
+from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance import reduction as module
 from calmotion.tolerance.integrator_choice import FAST
 from calmotion.tolerance.pod_subspace import ReferenceRun
 from calmotion.tolerance.reduction import converged_reduction
 from calmotion.tolerance.step_error import distance, simulate_at
+from made_shots import reduced_shot
 
 STEP = 1 / 480
 BY = RunSettings(integrator=FAST)

@@ -8,11 +8,11 @@ from calmotion.errors import IntegrationError
 from calmotion.model import Track
 from calmotion.model.run import RunSettings
 from calmotion.simulation.bodies import with_elasticity
-from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.tolerance import simulate_again
 from calmotion.tolerance.reduced_bodies import RunMemory
 from calmotion.tolerance.simulation import simulate_to_tolerance
 from calmotion.tolerance.step_error import distance, frames_of_result
+from made_shots import reduced_shot
 
 TOLERANCE = 1e-3
 OPTIONS = RunSettings(tolerance=TOLERANCE)

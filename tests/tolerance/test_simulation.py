@@ -12,7 +12,6 @@ from calmotion.model.tolerance import tolerance_of
 from calmotion.retargeting import to_tolerance as retarget
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.simulation.bodies import with_elasticity
-from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance import simulation as to_tolerance
 from calmotion.tolerance import step_choice
@@ -20,6 +19,7 @@ from calmotion.tolerance.pod_subspace import ProjectedShot
 from calmotion.tolerance.simulation import found_tracks, planned_step, simulate_to_tolerance
 from calmotion.tolerance.step_choice import WHOLE
 from calmotion.tolerance.step_error import CLOSED_GAP, distance, frames_of_result, simulate_at
+from made_shots import reduced_shot
 
 FINE = 1 / 7680
 

@@ -15,7 +15,6 @@ from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.simulation.bodies import bodies_in_parallel, full_model_of, reduce_bodies
-from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.simulation.preparation import grid_of
 from calmotion.simulation.rigid_run import shot_load_envelopes
 
@@ -125,15 +124,3 @@ def reduction_for(
 ) -> BodyReduction:
     """The reduction of a shot's bodies under its loads; arguments as of `load_envelopes` and `BodyReduction`."""
     return BodyReduction(character, meshes, load_envelopes(character, animation, meshes, options), repeats)
-
-
-def reduced_shot(
-    character: Character, animation: Animation, meshes: FEMeshes | None, options: RunSettings
-) -> CompiledShot:
-    """A shot compiled with its bodies reduced to the tolerance of the options; arguments as of `load_envelopes`.
-
-    Raises:
-        ShotError: A flexible body without a mesh, or one that cannot be reduced.
-    """
-    bodies = reduction_for(character, animation, meshes, options).bodies(options.tolerance)
-    return compile_shot(character, animation, bodies)

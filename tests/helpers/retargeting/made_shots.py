@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 from calmotion.model.run import RunSettings
-from calmotion.simulation.body_reduction import reduced_shot
+from calmotion.simulation.body_reduction import reduction_for
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.testing import beam_arm, quintic, shot_of
 from linkage_arm import SOFT, linkage_arm, performance
+
+
+def reduced_shot(character, animation, meshes, options):
+    """A shot compiled with its bodies reduced to the tolerance of the options."""
+    bodies = reduction_for(character, animation, meshes, options).bodies(options.tolerance)
+    return compile_shot(character, animation, bodies)
 
 
 def plastic_shot():

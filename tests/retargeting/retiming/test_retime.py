@@ -16,10 +16,10 @@ from calmotion.retargeting.retiming.rigid_robot import tempo_input
 from calmotion.retargeting.retiming.settings import pinned_times, refuse_tempo
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.simulation.bodies import with_elasticity
-from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.tolerance.simulation import found_tracks
+from made_shots import reduced_shot
 from posed import ignore_progress
 
 OPTIONS = RunSettings(step=1 / 240)
