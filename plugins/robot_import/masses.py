@@ -133,7 +133,7 @@ class _Author:
             names = ", ".join(map(named, frames))
             self.notes.append(f"links of mass 0 are frames, and get {1e6 * _FRAME_MASS:g} mg each: {names}")
         self._raise_moments()
-        without = [prim for prim in self._bodies if named(prim) in self._options.without_mass]
+        without = [prim for prim in self._bodies if named(prim) in self._options.robot.without_mass]
         if self._options.solid is not None:
             without += [prim for prim in self._bodies if prim not in (*without, *frames) and _has_no_mass(prim)]
         bending = [prim for prim in without if self._options.is_flexible(prim)]
@@ -160,7 +160,7 @@ class _Author:
     def _is_frame(self, body: Usd.Prim) -> bool:
         """Whether a link has no mass, nor gets that of a material."""
         without = self._options.mjcf and _has_no_mass(body) and not self._options.is_flexible(body)
-        return without or named(body) in self._options.massless or self._weighs_nothing(body)
+        return without or named(body) in self._options.robot.massless or self._weighs_nothing(body)
 
     def _keeps_mass(self, body: Usd.Prim) -> bool:
         """Whether the material of a flexible link gives its mass: the file states none of its own."""

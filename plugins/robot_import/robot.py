@@ -21,7 +21,7 @@ from calmotion.version import __version__
 from calmotion.workflow import Given, Path, problems_of, read_settings, value_of
 
 from .converters import BrokenMeshes, compiled_values, convert, converter_python, temporary_folder
-from .descriptions import MJCF, USD, Description, read_description, repaired
+from .descriptions import USD, Description, read_description, repaired
 from .masses import too_heavy
 from .options import FlexibleLinks, RobotOptions
 from .robot_layer import robot_layer
@@ -128,17 +128,14 @@ def import_robot(
     is_usd = os.path.splitext(os.fspath(robot))[1].lower() in (*EXTENSIONS, ".usdz")
     description = Description(os.fspath(robot), USD) if is_usd else read_description(os.fspath(robot), named)
     tracks, told = _motion(host, motion, settings) if motion is not None else (None, ())
-    options = RobotOptions(
-        links, tuple(targets), description.efforts, description.without_mass, description.massless,
-        None if solid is None else material_named(solid, known)[1], tracks,
-        None if is_usd and tracks is None else frames_per_second(tracks), tuple(motors), description.kind == MJCF,
-        description.locks, description.soft_limits,
-    )  # fmt: skip
+    material = None if solid is None else material_named(solid, known)[1]
+    rate = None if is_usd and tracks is None else frames_per_second(tracks)
+    options = RobotOptions(description, links, tuple(targets), material, tracks, rate, tuple(motors))
     if is_usd:
-        made = _over_usd(description.path, target, options)
+        made = _over_usd(target, options)
     else:
         python = converter_python(None if converters is None else os.fspath(converters), tell)
-        made = _Import(description, target, options).made(python)
+        made = _Import(target, options).made(python)
     return replace(made, notes=(*told, *made.notes))
 
 
@@ -200,8 +197,9 @@ def _motion(host: Host, path: Path, settings: Given) -> tuple[MotorTracks, tuple
     return value_of(run, MotorTracks, problems), told
 
 
-def _over_usd(robot: str, layer: str, options: RobotOptions) -> ImportedRobot:
+def _over_usd(layer: str, options: RobotOptions) -> ImportedRobot:
     """A layer over a robot that is USD, which stays where it is."""
+    robot = options.robot.path
     refuse_input_as_output(layer, [robot])
     made, notes = robot_layer(robot, relative_asset(robot, os.path.dirname(os.path.realpath(layer))), options)
     read: list[tuple[Character, Animation, Provenance]] = []
@@ -214,8 +212,8 @@ def _over_usd(robot: str, layer: str, options: RobotOptions) -> ImportedRobot:
 class _Import:
     """Writes one shot: everything is made in a temporary folder beside it, and moved to its place at the end."""
 
-    def __init__(self, description: Description, layer: str, options: RobotOptions) -> None:
-        self._description, self._layer, self._options = description, layer, options
+    def __init__(self, layer: str, options: RobotOptions) -> None:
+        self._description, self._layer, self._options = options.robot, layer, options
         self._folder = f"{os.path.splitext(layer)[0]}_robot"
 
     def made(self, python: str) -> ImportedRobot:

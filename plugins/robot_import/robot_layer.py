@@ -104,10 +104,10 @@ class _Author:
         """Drives, see `robot_motors`."""
         shift_limits(self._stage)
         options = self._options
-        self.notes += narrow_limits(self._stage, self._units, options.soft_limits)
-        author_motors(self._stage, self._units, options.motion, self._rate, options.efforts, options.motors)
+        self.notes += narrow_limits(self._stage, self._units, options.robot.soft_limits)
+        author_motors(self._stage, self._units, options.motion, self._rate, options.robot.efforts, options.motors)
         self.notes += author_springs(self._stage, self._units)
-        self.notes += author_locks(self._stage, self._units, options.locks)
+        self.notes += author_locks(self._stage, self._units, options.robot.locks)
         self.notes += passive_joints(self._stage, bool(options.motors or options.motion))
 
     def links(self) -> None:

@@ -9,6 +9,7 @@ from calmotion.errors import ShotError
 from calmotion.usd.reading.shot import read_shot
 from calmotion_plugins.robot_import import import_robot
 from calmotion_plugins.robot_import.converters import VARIABLE, environment_folder
+from calmotion_plugins.robot_import.descriptions import MJCF, Description
 from calmotion_plugins.robot_import.options import RobotOptions
 from calmotion_plugins.robot_import.robot_layer import robot_layer
 from converted_arm import CONVERTED, FORE
@@ -67,7 +68,8 @@ def converted(tmp_path, joint):
         "float newton:mimicCoef1 = 0.01", ""
     )
     (tmp_path / "converted.usda").write_text(text.replace("PhysicsPrismaticJoint", joint))
-    layer, notes = robot_layer(str(tmp_path / "converted.usda"), "./converted.usda", RobotOptions(mjcf=True))
+    options = RobotOptions(Description("r.xml", MJCF))
+    layer, notes = robot_layer(str(tmp_path / "converted.usda"), "./converted.usda", options)
     layer.Export(str(tmp_path / "robot.usda"))
     return read_shot(str(tmp_path / "robot.usda"), still=True)[0], notes
 

@@ -10,6 +10,7 @@ from calmotion.catalogs.materials import MATERIALS
 from calmotion.errors import ShotError
 from calmotion.model import MotorTracks
 from calmotion.usd.reading.shot import read_shot
+from calmotion_plugins.robot_import.descriptions import URDF, Description
 from calmotion_plugins.robot_import.options import FlexibleLinks, RobotOptions
 from calmotion_plugins.robot_import.robot_layer import robot_layer
 from converted_arm import CONVERTED, ELBOW, FORE, MIMIC, PAN, UPPER
@@ -20,10 +21,10 @@ TIMES = np.arange(5) / 20.0
 
 @pytest.fixture
 def make(tmp_path):
-    def run(edit=lambda text: text, **options):
+    def run(edit=lambda text: text, said=(("without_mass", ("fore.arm",)),), **options):
         (tmp_path / "converted.usda").write_text(edit(CONVERTED))
-        options = {"solid": MATERIALS["pla"], "without_mass": ("fore.arm",)} | options
-        layer, notes = robot_layer(str(tmp_path / "converted.usda"), "./converted.usda", RobotOptions(**options))
+        options = RobotOptions(Description("r.urdf", URDF, **dict(said)), **{"solid": MATERIALS["pla"]} | options)
+        layer, notes = robot_layer(str(tmp_path / "converted.usda"), "./converted.usda", options)
         layer.Export(str(tmp_path / "robot.usda"))
         character, animation, _ = read_shot(str(tmp_path / "robot.usda"), still=True)
         return character, animation, notes
@@ -32,7 +33,7 @@ def make(tmp_path):
 
 
 def test_joints_get_motors_that_hold_the_pose_nearest_to_zero(make):
-    character, animation, _ = make(efforts={"shoulder-pan": 20.0})
+    character, animation, _ = make(said={"efforts": {"shoulder-pan": 20.0}, "without_mass": ("fore.arm",)})
     assert [motor.path for motor in character.motors] == [PAN, ELBOW, MIMIC]
     assert animation.tracks[0].values[0] == pytest.approx(np.radians(10.0))
     assert animation.tracks[1].values[0] == 0.0
@@ -96,7 +97,7 @@ def geoms(*authored):
 
 
 def fore_mass(make, *authored, **options):
-    character, _, _ = make(geoms(*authored), without_mass=(), **options)
+    character, _, _ = make(geoms(*authored), said=(), **options)
     mass = next(body.mass for body in character.bodies if body.path == FORE)
     return None if mass is None else mass.mass
 
@@ -117,7 +118,8 @@ def test_what_the_geoms_of_a_flexible_link_weigh_is_believed_and_a_default_densi
 
 def test_links_of_no_mass_are_frames_of_almost_none(make):
     character, _, notes = make(
-        lambda text: text.replace("physics:mass = 0.1", "physics:mass = 0"), massless=("finger",)
+        lambda text: text.replace("physics:mass = 0.1", "physics:mass = 0"),
+        said={"massless": ("finger",), "without_mass": ("fore.arm",)},
     )
     finger = next(body for body in character.bodies if body.path.endswith("/finger"))
     assert finger.mass.mass == pytest.approx(1e-6) and any("finger" in note for note in notes)
