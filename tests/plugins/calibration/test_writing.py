@@ -171,7 +171,7 @@ def test_what_recordings_were_off_is_told_with_the_shot_of_the_layer(shot, tmp_p
     _, root = write_calibration(own[0], own[2], made, str(tmp_path / "robot.usda"))
     target = max(own[0].targets, key=lambda t: t.path)
     arm = np.linalg.norm(own[0].bodies[target.body].rest.position - own[0].bodies[0].rest.position)
-    (note,) = [note for note in read_shot(root)[0].notes if "predicted of its recordings" in note]
+    (note,) = [note for note in read_shot(root)[0].notes if "differed from its recordings" in note]
     found = [float(part.split()[-1]) for part in note.split(" mm")[:2]]
     assert found[1] / found[0] == pytest.approx(2.5, rel=0.02) and found[0] > 0.5 * 20.0 * arm
 

@@ -177,7 +177,7 @@ def test_results_of_prims_that_were_renamed_are_told(tmp_path):
     shot.write_text(shot.read_text().replace("/Arm/joints", "/Arm/motors").replace('"joints"', '"motors"'))
     _, changed, lost = notes(root)
     assert "another version of shot.usda" in changed
-    assert lost.startswith("calm.usda: the shot has no /Arm/joints/") and "1 more" in lost
+    assert lost.startswith("calm.usda: it has results for /Arm/joints/") and "1 more" in lost
 
 
 def test_results_of_a_shot_that_has_changed_since_are_told(tmp_path):
