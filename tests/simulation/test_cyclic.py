@@ -43,6 +43,6 @@ def test_a_root_that_is_elsewhere_at_the_end_is_refused(arm, animation):
         (np.zeros((len(times), 3)), np.roll(turned, 1, axis=1), "8.59 degrees"),
     ):
         root = MovingFrame(0, times, positions, rotations)
-        with pytest.raises(ShotError, match="not where it was") as error:
+        with pytest.raises(ShotError, match="first and the last frame of this root") as error:
             refuse_open_loops(character, dataclasses.replace(still, moving=(root,)))
         assert error.value.path == arm.joints[0].path and shown in str(error.value.found) and error.value.remedy

@@ -63,7 +63,7 @@ def test_rubber_needs_the_material_law():
 def test_a_body_that_hangs_like_a_rope_is_refused_with_the_least_modulus():
     with pytest.raises(ShotError, match="too soft for this shot") as refused:
         choice(*arm(5e6), swing(1.0), 1e-3, "/Arm")
-    least = float(re.search(r"a modulus of (\S+) Pa is the least", refused.value.remedy)[1])
+    least = float(re.search(r"author (\S+) Pa or more", refused.value.remedy)[1])
     assert choice(*arm(1.05 * least), swing(1.0), 1e-3)[0] == "neohookean"
     with pytest.raises(ShotError):
         choice(*arm(0.9 * least), swing(1.0), 1e-3)
