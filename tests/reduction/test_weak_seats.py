@@ -39,7 +39,7 @@ def test_a_block_on_a_small_boss_is_told_with_two_frequencies(helpers, body, blo
     weak = reduce_body(block, body, at, [], 0).weak_seat
     assert weak == 0
     note = weak_seat_note(block, body, at, weak)
-    own, half = (float(part.split("Hz")[0].split()[-1]) for part in (note, note.split("radius")[-1]))
+    own, half = (float(part.split()[-1]) for part in note.split(" Hz")[:2])
     assert note.startswith("/Arm/link: ") and "/Arm/roll" in note and 2.0 * half < own < 4.0 * half
     # what the shot says is not questioned
     given = replace(body, flexible=replace(body.flexible, interface_radius=0.02))

@@ -121,7 +121,7 @@ def test_joints_that_hold_one_part_of_the_surface_are_told_with_their_distance(a
     second = replace(arm.joints[0], path="/Arm/rod", body0=index, frame0=at, redundant=False)
     near = replace(arm, joints=(*arm.joints, second))
     (note,) = contact_notes(near, meshes)
-    assert note.startswith(f"{FORE}: the frames of {ELBOW} and /Arm/rod are 2 mm apart") and "one part" in note
+    assert note.startswith(f"{FORE}: the frames of {ELBOW} and /Arm/rod are 2 mm apart") and "share one" in note
     far = replace(second, frame0=replace(at, position=np.array([0.5 * LENGTH, 0.0, 0.5 * WIDTH])))
     assert list(contact_notes(replace(arm, joints=(*arm.joints, far)), meshes)) == []
 
