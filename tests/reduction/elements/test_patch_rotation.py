@@ -98,7 +98,7 @@ def on_faces(mesh, held):
     return np.unique(mesh.surface[held[mesh.surface[:, :3]].all(axis=1)])
 
 
-@pytest.mark.parametrize("curvature", [2.0, 6.0, 10.0, 12.0, 16.0, 24.0, -16.0])
+@pytest.mark.parametrize("curvature", [2.0, 12.0, 24.0, -16.0])
 def test_a_curved_seat_on_a_casting_is_not_softer_either(plastic, curvature):
     """Its ground is soft beside it: springs that hold it less let it tilt by more than its joint turns.
 
