@@ -92,7 +92,7 @@ def weak_seat_note(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFra
         return ""
     return (
         f"{body.path}: its stiffness depends on the size of the interface of {at.path}, which the shot does not "
-        f"author. Held there alone, its first frequency is {own:.4g} Hz, and {less:.4g} Hz with half of the radius. "
+        f"author. Held there alone, its first frequency is {own:.4g} Hz; with half of the radius it is {less:.4g} Hz. "
         "A GeomSubset of family calmInterface sets the size"
     )
 
