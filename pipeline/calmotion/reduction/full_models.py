@@ -34,15 +34,18 @@ class Member:
 
     @cached_property
     def key(self) -> str:
-        """Hash of what decides the model: elements, material, mass and interfaces, and no prim path."""
+        """Hash of what decides the model: elements, material, mass and interfaces, and no prim path.
+
+        A factor of its stiffness needs no factorisation of its own.
+        """
         settings, mass, mesh = self.body.flexible, self.body.mass, self.mesh
         assert settings is not None
         frames = [
             (own.frame, own.kind, None if own.surface is None else own.surface.triangles) for own in self.attachments
         ]
-        elements = (mesh.points, mesh.tets, mesh.patches, mesh.quality.stiffness_factor)
-        held = (settings.interface_radius, frames, self.root)
-        return cache_key((elements, replace(settings.material, path=""), None if mass is None else mass.mass, held))
+        material = (replace(settings.material, path=""), None if mass is None else mass.mass)
+        held = (mesh.patches, settings.interface_radius, frames, self.root)
+        return cache_key((mesh.points, mesh.tets, material, held))
 
 
 class FullModels:
@@ -79,7 +82,9 @@ class FullModels:
         with making:  # others that need it wait for it
             found = self._models.get(key)
             if found is None:
-                found = full_body(member.mesh, member.body, member.attachments, member.root)
+                quality = replace(member.mesh.quality, stiffness_factor=1.0)
+                mesh = replace(member.mesh, quality=quality)
+                found = full_body(mesh, member.body, member.attachments, member.root)
                 found.factorize()  # here, where no other model waits
             with self._lock:
                 self._wanted[key] = self._wanted.get(key, 0) - 1
@@ -87,24 +92,14 @@ class FullModels:
                     self._keep(key, found)
                 else:
                     self._models.pop(key, None)
-        return found
+        factor = member.mesh.quality.stiffness_factor
+        return found if factor == 1.0 else found.scaled(factor)
 
-    def known(self, member: Member) -> FullBody | None:
-        """The model of a body, if it is kept."""
-        return self._models.get(member.key)
-
-    def scaled(self, members: Iterable[tuple[Member, Member]]) -> FullModels:
-        """Models of bodies whose stiffness alone has changed, as far as these are kept here.
-
-        Args:
-            members: Bodies as they were and as they are.
-        """
+    def only(self, members: Iterable[Member]) -> FullModels:
+        """The models of some bodies, as far as they are kept here."""
         result = FullModels(self._keeps)
-        for before, after in members:
-            found = self.known(before)
-            if found is not None:
-                factor = after.mesh.quality.stiffness_factor / before.mesh.quality.stiffness_factor
-                result._models[after.key] = found.scaled(factor)
+        keys = {member.key for member in members}
+        result._models = {key: model for key, model in self._models.items() if key in keys}
         return result
 
     def _keep(self, key: str, model: FullBody) -> None:

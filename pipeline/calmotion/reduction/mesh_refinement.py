@@ -32,8 +32,9 @@ from calmotion.reduction.basis.natural_modes import clamped_modes
 from calmotion.reduction.cache import cached_reduction
 from calmotion.reduction.discretization_error import element_errors
 from calmotion.reduction.elements.assembly import assemble
+from calmotion.reduction.full_models import FullModels, Member
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
-from calmotion.reduction.reduce import FullBody, full_body
+from calmotion.reduction.reduce import FullBody
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +82,7 @@ class MeshController:
 
     def refined(
         self, mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], root: int | None,
-        loads: LoadEnvelope | None = None, full: FullBody | None = None,
+        loads: LoadEnvelope | None = None, models: FullModels | None = None,
     ) -> FEMesh:  # fmt: skip
         """The mesh, or a finer one, with the stiffness of ever finer ones; its quality holds the error.
 
@@ -93,7 +94,7 @@ class MeshController:
             attachments: Frames of its joints and targets.
             root: Index of that of the joint to its parent; None: nothing holds it.
             loads: Of the body, one row for each moving attachment; None: equal forces on all.
-            full: `full_body` of the mesh with its own stiffness, where it is known.
+            models: Full models that are known; those of the meshes with their own stiffness are added.
 
         Raises:
             ShotError: The body cannot be reduced.
@@ -101,21 +102,21 @@ class MeshController:
         own = replace(mesh, quality=replace(mesh.quality, stiffness_factor=1.0))
         key = ("refined", self, own, replace(body, surfaces=()), attachments, root, loads)  # skins do not matter
         try:
-            return cached_reduction(key, lambda: self._refined(own, body, attachments, root, loads, full))
+            return cached_reduction(key, lambda: self._refined(own, body, attachments, root, loads, models))
         except _NotFiner as kept:
             return kept.mesh
 
     def _refined(
         self, mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], root: int | None,
-        loads: LoadEnvelope | None, full: FullBody | None,
+        loads: LoadEnvelope | None, models: FullModels | None,
     ) -> FEMesh:  # fmt: skip
-        coarse = response(mesh, body, attachments, root, loads, self.modes, full)
+        coarse = response(mesh, body, attachments, root, loads, self.modes, models)
         nodes = self._nodes_of_finer(coarse)
         if nodes < self.fewest * coarse.nodes:
             return _with_error(mesh, 1.0, self.safety * self.recovered * coarse.error)
         finer = bisected_to(mesh, coarse.indicators, nodes, self.marked)
         try:
-            fine = response(finer, body, attachments, root, loads, self.modes, judged=False)
+            fine = response(finer, body, attachments, root, loads, self.modes, models, judged=False)
         except FactorsTooLarge as error:
             raise _NotFiner(_with_error(mesh, 1.0, self.safety * self.recovered * coarse.error)) from error
         change, left = self.extrapolated(coarse, fine)
@@ -154,12 +155,13 @@ class _NotFiner(Exception):
 
 def response(
     mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], root: int | None,
-    loads: LoadEnvelope | None, modes: int, full: FullBody | None = None, judged: bool = True,
+    loads: LoadEnvelope | None, modes: int, models: FullModels | None = None, judged: bool = True,
 ) -> Response:  # fmt: skip
     """The compliances of a body on a mesh; arguments and errors as of `MeshController.refined`.
 
     Args:
         modes: How many count.
+        models: Full models that are known; that of the mesh is added.
         judged: Whether their error by recovered strains is computed as well.
     """
     settings = body.flexible
@@ -169,7 +171,8 @@ def response(
         frequencies, shapes = clamped_modes(model, modes)
         squares, moved = (2.0 * np.pi * frequencies) ** 2, (np.zeros((*model.mesh.nodes.shape, 0)), np.zeros(0))
     else:
-        full = full or full_body(mesh, body, attachments, root)
+        models = models or FullModels(keeps=False)
+        full = models.of(Member(mesh, body, attachments, root))
         model, fixed = full.model, full.support.fixed(full.model)
         columns = fixed.lowest(modes)
         squares, U = ritz_modes(model, columns)

@@ -78,6 +78,7 @@ def reduce_body(
         elements=len(model.mesh.tets),
         elasticity=by_law.elasticity,
         left_out=left_out + by_law.told,
+        limit_m=by_law.limit_m,
         mesh_error_m=_mesh_error_at_targets(mesh_error, linear),
         mesh_error=mesh_error,
         element_error=max(1.0 / mesh.quality.stiffness_factor - 1.0, 0.0),

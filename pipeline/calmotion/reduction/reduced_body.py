@@ -100,6 +100,7 @@ class ReducedBody:
         mesh_error: Estimated relative error of its stiffness by the mesh, which makes a body too stiff; likewise.
         element_error: Relative error of the compliance of its elements, without what finer ones have told.
         damping_ratio: Fraction of critical damping of a body of several materials; None: that of its material.
+        limit_m: Estimated error that no finer reduction takes away [m].
         weak_seat: A marker whose seat seems to decide how far it bends, see `weak_seats`; None without one.
     """
 
@@ -116,6 +117,7 @@ class ReducedBody:
     mesh_error: float | None = None
     element_error: float = 0.0
     damping_ratio: float | None = None
+    limit_m: float = 0.0
     weak_seat: int | None = None
 
     @property

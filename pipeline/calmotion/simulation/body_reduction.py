@@ -87,9 +87,8 @@ class BodyReduction:
 
         def refine(index: int) -> None:
             own = members[index]
-            known = None if models is None or own.mesh.quality.stiffness_factor != 1.0 else models.known(own)
             controller = MeshController(wanted[index], max_nodes, keeps)
-            mesh = controller.refined(own.mesh, own.body, own.attachments, own.root, loads[index], known)
+            mesh = controller.refined(own.mesh, own.body, own.attachments, own.root, loads[index], models)
             finer[index] = replace(own, mesh=mesh)
 
         refined = [b for b, own in members.items() if b in wanted and (keeps == "finer" or not own.mesh.given)]
@@ -97,8 +96,7 @@ class BodyReduction:
         meshes = FEMeshes(tuple(own.mesh for own in finer.values()))
         result = BodyReduction(self.character, meshes, loads, self._repeats and models is not None)
         if models is not None:
-            same = (b for b in members if len(finer[b].mesh.tets) == len(members[b].mesh.tets))  # the same elements
-            result._full = models.scaled((members[b], finer[b]) for b in same)
+            result._full = models.only(finer.values())
         return result
 
     def release(self) -> None:

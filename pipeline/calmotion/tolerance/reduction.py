@@ -1,4 +1,4 @@
-"""Reduced bodies fine enough for a simulation: finer meshes, then finer reductions until the motion no longer changes.
+"""Reduced bodies fine enough for a simulation: finer until the motion no longer changes, then on finer meshes.
 
 What a reduction leaves out is estimated for each body by itself, at rest. In a robot that shakes it also shifts
 frequencies, and a small shift makes the motions part in time; only the simulation itself tells by how much.
@@ -47,45 +47,107 @@ def converged_reduction(
     Raises:
         ShotError: A body cannot be reduced, or the shot not be simulated.
     """
-    tolerance = requested = tolerance_of(shot.character, options.tolerance)
-
-    def simulated(*shots: CompiledShot) -> list[ReferenceRun]:
-        return in_parallel(lambda shot: reference_run(shot, options, options.step or MAX_STEP), shots)
-
-    found = None if retargeted else simulated(shot)[0]
-    known = None if found is None else found.run
-    meshed, reduction = meshes_to_tolerance(shot, reduction, options, known, progress)
-    if meshed is not shot:
-        shot, found = meshed, None
-    off, allowed = 0.0, SHARE * requested
-    for k in range(MOST):
-        progress((k + 1) / (MOST + 1), f"a reduction to {1e3 * tolerance:.2g} mm")
-        tolerance *= FINER
-        # what quadratic strain does not see has a bound of its own, and seeing all of it costs most of the time
-        bodies = reduction.bodies(tolerance, max(1.0, PAIRS * requested / tolerance))
-        if _same(shot.bodies, bodies):
-            continue
-        finer = shot.with_bodies(bodies)
-        before, then = simulated(shot, finer) if found is None else (found, *simulated(finer))
-        if then.run.integrator != before.run.integrator:  # it gave way for one of them, which differs by more
-            options = replace(options, integrator=options.scheme)
-            before, then = simulated(shot, finer)
-        off = distance(then.run.positions, before.run.positions)
-        if retargeted and found is None:
-            allowed = max(allowed, OF_SHAKE * distance(before.run.positions, intended_positions(shot, options)))
-        shot, found = finer, then
-        if off > allowed:
-            allowed = max(allowed, OF_UNCERTAINTY * uncertainty_error(shot, options, found.run))
-        if off <= allowed or (k and not retargeted and off <= OF_MESH * (mesh_error(shot, options, found.run) or 0.0)):
-            break
+    refined = _Refinement(shot, options, retargeted, progress)
+    refined.refine(reduction)
+    known = None if retargeted else refined.known().run
+    # Meshes come second: most reductions are made on the first ones, which are some times smaller.
+    meshed, finer = meshes_to_tolerance(refined.shot, reduction, options, known, progress, refined.bodies)
+    if meshed is not refined.shot:
+        reduction = finer
+        refined.shot, refined.found = meshed, None
+        if refined.off > refined.allowed:
+            refined.refine(reduction)
     reduction.release()
-    found = found or simulated(shot)[0]
+    shot, found = refined.shot, refined.known()
+    off = max(refined.off, refined.limit_m)
     free = _with_modes_by_tolerance(reduction)
     if free is not None:  # what authored modes leave out, which no finer tolerance brings back
         progress(1.0, "the same with modes by the tolerance")
-        off = max(off, distance(simulated(shot.with_bodies(free.bodies(FINER * requested)))[0].run.positions,
-                                found.run.positions))  # fmt: skip
+        other = shot.with_bodies(free.bodies(FINER * tolerance_of(shot.character, options.tolerance)))
+        off = max(off, distance(_simulated(options, other)[0].run.positions, found.run.positions))
     return ConvergedReduction(shot, off, found, reduction)
+
+
+class _Refinement:
+    """A shot whose bodies are reduced to smaller and smaller tolerances.
+
+    Args:
+        shot: With the bodies of a first reduction, to the tolerance of the options.
+        options, retargeted, progress: As of `converged_reduction`.
+
+    Attributes:
+        shot: With the bodies that are finest so far.
+        found: This shot as animated; None where it was not simulated.
+        off: How far the last refinement moved a target [m].
+        allowed: How far it may [m].
+    """
+
+    def __init__(
+        self, shot: CompiledShot, options: RunSettings, retargeted: bool, progress: Callable[[float, str], None]
+    ):
+        self._options, self._retargeted, self._progress = options, retargeted, progress
+        self._requested = self._tolerance = tolerance_of(shot.character, options.tolerance)
+        self._tried = 0
+        self.shot, self.off, self.allowed = shot, 0.0, SHARE * self._requested
+        self.found: ReferenceRun | None = None
+
+    @property
+    def limit_m(self) -> float:
+        """Estimated error that no finer reduction takes away [m]."""
+        return sum(body.limit_m for body in self.shot.bodies)
+
+    def known(self) -> ReferenceRun:
+        """The shot as animated."""
+        self.found = self.found or _simulated(self._options, self.shot)[0]
+        return self.found
+
+    def bodies(self, reduction: BodyReduction) -> list[ReducedBody]:
+        """The bodies of a reduction to the tolerance that the shot has so far."""
+        return self._reduced(reduction, self._tolerance)
+
+    def refine(self, reduction: BodyReduction) -> None:
+        """Take finer bodies until these move no target by more than is allowed, or something else is worse."""
+        tolerance = self._tolerance
+        while self._tried < MOST and self.limit_m <= self.allowed:
+            self._tried += 1
+            self._progress(self._tried / (MOST + 1), f"a reduction to {1e3 * tolerance:.2g} mm")
+            tolerance *= FINER
+            bodies = self._reduced(reduction, tolerance)
+            if _same(self.shot.bodies, bodies):
+                continue
+            self._tolerance = tolerance
+            self._compare(self.shot.with_bodies(bodies))
+            if self.off <= self.allowed or (self._tried > 1 and self._meshes_are_worse()):
+                return
+
+    def _reduced(self, reduction: BodyReduction, tolerance: float) -> list[ReducedBody]:
+        # what quadratic strain does not see has a bound of its own, and seeing all of it costs most of the time
+        return reduction.bodies(tolerance, max(1.0, PAIRS * self._requested / tolerance))
+
+    def _compare(self, finer: CompiledShot) -> None:
+        if self.found is None:
+            before, then = _simulated(self._options, self.shot, finer)
+        else:
+            before, then = self.found, *_simulated(self._options, finer)
+        if then.run.integrator != before.run.integrator:  # it gave way for one of them, which differs by more
+            self._options = replace(self._options, integrator=self._options.scheme)
+            before, then = _simulated(self._options, self.shot, finer)
+        self.off = distance(then.run.positions, before.run.positions)
+        if self._retargeted:
+            shake = distance(before.run.positions, intended_positions(self.shot, self._options))
+            self.allowed = max(self.allowed, OF_SHAKE * shake)
+        self.shot, self.found = finer, then
+        if self.off > self.allowed:
+            self.allowed = max(self.allowed, OF_UNCERTAINTY * uncertainty_error(finer, self._options, then.run))
+
+    def _meshes_are_worse(self) -> bool:
+        if self._retargeted:
+            return False
+        return self.off <= OF_MESH * (mesh_error(self.shot, self._options, self.known().run) or 0.0)
+
+
+def _simulated(options: RunSettings, *shots: CompiledShot) -> list[ReferenceRun]:
+    return in_parallel(lambda shot: reference_run(shot, options, options.step or MAX_STEP), shots)
 
 
 def _with_modes_by_tolerance(reduction: BodyReduction) -> BodyReduction | None:

@@ -50,6 +50,8 @@ class Basis:
         first_order: Of a basis with modal derivatives: its c linear modes in its coordinates, shape [r, c].
         second_order: Of a basis with modal derivatives: the derivatives of the pairs in its coordinates, shape
             [r, pairs].
+        dropped: Of a basis with modal derivatives: share of the largest strain energy among them that the largest of
+            those has which there was no room for.
     """
 
     modes: Array
@@ -61,6 +63,7 @@ class Basis:
     load_envelope: LoadEnvelope | None = None
     first_order: Array | None = None
     second_order: Array | None = None
+    dropped: float = 0.0
 
 
 @one_blas_thread()

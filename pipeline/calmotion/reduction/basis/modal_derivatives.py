@@ -36,6 +36,7 @@ from calmotion.reduction.elements.patch_rotation import (
 )
 from calmotion.support import interrupts
 
+MOST = 40  # directions of derivatives that are kept; the cost goes with the fourth power (samples have up to 37)
 NEGLIGIBLE = 1e-3  # square root of the negligible share of the largest strain energy among the derivatives
 
 
@@ -197,8 +198,9 @@ def extended_basis(
     extra, moved, change_sizes = extra * scale, moved * scale, change_sizes * scale
     energy, directions = np.linalg.eigh(strain_energy * np.outer(scale, scale))
     dropped = negligible**2
-    keep = directions[:, energy > dropped]
-    extra, moved = extra @ keep, moved @ keep
+    kept = np.flatnonzero(energy > dropped)[-MOST:]
+    left = float(energy[: kept[0]].max(initial=0.0)) if len(kept) == MOST else 0.0
+    extra, moved = extra @ directions[:, kept], moved @ directions[:, kept]
     # the changes of shape that rotations of the patches cause; a missing one would make the springs resist the rotation
     root = _root(shapes.T @ (K @ shapes))
     strain, strength, _ = np.linalg.svd(root @ change_sizes, full_matrices=False)
@@ -222,6 +224,7 @@ def extended_basis(
         patch_squares=np.ascontiguousarray(shape @ U),
         first_order=result.T @ (M @ modes),
         second_order=result.T @ (M @ derivatives.fields.reshape(3 * n, -1)),
+        dropped=left if left > dropped else 0.0,
     )
 
 

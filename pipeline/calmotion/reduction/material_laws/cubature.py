@@ -24,6 +24,7 @@ ERROR = 2e-5
 POSES = 24
 _BATCH = 4  # points added between two solutions for the weights
 _MOST = 600
+_MOST_COORDINATES = 48  # of whose stiffness twice as many entries are matched as there may be points
 LEAST_VOLUME = 0.2  # volume ratio below which the logarithm of the law is continued as a parabola
 _CANDIDATES = 10_000  # candidate points, a random choice on large meshes
 
@@ -39,6 +40,9 @@ def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial)
     Raises:
         ShotError: No set of points meets `ERROR`.
     """
+    r = len(basis.omega_squared)
+    if r > _MOST_COORDINATES:
+        raise _inaccurate(material, f"{r} elastic coordinates, of which {_MOST_COORDINATES} can be integrated")
     lame, mu = lame_constants(material.youngs_modulus, material.poissons_ratio)
     rule = GradientRule(model.mesh, LAW_ORDER)
     gram = strain_gram(rule, basis.modes, lame, mu)
@@ -46,19 +50,23 @@ def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial)
     candidates, columns, target = _training(rule, basis, poses, lame, mu)
     chosen, weights, error = greedy_cubature(columns, target, ERROR, _MOST)
     if error > 10.0 * ERROR:
-        raise ShotError(
-            "no cubature of the Neo-Hookean energy is accurate enough",
-            path=material.path,
-            attribute="calm:flexible:elasticity",
-            found=f"error {error:.2%} with {len(chosen)} points",
-            remedy="Use stvk, which needs no cubature, or a coarser mesh.",
-        )
+        raise _inaccurate(material, f"error {error:.2%} with {len(chosen)} points")
     C = linear_tangent(lame, mu)
     points = candidates[chosen]
     correction = np.diag(basis.omega_squared) - np.einsum("c,cmi,mn,cnj->ij", weights, points, C, points, optimize=True)
     correction = 0.5 * (correction + correction.T)
     packed = np.hstack([weights[:, None], points.reshape(len(chosen), -1)])
     return np.concatenate([correction.ravel(), packed.ravel()]), len(chosen)
+
+
+def _inaccurate(material: ElasticMaterial, found: str) -> ShotError:
+    return ShotError(
+        "no cubature of the Neo-Hookean energy is accurate enough",
+        path=material.path,
+        attribute="calm:flexible:elasticity",
+        found=found,
+        remedy="Use stvk, which needs no cubature.",
+    )
 
 
 def _training(rule: GradientRule, basis: Basis, poses: Array, lame: float, mu: float) -> tuple[Array, Array, Array]:

@@ -20,7 +20,7 @@ from calmotion.reduction.material_laws.bending import Bending
 from calmotion.reduction.reduced_body import Elasticity
 
 PAIRED_MODES = 16  # largest number of modes with derivatives
-_NEGLIGIBLE_ENERGY = 1e-3  # share of the derivatives' strain energy, times the tolerance over the body's size
+NEGLIGIBLE_ENERGY = 1e-3  # share of the derivatives' strain energy, times the tolerance over the body's size
 _FINEST = 1e-6  # rounding
 
 
@@ -49,7 +49,7 @@ def large_deflection(
         basis, deflections = bending.basis, bending.amplitude
         known = bending.derivatives if law == "stvk" else None
     size = float(np.ptp(model.mesh.nodes, axis=0).max())
-    negligible = float(np.clip(np.sqrt(_NEGLIGIBLE_ENERGY * tolerance / size), _FINEST, NEGLIGIBLE))
+    negligible = float(np.clip(np.sqrt(NEGLIGIBLE_ENERGY * tolerance / size), _FINEST, NEGLIGIBLE))
     stiff = stiffer(tolerance)
     extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible, deflections, stiff, known)
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)

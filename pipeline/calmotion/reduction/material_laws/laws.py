@@ -6,6 +6,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
+from calmotion.errors import ShotError
 from calmotion.model.character import FlexibleSettings
 from calmotion.model.result import Simplification
 from calmotion.model.tolerance import REDUCTION
@@ -15,7 +18,7 @@ from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.bending import Bending
 from calmotion.reduction.material_laws.deflection import Deflection, deflection_under
-from calmotion.reduction.material_laws.large_deflection import large_deflection
+from calmotion.reduction.material_laws.large_deflection import NEGLIGIBLE_ENERGY, large_deflection
 from calmotion.reduction.reduced_body import Elasticity
 
 _LARGE_STRAIN = 0.1  # below, the bound of the loads is too pessimistic to require a nonlinear material
@@ -89,11 +92,13 @@ class BodyByLaw:
         basis: With modal derivatives where the law is not linear.
         elasticity: None of a linear body.
         told: What is simplified.
+        limit_m: Estimated error that no smaller tolerance takes away [m].
     """
 
     basis: Basis
     elasticity: Elasticity | None
     told: tuple[Simplification, ...]
+    limit_m: float = 0.0
 
 
 def law_for(deflection: Deflection, tolerance: float) -> MaterialLaw:
@@ -129,6 +134,7 @@ def reduced_by_law(
     loads = basis.load_envelope or load_envelope
     bending = Bending.by_loads(model, support, basis, material, loads)
     told: tuple[Simplification, ...] = ()
+    deflection: Deflection | None = None
     if law is None:
         assert bending.derivatives is not None
         deflection = deflection_under(model, bending.basis, bending.derivatives, material, load_envelope, path)
@@ -137,10 +143,23 @@ def reduced_by_law(
         if law is linear:
             return BodyByLaw(basis, None, told)
     bending = bending.with_third_order(model, support, material, loads, tolerance)
-    longer, elasticity = large_deflection(
-        model, support, basis, material, law.name, load_envelope, tolerance, settings.pairs_share, bending
-    )
-    return BodyByLaw(longer, elasticity, told + _locking(bending, path, tolerance) + _omitted_strain(elasticity, path))
+
+    def by_law(law: MaterialLaw) -> tuple[Basis, Elasticity]:
+        return large_deflection(
+            model, support, basis, material, law.name, load_envelope, tolerance, settings.pairs_share, bending
+        )
+
+    try:
+        longer, elasticity = by_law(law)
+    except ShotError:
+        if deflection is None or law is not LAWS[-1]:
+            raise
+        law = LAWS[1]  # nobody asked for another
+        longer, elasticity = by_law(law)
+        told = _told(law, path, law.why(deflection), law.error_m(deflection))
+    limits = (*_locking(bending, path, tolerance), *_no_room(model, longer, path, tolerance))
+    limit = sum(row.estimated_error_m or 0.0 for row in limits)
+    return BodyByLaw(longer, elasticity, (*told, *limits, *_omitted_strain(elasticity, path)), limit)
 
 
 def _told(law: MaterialLaw, path: str, why: str, error_m: float | None) -> tuple[Simplification, ...]:
@@ -155,6 +174,16 @@ def _locking(bending: Bending, path: str, tolerance: float) -> tuple[Simplificat
         return ()
     why = "bending flattens wide thin strips in more ways than its modes have"
     return (Simplification(f"{path}: too stiff under large deflections", why, bending.missing_m, REDUCTION),)
+
+
+def _no_room(model: FEModel, basis: Basis, path: str, tolerance: float) -> tuple[Simplification, ...]:
+    """That a body deflects in more ways than its basis has room for, where this is not negligible."""
+    error = basis.dropped * float(np.ptp(model.mesh.nodes, axis=0).max()) / NEGLIGIBLE_ENERGY
+    if error <= tolerance:
+        return ()
+    what = f"{path}: {len(basis.omega_squared)} elastic coordinates, the most there are"
+    why = "this shot deflects it in more ways; a step that no motor can follow does so, which smooth keys mend"
+    return (Simplification(what, why, error, REDUCTION),)
 
 
 def _omitted_strain(law: Elasticity, path: str) -> tuple[Simplification, ...]:

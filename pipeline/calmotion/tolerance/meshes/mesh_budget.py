@@ -34,15 +34,18 @@ _SOFTEST = 0.5  # factor of a stiffness or a strain; a mesh that is off by more 
 def meshes_to_tolerance(
     shot: CompiledShot, reduction: BodyReduction, options: RunSettings,
     run: StepRun | None, progress: Callable[[float, str], None] = lambda fraction, message: None,
+    bodies: Callable[[BodyReduction], list[ReducedBody]] | None = None,
 ) -> tuple[CompiledShot, BodyReduction]:  # fmt: skip
     """The shot and its reduction on meshes that keep their share of the tolerance, as far as the limit of nodes allows.
 
     Args:
-        shot: With the bodies of a first reduction.
+        shot: With reduced bodies.
         reduction: Which made them.
         options: With the tolerance.
         run: The shot as animated; None where its shake will be removed, and with it the effect of the stiffness on its
             frequencies.
+        progress: Called with a fraction and the body at hand.
+        bodies: Makes the bodies on the finer meshes; None: to the tolerance.
 
     Raises:
         ShotError: A body cannot be reduced, or the shot not be simulated.
@@ -66,7 +69,8 @@ def meshes_to_tolerance(
         return shot, reduction
     finer = reduction.with_finer_meshes(options.tolerance, wanted, MOST_NODES, progress)
     reduction.release()
-    return shot.with_bodies(finer.bodies(options.tolerance, progress=progress)), finer
+    made = finer.bodies(options.tolerance, progress=progress) if bodies is None else bodies(finer)
+    return shot.with_bodies(made), finer
 
 
 def mesh_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float | None:
