@@ -108,3 +108,17 @@ def test_what_authored_modes_leave_out_is_a_part_of_the_error(arm, animation, me
     converged = refined(limited, animation, meshes, 1e-3)
     off = np.linalg.norm(simulate_at(converged.shot, BY, STEP).positions - fine[1], axis=2).max()
     assert off > 4e-4 and converged.error_m == pytest.approx(off, rel=0.2)
+
+
+def test_a_reduction_without_room_is_neither_refined_nor_meshed_again(arm, animation, meshes, monkeypatch):
+    def without_room(*arguments):
+        return [
+            dataclasses.replace(body, limit_m=0.02 if len(body.stiffness) else 0.0)
+            for body in reduce_bodies(*arguments)
+        ]
+
+    monkeypatch.setattr(body_reduction, "reduce_bodies", without_room)
+    monkeypatch.setattr(module, "meshes_to_tolerance", None)
+    converged = refined(arm, animation, meshes, 1e-3)
+    assert converged.error_m >= 0.02
+    assert count(converged.shot) == count(reduced_shot(arm, animation, meshes, RunSettings(tolerance=1e-3)))

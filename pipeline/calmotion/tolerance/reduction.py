@@ -49,14 +49,14 @@ def converged_reduction(
     """
     refined = _Refinement(shot, options, retargeted, progress)
     refined.refine(reduction)
-    known = None if retargeted else refined.known().run
     # Meshes come second: most reductions are made on the first ones, which are some times smaller.
-    meshed, finer = meshes_to_tolerance(refined.shot, reduction, options, known, progress, refined.bodies)
-    if meshed is not refined.shot:
-        reduction = finer
-        refined.shot, refined.found = meshed, None
-        if refined.off > refined.allowed:
-            refined.refine(reduction)
+    if refined.limit_m <= refined.allowed:
+        known = None if retargeted else refined.known().run
+        meshed, finer = meshes_to_tolerance(refined.shot, reduction, options, known, progress, refined.bodies)
+        if finer is not reduction:
+            reduction, refined.shot, refined.found = finer, meshed, None
+            if refined.off > refined.allowed:
+                refined.refine(reduction)
     reduction.release()
     shot, found = refined.shot, refined.known()
     off = max(refined.off, refined.limit_m)

@@ -39,16 +39,14 @@ def with_flexible(member, **changes):
 
 def test_links_that_are_alike_have_one_model(member):
     models = FullModels(keeps=True)
-    assert models.known(member) is None
-    assert models.of(member) is models.of(alike(member)) is models.known(member)
+    assert models.of(member) is models.of(alike(member))
 
 
 def test_what_decides_a_model_tells_links_apart(member, helpers, plastic):
-    mesh, quality = member.mesh, member.mesh.quality
+    mesh = member.mesh
     moved = replace(member.attachments[0], frame=helpers.frame(0.19, 0.0, 0.0))
     others = [
         replace(member, mesh=replace(mesh, points=mesh.points * 1.001)),
-        replace(member, mesh=replace(mesh, quality=replace(quality, stiffness_factor=0.9))),
         replace(member, attachments=[moved, member.attachments[1]]),
         replace(member, root=0),
         with_flexible(member, interface_radius=0.01),
@@ -79,15 +77,37 @@ def test_threads_that_need_one_model_make_it_once(member, monkeypatch):
     assert len(made) == 1 and found[0] is found[1] is found[2]
 
 
-def test_models_are_scaled_where_the_stiffness_alone_has_changed(member):
+def softer(member):
+    """The link with a factor of its stiffness, which is known from finer meshes."""
+    return replace(member, mesh=replace(member.mesh, quality=replace(member.mesh.quality, stiffness_factor=0.8)))
+
+
+def test_a_factor_of_the_stiffness_needs_no_factorisation(member, monkeypatch):
+    from calmotion.reduction import reduce
+
     models = FullModels(keeps=True)
-    own = models.of(member)
-    softer = replace(member, mesh=replace(member.mesh, quality=replace(member.mesh.quality, stiffness_factor=0.8)))
-    scaled = models.scaled([(member, softer)]).known(softer)
-    fresh = FullModels(keeps=True).of(softer)
-    for found in (scaled, fresh):
+    own, made = models.of(member), reduce.full_body
+    monkeypatch.setattr(reduce, "full_body", None)
+    scaled = models.of(softer(member))
+    monkeypatch.setattr(reduce, "full_body", made)
+    material = member.body.flexible.material
+    weak = with_flexible(member, material=replace(material, youngs_modulus=0.8 * material.youngs_modulus))
+    for found in (scaled, FullModels(keeps=True).of(softer(member)), models.of(weak)):
         stiffness = found.support.fixed(found.model).patch_stiffness()
         np.testing.assert_allclose(
             stiffness, 0.8 * own.support.fixed(own.model).patch_stiffness(), rtol=1e-9, atol=1e-6
         )
-    assert models.scaled([(softer, member)]).known(member) is None
+
+
+def test_models_of_other_bodies_are_let_go(member, monkeypatch):
+    from calmotion.reduction import reduce
+
+    models, other = FullModels(keeps=True), replace(member, root=0)
+    kept = models.of(member)
+    models.of(other)
+    few = models.only([softer(member)])
+    made = []
+    monkeypatch.setattr(reduce, "full_body", lambda *args: made.append(args) or kept)
+    assert few.of(member) is kept and not made
+    few.of(other)
+    assert len(made) == 1

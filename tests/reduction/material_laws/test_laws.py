@@ -7,12 +7,14 @@ import pytest
 from boxes import box_tets
 from calmotion.errors import ShotError
 from calmotion.model import ElasticMaterial, FlexibleSettings
+from calmotion.reduction.basis import modal_derivatives as modal_derivatives_module
 from calmotion.reduction.basis.craig_bampton import reduced_basis
 from calmotion.reduction.basis.modal_derivatives import Support, modal_derivatives
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.load_envelope import LoadEnvelope
+from calmotion.reduction.material_laws import cubature
 from calmotion.reduction.material_laws.deflection import MODES, deflection_of, deflection_under, work_of_loads
-from calmotion.reduction.material_laws.laws import law_for
+from calmotion.reduction.material_laws.laws import law_for, reduced_by_law
 
 LENGTH, PAYLOAD = 0.6, 0.2
 
@@ -54,6 +56,36 @@ def test_a_slow_swing_is_linear_and_a_fast_one_is_not():
     assert 1e-3 < choice(*body, swing(1.0), 1.0)[1] < 30e-3
     # the same swing with a tolerance that allows it
     assert choice(*body, swing(1.0), 1.0)[0] == "linear"
+
+
+def by_law(monkeypatch, **limits):
+    """An arm of soft rubber that swings fast, reduced with other limits."""
+    for name, value in limits.items():
+        monkeypatch.setattr(*LIMITS[name], value)
+    model, support, basis, material = arm(1.6e7)
+    settings = FlexibleSettings(material)
+    return reduced_by_law(model, support, basis, settings, swing(1.0), 1e-3, "/Arm/Link")
+
+
+LIMITS = {"derivatives": (modal_derivatives_module, "MOST"), "cubature": (cubature, "_MOST_COORDINATES")}
+
+
+def test_a_law_that_cannot_be_evaluated_gives_way_to_the_next_one_with_its_error(monkeypatch):
+    found = by_law(monkeypatch, cubature=3)
+    row = next(row for row in found.told if "linear material" in row.what)
+    assert found.elasticity.law == "stvk" and row.estimated_error_m > 1e-3
+    model, support, basis, material = arm(1.6e7)
+    asked = FlexibleSettings(material, elasticity="neohookean")
+    with pytest.raises(ShotError, match="accurate enough"):
+        reduced_by_law(model, support, basis, asked, swing(1.0), 1e-3, "/Arm/Link")
+
+
+def test_a_body_that_deflects_in_more_ways_than_there_is_room_for_is_told(monkeypatch):
+    few = by_law(monkeypatch, cubature=3, derivatives=2)
+    row = next(row for row in few.told if "the most there are" in row.what)
+    assert row.estimated_error_m > 1e-3 and few.limit_m >= row.estimated_error_m
+    every = by_law(monkeypatch, cubature=3, derivatives=40)
+    assert every.limit_m == 0.0 and len(every.basis.omega_squared) > len(few.basis.omega_squared)
 
 
 def test_rubber_needs_the_material_law():

@@ -196,16 +196,13 @@ def extended_basis(
     second_energy = max(float(np.linalg.eigvalsh(strain_energy)[-1]), np.finfo(float).tiny)
     scale = np.sqrt(np.maximum(share**2 / first_energy, 1.0 / second_energy))
     extra, moved, change_sizes = extra * scale, moved * scale, change_sizes * scale
-    energy, directions = np.linalg.eigh(strain_energy * np.outer(scale, scale))
-    dropped = negligible**2
-    kept = np.flatnonzero(energy > dropped)[-MOST:]
-    left = float(energy[: kept[0]].max(initial=0.0)) if len(kept) == MOST else 0.0
-    extra, moved = extra @ directions[:, kept], moved @ directions[:, kept]
+    kept, dropped = _largest(strain_energy * np.outer(scale, scale), negligible**2)
+    extra, moved = extra @ kept, moved @ kept
     # the changes of shape that rotations of the patches cause; a missing one would make the springs resist the rotation
     root = _root(shapes.T @ (K @ shapes))
     strain, strength, _ = np.linalg.svd(root @ change_sizes, full_matrices=False)
     most = max((stiffness_of(int(own.any(axis=0).sum()), stiff) for own in derivatives.changes), default=0.0)
-    taken = np.linalg.pinv(root) @ strain[:, most * strength**2 > dropped]
+    taken = np.linalg.pinv(root) @ strain[:, most * strength**2 > negligible**2]
     ritz = np.hstack([modes, extra, shapes @ taken])
     motion = np.concatenate([basis.patch_motion, moved, shape_motion @ taken], axis=2)
     none = np.zeros((p, 6, modes.shape[1] + extra.shape[1]))
@@ -224,8 +221,16 @@ def extended_basis(
         patch_squares=np.ascontiguousarray(shape @ U),
         first_order=result.T @ (M @ modes),
         second_order=result.T @ (M @ derivatives.fields.reshape(3 * n, -1)),
-        dropped=left if left > dropped else 0.0,
+        dropped=dropped,
     )
+
+
+def _largest(energy: Array, negligible: float) -> tuple[Array, float]:
+    """Directions of the largest energies, and that of the largest which there is no room for; 0 without one."""
+    values, directions = np.linalg.eigh(energy)
+    first = len(values) - min(int(np.count_nonzero(values > negligible)), MOST)
+    left = float(values[:first].max(initial=0.0))
+    return directions[:, first:], left if left > negligible else 0.0
 
 
 def _moved(model: FEModel, basis: Basis, derivatives: Derivatives, deflections: Array) -> Array:

@@ -64,10 +64,10 @@ class Bending:
             _ALLOWED * tolerance / deflection,
         )  # fmt: skip
         if found.basis is self.basis:
-            return replace(self, missing_m=found.missing * deflection)
+            return replace(self, missing_m=min(found.missing, 1.0) * deflection)
         by_loads = _by_loads(model, found.basis, load_envelope)
         basis, amplitude = _ordered(found.basis, np.maximum(by_loads, found.amplitude / OVERSHOOT))
-        return Bending(basis, amplitude, None, found.missing * deflection)
+        return Bending(basis, amplitude, None, min(found.missing, 1.0) * deflection)
 
 
 def searle_number(nodes: Array, deflection: float) -> float:
