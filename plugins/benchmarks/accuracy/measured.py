@@ -8,12 +8,14 @@ shots as they are, and, for each parameter, how often the 95% interval of a fit 
 that shares no recording with it. `--most` takes that many fits, spread over all of them.
 
 The error of a strain gauge, whose gain and free swing at the start are fitted, is the share of its signal's shake that
-is left. Without a folder, the command compares a published cantilever with its finite elements.
+is left. A folder with `beam.toml` (the entries of `two_mode_beam.Strip`) gets the same from an independent model of its
+strip too. Without a folder, the command compares a published cantilever with its finite elements.
 """
 
 from __future__ import annotations
 
 import argparse
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -37,9 +39,10 @@ from calmotion_plugins.calibration import (
     robot_with,
     signals_of,
 )
+from scipy.interpolate import CubicSpline
 
 from ..common.reporting import bench_parser, finish, keep, say
-from . import cantilever
+from . import cantilever, two_mode_beam
 
 CLOCK = 0.02  # standard deviation of the clocks, which begin with the commands [s]
 STEP = 4e-3  # of the predictions [s]
@@ -110,6 +113,28 @@ def _left(signals: Signals, channel: Channel, place: Any, gain: float | None) ->
     )
     off = values - (0.0 if gain is None else gain) * answer[:, 0]
     return float((off - free @ np.linalg.lstsq(free, off, rcond=None)[0]).std() / values.std())
+
+
+def beam_rows(folder: Path, machine: Machine, fits: Sequence[tuple[str, ...]]) -> list[Predicted]:
+    """What an independent two-mode beam predicts of the recordings of strips; none for another machine."""
+    file = folder / "beam.toml"
+    if not file.is_file():
+        return []
+    strip = two_mode_beam.Strip(**tomllib.loads(file.read_text(encoding="utf-8")))
+    readings = {}
+    for name, (shot, recordings) in machine.takes.items():
+        (track,), channel = shot.animation.current, recordings[0].channels[0]
+        hub = CubicSpline(shot.animation.frame_times, track.values)
+        inside = (channel.times >= 0.0) & (channel.times <= shot.animation.frame_times[-1])
+        times = channel.times[inside]
+        readings[name] = two_mode_beam.Reading(times, hub(times), channel.values[inside, 0])
+    rows = []
+    for own in fits:
+        found = two_mode_beam.fitted(strip, [readings[name] for name in own])
+        left = [two_mode_beam.predicted(found, reading) for name, reading in readings.items() if name not in own]
+        told = f"{found.frequencies[0]:.3g} Hz, damping {found.damping:.3g}, {found.modulus:.3g} of the modulus"
+        rows.append(Predicted(f"beam: {', '.join(own)}", float(np.mean(left)), np.nan, told))
+    return rows
 
 
 def machine_in(folder: Path) -> Machine:
@@ -209,6 +234,7 @@ def main(arguments: list[str] | None = None) -> int:
     rows += [
         Predicted("median", float(np.median(errors)), float(np.mean(as_they_are)), ""),
         Predicted("largest", max(errors), max(as_they_are), ""),
+        *beam_rows(Path(options.folder), machine, list(fits)),
     ]
     lines = [f"in the 95% interval, {name}: {a} of {n}" for name, (a, n) in inside.items()]
     finish(options, "Predictions of a real machine", rows, lines=lines, in_the_95_percent_interval=inside)

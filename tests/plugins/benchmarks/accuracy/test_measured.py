@@ -1,11 +1,15 @@
 """`calmotion bench measured`: which recordings are fitted together, and how often intervals hold."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from calmotion import ShotError
 from calmotion_plugins.benchmarks.accuracy.cantilever import MEASURED, cantilever
 from calmotion_plugins.benchmarks.accuracy.measured import choices, covered, machine_in
+from calmotion_plugins.benchmarks.accuracy.two_mode_beam import Reading, Strip, fitted, predicted
 from calmotion_plugins.calibration import Calibration, Estimate
+from scipy.interpolate import CubicSpline
 
 NAMES = ("sweep_100", "sweep_400", "hold_100", "hold_400")
 
@@ -39,3 +43,38 @@ def test_three_frequencies_of_a_published_cantilever_follow_from_its_geometry_an
     found, modulus = cantilever()
     assert np.abs(found / MEASURED - 1.0).max() < 0.015
     assert 1.5e11 < modulus < 2.2e11
+
+
+STRIP = Strip(0.2, 0.076, 0.00127, 0.08, 7850.0, 2e11, 1.5, 0.05, 2.0, 0.9)
+
+
+def motion(turn, seconds):
+    times = np.arange(0.0, 4.0, 1 / 500)
+    s = np.clip(times / seconds, 0.0, 1.0)
+    return times, turn * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+
+
+def recorded(turn, seconds, factor=0.7, damping=0.05, gain=1.2):
+    """A strip of another modulus, by its equations of motion."""
+    from scipy.integrate import solve_ivp
+
+    times, hub = motion(turn, seconds)
+    spline = CubicSpline(times, hub)
+    w, turned, strains = dataclasses.replace(STRIP, modulus=factor * STRIP.modulus).modes()
+    f, z = 2.0 * np.pi * STRIP.corner, STRIP.filter_damping
+
+    def rates(t, y):
+        q, v, s, sv = y[:2], y[2:4], y[4], y[5]
+        force = -2.0 * damping * w * v - w**2 * q - turned * spline(t, 2)
+        return np.concatenate([v, force, [sv, f * f * (strains @ q - s) - 2.0 * z * f * sv]])
+
+    start = [1e-3, 0.0, 0.0, 0.0, strains[0] * 1e-3, 0.0]
+    found = solve_ivp(rates, (0.0, times[-1]), start, t_eval=times, rtol=1e-8, atol=1e-11, max_step=0.01)
+    return Reading(times, hub, gain * found.y[4] + 0.01)
+
+
+def test_a_beam_of_two_modes_tells_modulus_damping_and_gain_of_a_strip_and_predicts_another_motion():
+    found = fitted(STRIP, [recorded(0.5, 0.8)])
+    assert found.modulus == pytest.approx(0.7, rel=0.01) and found.damping == pytest.approx(0.05, rel=0.05)
+    assert found.gain == pytest.approx(1.2, rel=0.02) and found.left < 0.02
+    assert predicted(found, recorded(-0.8, 1.1)) < 0.03
