@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import ON_ERROR, Motor
+from calmotion.model import ON_ERROR, PRESCRIBED, Motor
 from calmotion.multibody import SimulationFailure
 from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, Channel, SensorRecording
 from calmotion.simulation import CompiledShot
@@ -111,6 +111,8 @@ def _joint(path: str, m: int, motor: Motor | None, mechanics: Mechanics | None, 
     acceleration = np.gradient(np.gradient(command, times, edge_order=2), times, edge_order=2)
     load = torque - inertia * acceleration
     rotor = motor.rotor
+    if motor.model == PRESCRIBED:  # gains of a drive that this shot does not use
+        return Joint(path, inertia + rotor.armature, load, torque, slope, delay=motor.delay)
     return Joint(
         path, inertia + rotor.armature, load, torque, slope, motor.position_gain,
         motor.velocity_gain + rotor.viscous_friction + rotor.back_emf,

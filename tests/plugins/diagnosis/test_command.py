@@ -114,9 +114,16 @@ def test_the_answer_comes_first_and_figures_are_written(calmotion, tmp_path, mot
     assert f"<p>{done.stdout.splitlines()[0]}</p>" in page and "Motion and error" in page and "take.csv" in page
 
 
-def test_a_shot_knows_its_command_and_refuses_what_it_does_not_have(calmotion, tmp_path):
+# of a drive that this shot does not use: its motors follow exactly
+UNUSED = "        float drive:angular:physics:stiffness = 0.05\n        float drive:angular:physics:damping = 0.0001\n"
+
+
+@pytest.mark.parametrize("gains", ["", UNUSED])
+def test_a_shot_knows_its_command_and_refuses_what_it_does_not_have(calmotion, tmp_path, gains):
     shot = tmp_path / "robot.usda"
-    shot.write_text(ONE_HINGE)
+    at = "        float drive:angular:physics:targetPosition"
+    assert at in ONE_HINGE
+    shot.write_text(ONE_HINGE.replace(at, gains + at))
     times = np.arange(0.0, 1.3, 0.005)
     frames = np.radians([0.0, 10.0, 30.0, 20.0, 0.0])
     turn = CubicSpline(np.arange(5) * 0.25, frames)(np.clip(times, 0.0, 1.0))
