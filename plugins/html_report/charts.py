@@ -63,7 +63,7 @@ def _panel(axes: Axes, xlabel: str, packing: Packing, points: int) -> dict[str, 
     spans = [
         patch.get_extents().transformed(axes.transData.inverted()).intervalx.tolist()
         for patch in axes.patches
-        if patch.get_transform().contains_branch_seperately(axes.transData) == (True, False)
+        if patch.get_data_transform().contains_branch_seperately(axes.transData) == (True, False)
     ]
     bars = [
         {"points": segment.tolist(), "color": _color(collection.get_color()[0])}

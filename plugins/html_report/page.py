@@ -94,7 +94,7 @@ def three() -> str:
             "trimesh has no viewer with three.js",
             path="--html",
             found=f"trimesh {trimesh.__version__}",
-            remedy="Install another version: pip install 'trimesh>=4.6,<5'",
+            remedy="Install another version: pip install 'trimesh>=4.11,<6'",
         )
     return viewer[begin + len("<script>") : end.end()]
 
