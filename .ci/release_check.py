@@ -45,6 +45,12 @@ class Counts:
         return cls(tests - failed - errors - skipped, failed + errors, skipped)
 
 
+def is_here(number: str) -> bool:
+    """Whether a Python can be run; names that pyenv has for others are on the PATH, too."""
+    python = shutil.which(f"python{number}")
+    return python is not None and subprocess.run([python, "--version"], capture_output=True).returncode == 0
+
+
 def installed(name: str, python: str) -> Path:
     """The interpreter of an environment with the lowest or newest versions."""
     folder = ROOT / f".venv-{name}"
@@ -76,8 +82,8 @@ def written(page: str, rows: list[str]) -> str:
 
 def main(tests: list[str]) -> int:
     """Run both; the exit status."""
-    newest = next((number for number in PYTHONS if shutil.which(f"python{number}")), None)
-    if newest is None or not shutil.which(f"python{LOWEST}"):
+    newest = next((number for number in PYTHONS if is_here(number)), None)
+    if newest is None or not is_here(LOWEST):
         print(f"error: Python {LOWEST} is needed on the PATH", file=sys.stderr)
         return 1
     rows, failed = [], 0
