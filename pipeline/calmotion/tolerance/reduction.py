@@ -103,7 +103,7 @@ class _Refinement:
 
     def bodies(self, reduction: BodyReduction) -> list[ReducedBody]:
         """The bodies of a reduction to the tolerance that the shot has so far."""
-        return self._reduced(reduction, self._tolerance)
+        return self._reduced(reduction, self._tolerance, self._progress)
 
     def refine(self, reduction: BodyReduction) -> None:
         """Take finer bodies until these move no target by more than is allowed, or something else is worse."""
@@ -120,11 +120,14 @@ class _Refinement:
             if self.off <= self.allowed or (self._tried > 1 and self._meshes_are_worse()):
                 return
 
-    def _reduced(self, reduction: BodyReduction, tolerance: float) -> list[ReducedBody]:
+    def _reduced(
+        self, reduction: BodyReduction, tolerance: float, progress: Callable[[float, str], None] | None = None
+    ) -> list[ReducedBody]:
         # what quadratic strain does not see has a bound of its own, and seeing all of it costs most of the time
-        return reduction.bodies(tolerance, max(1.0, PAIRS * self._requested / tolerance))
+        return reduction.bodies(tolerance, max(1.0, PAIRS * self._requested / tolerance), progress)
 
     def _compare(self, finer: CompiledShot) -> None:
+        first = self.found is None
         if self.found is None:
             before, then = _simulated(self._options, self.shot, finer)
         else:
@@ -133,7 +136,7 @@ class _Refinement:
             self._options = replace(self._options, integrator=self._options.scheme)
             before, then = _simulated(self._options, self.shot, finer)
         self.off = distance(then.run.positions, before.run.positions)
-        if self._retargeted:
+        if self._retargeted and first:
             shake = distance(before.run.positions, intended_positions(self.shot, self._options))
             self.allowed = max(self.allowed, OF_SHAKE * shake)
         self.shot, self.found = finer, then
