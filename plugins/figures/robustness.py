@@ -34,16 +34,16 @@ def plot_robustness(character: Character, found: Robustness) -> Figure:
 
 def _distributions(axes: Axes, found: Robustness, target: int) -> None:
     for name, (label, color, line) in SHOWN.items():
-        errors = np.sort(found.drawn[name][:, target])
+        errors = np.sort(found.drawn[name][:, target, 0])
         shares = 100.0 * np.arange(1, len(errors) + 1) / len(errors)
         known = np.isfinite(errors)  # robots that could not be simulated are missing above
         axes.step(1e3 * errors[known], shares[known], line, where="post", color=color, linewidth=1.5, label=label)
-        axes.plot(1e3 * found.nominal[name][target], 0.0, "o", color=color, markersize=6.0, clip_on=False)
+        axes.plot(1e3 * found.nominal[name][target, 0], 0.0, "o", color=color, markersize=6.0, clip_on=False)
     axes.set_xscale("log")
     axes.set_ylim(0.0, 102.0)
 
 
 def _largest(drawn: np.ndarray, target: int) -> float:
     """The largest error of a target on robots that could be simulated [m]."""
-    errors = drawn[:, target]
+    errors = drawn[:, target, 0]
     return float(errors[np.isfinite(errors)].max(initial=0.0))

@@ -159,9 +159,10 @@ def test_convergence_begins_with_the_motion_as_animated(figures):
 
 def robustness():
     """One target; a robot in ten could not be simulated with the nominal curves."""
-    drawn = {name: scale * np.linspace(1e-3, 20e-3, 20)[:, None] for name, scale in (("before", 5.0), ("robust", 0.5))}
-    drawn["nominal"] = np.where(np.arange(20)[:, None] % 10 == 9, np.inf, np.linspace(1e-3, 20e-3, 20)[:, None])
-    nominal = {name: np.array([v]) for name, v in (("before", 60e-3), ("nominal", 1e-3), ("robust", 2e-3))}
+    errors = np.linspace(1e-3, 20e-3, 20)[:, None, None] * np.ones(2)
+    drawn = {name: scale * errors for name, scale in (("before", 5.0), ("robust", 0.5))}
+    drawn["nominal"] = np.where(np.arange(20)[:, None, None] % 10 == 9, np.inf, errors)
+    nominal = {name: np.full((1, 2), v) for name, v in (("before", 60e-3), ("nominal", 1e-3), ("robust", 2e-3))}
     return Robustness("worst", (), nominal, drawn)
 
 
@@ -169,7 +170,7 @@ def test_robustness_is_drawn_as_shares_of_robots_beside_the_error_of_the_model(f
     found = robustness()
     (shares,) = figures.drawing.plot_robustness(synthetic.character(), found).axes
     errors, share = lines_of(shares)["robust"].get_data()
-    assert np.allclose(errors, 1e3 * found.drawn["robust"][:, 0]) and share[-1] == 100.0 and share[0] == 5.0
+    assert np.allclose(errors, 1e3 * found.drawn["robust"][:, 0, 0]) and share[-1] == 100.0 and share[0] == 5.0
     errors, share = lines_of(shares)["optimised for the model"].get_data()
     assert len(errors) == 18 and share[-1] == 90.0  # two robots are missing
     points = {float(line.get_xdata()[0].round(9)) for line in shares.get_lines() if len(line.get_xdata()) == 1}

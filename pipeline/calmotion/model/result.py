@@ -314,7 +314,7 @@ class Result:
             return None
         if self.robustness is not None:
             over = np.max if self.robustness.kind == "worst" else np.mean
-            before, after = (float(over(self.robustness.drawn[name])) for name in ("before", "robust"))
+            before, after = (float(over(self.robustness.drawn[name][..., 0])) for name in ("before", "robust"))
             return after <= before
         before, after = (
             float(np.max(run.position_errors[run.motion.judged], initial=0.0)) for run in (self.before, self.after)

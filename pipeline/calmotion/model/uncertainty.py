@@ -62,7 +62,7 @@ class RobustSettings:
         scenarios: Number of robots, the nominal one among them.
         draws: Number of random robots on which the curves are measured afterwards.
         nominal_error: Error that a target may have on the nominal robot where the largest error is minimised, over the
-            tolerance; curves for the nominal robot alone may have more.
+            tolerance, in position and as its rotation weighs; curves for the nominal robot alone may have more.
     """
 
     kind: str = WORST
@@ -91,8 +91,9 @@ class Robustness:
     Attributes:
         kind: Of the optimisation, `mean` or `worst`.
         scenarios: The robots for which the curves were optimised, the nominal one first.
-        nominal: Largest error of each target on the nominal robot [m], shape [K], by name of the curves (`CURVES`).
-        drawn: The same on random robots that the optimisation did not see, shape [draws, K]; infinite where a robot
+        nominal: Largest errors of position [m] and rotation [rad] of each target on the nominal robot, shape [K, 2], by
+            name of the curves (`CURVES`).
+        drawn: The same on random robots that the optimisation did not see, shape [draws, K, 2]; infinite where a robot
             could not be simulated.
     """
 

@@ -124,15 +124,17 @@ def robustness_row(result: Result, target: int) -> dict[str, Any]:
     found = result.robustness
     if found is None:
         return {}
-    rows = {}
+    rows: dict[str, dict[str, float]] = {}
     for name in CURVES:
-        drawn = found.drawn[name][:, target]
-        rows[name] = {
-            "nominal_max_error_m": float(found.nominal[name][target]),
-            "median_max_error_m": float(np.median(drawn)),
-            "p95_max_error_m": float(np.quantile(drawn, 0.95, method="higher")),
-            "worst_max_error_m": float(drawn.max()),
-        }
+        rows[name] = {}
+        for column, error in enumerate(("error_m", "rotation_error_rad")):
+            drawn = found.drawn[name][:, target, column]
+            rows[name] |= {
+                f"nominal_max_{error}": float(found.nominal[name][target, column]),
+                f"median_max_{error}": float(np.median(drawn)),
+                f"p95_max_{error}": float(np.quantile(drawn, 0.95, method="higher")),
+                f"worst_max_{error}": float(drawn.max()),
+            }
     return {"robustness": rows}
 
 
@@ -145,5 +147,5 @@ def robustness_report(result: Result) -> dict[str, Any]:
         "robust": found.kind,
         "scenarios": [{"parameters": dict(s.factors), "weight": s.weight} for s in found.scenarios],
         "draws": len(found.drawn["robust"]),
-        "failed_draws": {name: int(np.sum(~np.isfinite(found.drawn[name]).all(axis=1))) for name in CURVES},
+        "failed_draws": {name: int(np.sum(~np.isfinite(found.drawn[name]).all(axis=(1, 2)))) for name in CURVES},
     }

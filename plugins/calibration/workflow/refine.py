@@ -177,4 +177,4 @@ def expected_errors(optimized: OptimizationResult, draws: int = DRAWS) -> Array:
     tracks = found_tracks(optimized.result, shot.animation)
     robots = random_scenarios(uncertain_parameters(shot), draws)
     options = RunSettings(step=optimized.result.step_s, pre_roll=optimized.result.pre_roll_s)
-    return errors_on(shot, options, {"found": tracks}, robots)["found"]
+    return errors_on(shot, options, {"found": tracks}, robots)["found"][..., 0]

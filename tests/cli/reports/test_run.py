@@ -186,7 +186,11 @@ def test_how_far_motors_move_and_why_errors_remain_are_told():
 def test_curves_on_random_robots_are_a_table():
     errors = {"nominal_max_error_m": 1e-3, "median_max_error_m": 2e-3, "p95_max_error_m": 4e-3}
     rows = {name: errors | {"worst_max_error_m": worst} for name, worst in (("before", None), ("nominal", 9e-3))}
-    target = {"path": "/Arm/Tip", "robustness": rows | {"robust": errors | {"worst_max_error_m": 5e-3}}}
+    target = {
+        "path": "/Arm/Tip",
+        "rotation_weight": 0.0,
+        "robustness": rows | {"robust": errors | {"worst_max_error_m": 5e-3}},
+    }
     stream = io.StringIO()
     report = {"scenarios": [], "draws": 200, "targets": [target], "main_target": "/Arm/Tip"}
     print_robustness(console_on(stream), report)
@@ -197,6 +201,13 @@ def test_curves_on_random_robots_are_a_table():
     better = rows | {"robust": errors | {"p95_max_error_m": 3e-3, "worst_max_error_m": 5e-3}}
     print_robustness(console_on(stream), report | {"targets": [target | {"robustness": better}]})
     assert "On 95% of the robots around the model, the error at /Arm/Tip is at most 3 mm." in stream.getvalue()
+    turned = {
+        name: row | {key.replace("error_m", "rotation_error_rad"): 0.1 for key in row} for name, row in better.items()
+    }
+    print_robustness(
+        console_on(stream), report | {"targets": [target | {"rotation_weight": 0.1, "robustness": turned}]}
+    )
+    assert stream.getvalue().splitlines()[-1].split()[-1] == "5.73°"
     stream = io.StringIO()
     kept = target | {"robustness": rows | {"robust": rows["nominal"]}}
     print_robustness(console_on(stream), report | {"targets": [kept]})

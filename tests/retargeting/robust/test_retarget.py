@@ -25,19 +25,20 @@ def result(arm, animation, bodies):
 def test_the_largest_error_over_the_robots_is_smaller_than_that_of_nominal_curves(result):
     found = result.robustness
     assert len(found.scenarios) >= 7 and len(found.drawn["robust"]) == 20
-    before, nominal, robust = (found.drawn[name].max() for name in ("before", "nominal", "robust"))
+    before, nominal, robust = (found.drawn[name][..., 0].max() for name in ("before", "nominal", "robust"))
     assert robust < 0.9 * nominal < before
 
 
 def test_the_error_on_the_model_is_within_what_is_allowed(arm, result):
     found, tolerance, own = result.robustness, tolerance_of(arm), result.robustness.nominal["nominal"]
-    assert np.all(found.nominal["robust"] <= np.maximum(8.0 * tolerance, own))
+    assert np.all(found.nominal["robust"][:, 0] <= np.maximum(8.0 * tolerance, own[:, 0]))
 
 
 def test_what_is_measured_on_the_nominal_robot_is_what_the_result_has(result):
     judged, measured = result.after.motion.judged, result.robustness.nominal
     for name, simulation in (("robust", result.after), ("before", result.before)):
-        assert np.allclose(measured[name], simulation.position_errors[judged].max(axis=0), rtol=1e-6)
+        simulated = [e[judged].max(axis=0) for e in (simulation.position_errors, simulation.rotation_errors)]
+        assert np.allclose(measured[name], np.stack(simulated, axis=1), rtol=1e-6)
 
 
 def test_the_error_of_the_simulation_is_estimated_as_for_one_robot(result):
@@ -59,7 +60,8 @@ def test_the_report_has_the_distribution_of_each_target(result):
     row = robustness_row(result, 0)["robustness"]
     assert set(row) == {"before", "nominal", "robust"}
     for values in row.values():
-        assert values["median_max_error_m"] <= values["p95_max_error_m"] <= values["worst_max_error_m"]
+        for error in ("error_m", "rotation_error_rad"):
+            assert values[f"median_max_{error}"] <= values[f"p95_max_{error}"] <= values[f"worst_max_{error}"]
     assert robustness_row(dataclasses.replace(result, robustness=None), 0) == {}
 
 

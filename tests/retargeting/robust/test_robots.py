@@ -43,9 +43,9 @@ def test_a_mean_is_one_of_opposite_robots(shot, count, robots):
 def test_robots_with_larger_errors_are_farthest_first_and_not_alike(shot):
     tracks, parameters = shot.animation.tracks, uncertain_parameters(shot)
     found = farthest(shot, OPTIONS, tracks, parameters, 4)
-    errors = errors_on(shot, OPTIONS, {"": tracks}, found)[""].max(axis=1)
+    errors = errors_on(shot, OPTIONS, {"": tracks}, found, weighted=True)[""].max(axis=(1, 2))
     assert len(found) == 4 and np.all(np.diff(errors) <= 0.0)
     above = farthest(shot, OPTIONS, tracks, parameters, 4, 1.001 * errors[2])
     assert [robot.factors for robot in above] == [robot.factors for robot in found[:2]]
     assert farthest(shot, OPTIONS, tracks, parameters, 2, 2.0 * errors[0]) == ()
-    assert errors_on(shot, OPTIONS, {"": tracks}, ())[""].shape == (0, len(shot.character.targets))
+    assert errors_on(shot, OPTIONS, {"": tracks}, ())[""].shape == (0, len(shot.character.targets), 2)

@@ -61,6 +61,10 @@ VARIATIONS = {
     "a motor alone": (one_motor, WORST),
     "a target alone": (weighing((1.0, 0.0)), WORST),
     "a target of which the turn alone weighs": (weighing((1.0, 0.0), (0.0, 0.1)), WORST),
+    "a rotation that weighs beside the position": (
+        weighing((1.0, 0.02)),
+        dataclasses.replace(WORST, nominal_error=4.0),
+    ),
     "targets of other weights": (weighing((0.1, 0.0), (1.0, 0.01)), WORST),
     "limits": (limited, WORST),
     "nothing allowed": (same, dataclasses.replace(WORST, nominal_error=0.0)),
@@ -87,9 +91,10 @@ def test_the_error_on_the_model_keeps_its_bound_and_that_on_others_does_not_grow
     assert robustness_report(result)["scenarios"] and all(np.isfinite(row["robust"]["p95_max_error_m"]) for row in rows)
     assert sum(scenario.weight for scenario in found.scenarios) == pytest.approx(1.0) and not found.scenarios[0].factors
     if robust.kind == "worst":
-        own = found.nominal["nominal"]
-        assert np.all(found.nominal["robust"] <= np.maximum(robust.nominal_error * TOLERANCE, own) * (1.0 + 1e-6))
-        weights = np.sqrt([target.position_weight for target in shot.character.targets])
+        weights = np.sqrt([(target.position_weight, target.rotation_weight) for target in shot.character.targets])
+        scales = np.where(weights[:, :1] > 0.0, weights[:, :1], weights[:, 0].max())
+        allowed = np.maximum(robust.nominal_error * TOLERANCE * scales, weights * found.nominal["nominal"])
+        assert np.all(weights * found.nominal["robust"] <= allowed * (1.0 + 1e-6))
         worst = {name: (found.drawn[name] * weights).max() for name in ("nominal", "robust")}
         assert worst["robust"] <= 1.05 * worst["nominal"]
     kept = all(one.frame_values is other.frame_values for one, other in zip(result.curves, nominal.curves, strict=True))

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.model import WeightTrack
 from calmotion.model.run import RunSettings
 from calmotion.model.uncertainty import RobustSettings, Scenario
 from calmotion.retargeting.optimize import optimize_shot
@@ -43,7 +44,7 @@ def searched(started, allowed, options=OPTIONS):
 
 def largest(started, tracks):
     """Of the nominal robot, and of all others."""
-    errors = errors_on(started[0], OPTIONS, {"": tracks}, started[2])[""].max(axis=1)
+    errors = errors_on(started[0], OPTIONS, {"": tracks}, started[2], weighted=True)[""].max(axis=(1, 2))
     return errors[0], errors[1:].max()
 
 
@@ -51,7 +52,7 @@ def test_the_largest_error_falls_and_the_nominal_robot_is_off_by_no_more_than_is
     before, after = largest(started, started[1]), largest(started, worst.tracks)
     assert after[1] < 0.8 * before[1]
     assert 0.85 * ALLOWED < after[0] <= ALLOWED
-    assert np.allclose(worst.errors.max(axis=1)[[0, 1]], [after[0], worst.errors[1].max()], rtol=1e-6)
+    assert np.allclose(worst.errors.max(axis=(1, 2))[[0, 1]], [after[0], worst.errors[1].max()], rtol=1e-6)
 
 
 def test_less_error_on_the_nominal_robot_leaves_more_on_the_others(started, worst):
@@ -71,6 +72,27 @@ def test_the_bound_holds_where_the_search_ends_far_from_it(started, monkeypatch)
     found = searched(started, 1.001 * largest(started, started[1])[0])
     assert largest(started, found.tracks)[0] <= 1.001 * largest(started, started[1])[0]
     assert largest(started, found.tracks)[1] < largest(started, started[1])[1]
+
+
+def test_the_rotation_on_the_nominal_robot_keeps_the_bound_too(started):
+    heavier = [dataclasses.replace(target, rotation_weight=0.3) for target in started[0].character.targets]
+    shot = started[0].with_character(dataclasses.replace(started[0].character, targets=tuple(heavier)))
+    tracks = found_tracks(optimize_shot(shot, OPTIONS, ignore_progress), shot.animation)
+    own = errors_on(shot, OPTIONS, {"": tracks}, started[2][:1], weighted=True)[""][0]
+    found = searched((shot, tracks, started[2]), ALLOWED)
+    assert np.all(found.errors[0] <= np.maximum(ALLOWED, own) * (1.0 + 1e-9))
+    assert found.errors[1:].max() < errors_on(shot, OPTIONS, {"": tracks}, started[2], weighted=True)[""][1:].max()
+
+
+def test_an_error_counts_by_the_weight_of_its_instant(started):
+    shot, tracks, _ = started
+    ends = np.array(shot.animation.frame_times)[[0, -1]]
+    fading = [WeightTrack(k, False, ends, np.zeros(2)) for k in range(len(shot.character.targets))]
+    unseen = dataclasses.replace(shot, animation=dataclasses.replace(shot.animation, weights=tuple(fading)))
+    (raw,), (weighted,) = (
+        errors_on(unseen, OPTIONS, {"": tracks}, (Scenario(),), weighted=w)[""] for w in (False, True)
+    )
+    assert np.all(raw[:, 0] > 0.0) and np.all(weighted[:, 0] == 0.0)
 
 
 def test_curves_that_no_others_are_better_than_are_returned(started, monkeypatch):
@@ -120,7 +142,7 @@ def test_a_loop_is_searched_by_sweeps(arm, animation, bodies):
     tracks = found_tracks(optimize_shot(shot, options, ignore_progress), cyclic)
     scenarios = (Scenario(), *farthest(shot, options, tracks, uncertain_parameters(shot), 2))
     found = least_maximum(shot, options, tracks, scenarios, 2.0 * ALLOWED, ignore_progress)
-    before = errors_on(shot, options, {"": tracks}, scenarios)[""]
+    before = errors_on(shot, options, {"": tracks}, scenarios, weighted=True)[""]
     assert found.errors[1:].max() < 0.95 * before[1:].max()
     assert found.errors[0].max() <= max(2.0 * ALLOWED, before[0].max())
 

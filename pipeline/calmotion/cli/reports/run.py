@@ -120,29 +120,28 @@ def print_robustness(console: Console, report: dict[str, Any]) -> None:
     """The curves on robots that differ from the model."""
     if "scenarios" not in report:
         return
-    heads, rows = ("nominal", "median", "p95", "worst"), []
-    names = {"before": "as animated", "nominal": "optimised for the model", "robust": "robust"}
-    for target in report["targets"]:
-        for name, shown in names.items():
-            values = [target["robustness"][name][f"{head}_max_error_m"] for head in heads]
-            rows.append([target["path"], shown, *(_length_or_failed(value) for value in values)])
     main = next(target for target in report["targets"] if target["path"] == report["main_target"])
     nominal, robust = (main["robustness"][name]["p95_max_error_m"] for name in ("nominal", "robust"))
     if nominal is not None and robust is not None and robust < nominal:
         say(console, f"On 95% of the robots around the model, the error at {main['path']} is at most {length(robust)}.")
         say(console, f"The curves for the model alone would leave up to {length(nominal)} there.")
-    title = f"Largest error on {report['draws']} random robots"
-    print_table(console, title, ["target", "curves", "model", "median", "95%", "worst"], rows, texts=2)
+    names = {"before": "as animated", "nominal": "optimised for the model", "robust": "robust"}
+    for title, key, shown in (("error", "error_m", length), ("rotation error", "rotation_error_rad", angle)):
+        rows = []
+        for target in report["targets"] if key == "error_m" else [t for t in report["targets"] if t["rotation_weight"]]:
+            for name, curves in names.items():
+                values = [
+                    target["robustness"][name][f"{head}_max_{key}"] for head in ("nominal", "median", "p95", "worst")
+                ]
+                rows.append([target["path"], curves, *("failed" if v is None else shown(v) for v in values)])
+        title = f"Largest {title} on {report['draws']} random robots"
+        print_table(console, title, ["target", "curves", "model", "median", "95%", "worst"], rows, texts=2)
     if all(target["robustness"]["robust"] == target["robustness"]["nominal"] for target in report["targets"]):
         say(
             console,
             "No robust curves were found that keep the allowed error on the model. The layer has the curves for the "
             "model alone.",
         )
-
-
-def _length_or_failed(metres: float | None) -> str:
-    return "failed" if metres is None else length(metres)
 
 
 def print_run(report: dict[str, Any], console: Console, verbose: bool = False) -> None:

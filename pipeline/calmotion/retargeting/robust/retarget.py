@@ -16,7 +16,7 @@ from calmotion.model.uncertainty import WORST, Robustness, Scenario
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.retargeting.found_curves import best_so_far
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.retargeting.robust.measure import errors_on, largest_weighted, silent
+from calmotion.retargeting.robust.measure import errors_on, silent
 from calmotion.retargeting.robust.robots import farthest, opposite_pairs
 from calmotion.retargeting.robust.scenarios import Parameter, random_scenarios, uncertain_parameters
 from calmotion.retargeting.robust.worst_case import LeastMaximum, least_maximum
@@ -92,7 +92,7 @@ def _worst(
             raise _named(shot, options, robots) from failure
         tracks = found.tracks
         counts += found.search.evaluations, found.search.gradients, found.search.products
-        known = LARGER * float(largest_weighted(shot, found.errors).max())
+        known = LARGER * float(found.errors.max())
         added = farthest(shot, options, tracks, parameters, ADDED, known)
         if not added:
             break
@@ -118,7 +118,7 @@ def _simulated(shot: CompiledShot, options: RunSettings, worst: LeastMaximum, be
 
 def _named(shot: CompiledShot, options: RunSettings, robots: Sequence[Scenario], reason: str = "") -> ShotError:
     """The error that names the robot that cannot be simulated, or that is farthest off, and the reason."""
-    off = errors_on(shot, options, {"": shot.animation.tracks}, robots)[""].max(axis=1)
+    off = errors_on(shot, options, {"": shot.animation.tracks}, robots)[""][..., 0].max(axis=1)
     factors = robots[int(np.argmax(off))].factors
     different = ", ".join(f"{name} times {factor:.3g}" for name, factor in factors.items() if factor != 1.0)
     return ShotError(
@@ -169,10 +169,11 @@ def _robustness(
         "nominal": found_tracks(nominal, animation),
         "robust": found_tracks(robust, animation),
     }
-    on_nominal = errors_on(shot, options, curves, scenarios[:1])
+    nominal_errors = errors_on(shot, options, curves, scenarios[:1])
 
     def measured(fraction: float, message: str) -> None:
         progress(_SEARCHED + (1.0 - _SEARCHED) * fraction, message)
 
     drawn = errors_on(shot, options, curves, draws, measured)
-    return Robustness(options.robust.kind, scenarios, {name: rows[0] for name, rows in on_nominal.items()}, drawn)
+    nominally = {name: rows[0] for name, rows in nominal_errors.items()}
+    return Robustness(options.robust.kind, scenarios, nominally, drawn)

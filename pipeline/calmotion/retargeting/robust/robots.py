@@ -12,7 +12,7 @@ from calmotion.model.run import RunSettings
 from calmotion.model.uncertainty import Scenario
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.problem.robot import Robot
-from calmotion.retargeting.robust.measure import errors_on, largest_weighted
+from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import Parameter, scenario_at, shot_of
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.preparation import Prepared, prepare
@@ -47,11 +47,11 @@ def farthest(
     Args:
         tracks: Curves.
         count: Number of robots.
-        above: Error that they have at least [m].
+        above: Weighted error that they have at least [m].
     """
     points = random_points(parameters)
     tried = [scenario_at(parameters, x) for x in points]
-    found = largest_weighted(shot, errors_on(shot, options, {"": tracks}, tried)[""])
+    found = errors_on(shot, options, {"": tracks}, tried, weighted=True)[""].max(axis=(1, 2))
     found = np.where(np.isfinite(found), found, 0.0)
     picked: list[int] = []
     for k in np.argsort(-found):

@@ -21,7 +21,7 @@ from calmotion.retargeting.kept_feet import with_kept_feet
 from calmotion.retargeting.problem.limits import FIRST_PENALTY, MARGIN, LimitTerms
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
-from calmotion.retargeting.robust.measure import largest_weighted
+from calmotion.retargeting.robust.measure import largest_errors
 from calmotion.retargeting.robust.robots import robots_of
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.retargeting.solver.norm import PowerMean
@@ -39,7 +39,7 @@ class LeastMaximum:
     Attributes:
         tracks: The curves; those where it began, where no others are better.
         scenarios: The robots, with the weights of their squared errors in the sum that is stationary at these curves.
-        errors: Largest error of each target on each robot [m], shape [S, K].
+        errors: Largest weighted errors of each target's position and rotation on each robot [m], shape [S, K, 2].
         search: The work that was done.
     """
 
@@ -74,19 +74,21 @@ def least_maximum(
         options: Of the search, with its time step.
         tracks: Where it begins.
         scenarios: The robots, the nominal one first.
-        allowed: Error that a target may have on the nominal robot [m]; where it begins with more, as much.
+        allowed: Error that a target may have on the nominal robot [m], and its rotation as it weighs beside the
+            position; where it begins with more, as much.
         progress: Called with a fraction and a message.
 
     Raises:
         SimulationFailure: A robot cannot be simulated.
     """
     own, (start, fixed) = LeastMaximum, _posed(shot, options, tracks, scenarios)
-    bound, search, orders = np.maximum(allowed, errors_of(start)[0]), Search.start(start.x, start), list(own.ORDERS)
+    bound = bound_of(start, allowed)
+    search, orders = Search.start(start.x, start), list(own.ORDERS)
     damping = whole = 0.0
-    factors = np.maximum(own.FIRST_FACTOR * largest_of(shot, start) / bound, 1.0)
+    factors = np.maximum(own.FIRST_FACTOR * largest_of(start) / bound, 1.0)
     for number in range(own.ROUNDS):
         interrupts.check()
-        told = f"largest weighted error on {len(scenarios)} robots: {1e3 * largest_of(shot, search.at):.3f} mm"
+        told = f"largest weighted error on {len(scenarios)} robots: {1e3 * largest_of(search.at):.3f} mm"
         progress(number / own.ROUNDS, told)
         mean = power_mean(start.problem, orders[0], factors)
         at = search.at.of(replace(search.at.problem, norm=mean, damping=damping))
@@ -109,7 +111,7 @@ def least_maximum(
                 orders.pop(0)
             elif not np.any(nominal > 1.0):
                 break
-    best = _within(shot, start, search.at, bound)
+    best = _within(start, search.at, bound)
     weights = power_mean(best.problem, own.ORDERS[-1], factors).weights(best.residuals).reshape(len(scenarios), -1)
     shares = weights.sum(axis=1) / weights.sum()
     weighted = tuple(replace(s, weight=float(w)) for s, w in zip(scenarios, shares, strict=True))
@@ -118,19 +120,31 @@ def least_maximum(
 
 
 def errors_of(at: Evaluation) -> Array:
-    """The largest error of each target on each robot [m], shape [S, K]."""
-    judged, motions = at.problem.grid.judged, [(run.run, run.robot.objective.intended) for run in at.runs]
-    off = [np.linalg.norm((run.target_positions - meant.target_positions)[judged], axis=2) for run, meant in motions]
-    return np.array([distances.max(axis=0, initial=0.0) for distances in off])
+    """The largest weighted errors of each target's position and rotation on each robot [m], shape [S, K, 2]."""
+    grid = at.problem.grid
+    return np.array([largest_errors(run.robot.objective, grid, run.run, weighted=True) for run in at.runs])
 
 
-def largest_of(shot: CompiledShot, at: Evaluation) -> float:
-    """The largest error of all robots but the nominal one, as it weighs [m]; of that where there is no other."""
-    errors = largest_weighted(shot, errors_of(at))
-    return float(errors[1:].max() if len(errors) > 1 else errors[0])
+def bound_of(start: Evaluation, allowed: float) -> Array:
+    """Weighted errors that the nominal robot may have [m], shape [K, 2]; infinite where nothing weighs.
+
+    They are those of a position that is off by what is allowed: where the rotation alone weighs, at the target whose
+    position weighs most. Where the search begins with more, it is that.
+    """
+    grid, weights = start.problem.grid, start.problem.objective.weights[..., ::3]
+    roots = (weights[grid.judged] / np.sqrt(grid.quadrature[grid.judged])[:, None, None]).max(axis=0)
+    positions = roots[:, :1]
+    scales = np.where(positions > 0.0, positions, positions.max(initial=0.0) or 1.0)
+    return np.where(roots > 0.0, np.maximum(allowed * scales, errors_of(start)[0]), np.inf)
 
 
-def _within(shot: CompiledShot, start: Evaluation, found: Evaluation, bound: Array) -> Evaluation:
+def largest_of(at: Evaluation) -> float:
+    """The largest weighted error of all robots but the nominal one [m]; of that where there is no other."""
+    errors = errors_of(at)
+    return float(errors[1:].max() if len(errors) > 1 else errors[0].max())
+
+
+def _within(start: Evaluation, found: Evaluation, bound: Array) -> Evaluation:
     """The point nearest to what was found, on the way from the start, at which bound and limits are kept, or kept as
     well as at the start; the start where nothing is won."""
 
@@ -153,7 +167,7 @@ def _within(shot: CompiledShot, start: Evaluation, found: Evaluation, bound: Arr
                 inside, best = middle, there
             else:
                 outside = middle
-    return best if largest_of(shot, best) < largest_of(shot, start) else start
+    return best if largest_of(best) < largest_of(start) else start
 
 
 def _tracks(shot: CompiledShot, at: Evaluation) -> tuple[Track, ...]:
@@ -191,7 +205,7 @@ def power_mean(problem: RetargetProblem, order: int, factors: Array) -> PowerMea
 
     Args:
         problem: Of the robots, the nominal one first.
-        factors: With which errors of the nominal robot's positions count, shape [K].
+        factors: With which errors of the nominal robot count, shape [K, 2].
     """
     quadrature, weights = problem.grid.quadrature, problem.objective.weights
     squares = weights.reshape(len(weights), -1, 3)[..., 0] ** 2
@@ -200,6 +214,6 @@ def power_mean(problem: RetargetProblem, order: int, factors: Array) -> PowerMea
     units = np.sqrt(float((squares / by_time[:, None]).max()) * by_time / robots)
     shares = quadrature / (quadrature.sum() * max(len(counted), 1) * robots)
     every = np.ones((robots, len(weights), squares.shape[1]))
-    every[0, :, ::2] = factors
+    every[0] = factors.ravel()
     units, shares = (np.tile(part, robots)[:, None] for part in (units, shares))
     return PowerMean(order, units, shares, every.reshape(-1, squares.shape[1]))
