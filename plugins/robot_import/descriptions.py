@@ -12,7 +12,15 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.support import nearest, refuse_lfs_pointers, refuse_special, remedy_for
 
 from .attributes import Element, judged
-from .mjcf import elements, locks, nested_copy, parts, refuse_missing_meshes, several_joints
+from .mjcf import (
+    elements,
+    locks,
+    nested_copy,
+    parts,
+    refuse_missing_meshes,
+    refuse_other_compilers,
+    several_joints,
+)
 from .repairs import (
     PACKAGE,
     faults,
@@ -40,6 +48,7 @@ class Description:
         efforts: Largest effort of each joint of a URDF, where it is positive [N m or N].
         without_mass: Links of a URDF with geometry and without inertia.
         massless: Links of a URDF whose mass is 0, and those with neither inertia nor geometry: frames.
+        centred: Links of a URDF whose inertia has no origin: their centre of mass is that of the link's frame.
         unread: What of the robot is not read, as sentences for the user.
         locks: Joints of an MJCF that an equality holds at one value [rad or m].
         soft_limits: Narrower limits of joints of a URDF, which its safety controllers keep [rad or m].
@@ -52,6 +61,7 @@ class Description:
     efforts: Mapping[str, float] = field(default_factory=dict)
     without_mass: tuple[str, ...] = ()
     massless: tuple[str, ...] = ()
+    centred: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
     locks: Mapping[str, float] = field(default_factory=dict)
@@ -74,6 +84,7 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
         listed = elements(files)
         unread = judged(MJCF, listed)
         refuse_missing_meshes(files)
+        refuse_other_compilers(files)
         several = several_joints(files)
         told = (
             (f"joints of one body are those of bodies one inside the other: {', '.join(several)}",) if several else ()
@@ -86,13 +97,15 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
             found=f"<{root.tag}>",
             remedy="Name a .urdf file, an .xml file of MuJoCo, or a USD file",
         )
+    name = os.path.basename(path)
+    made = "robot.urdf" if name != "robot.urdf" else "expanded.urdf"  # never over what is read
     macro = next((text for node in root.iter() if (text := _macro(node))), None)
     if macro is not None:
         raise ShotError(
             "this is a xacro, from which a URDF is made first",
             path=path,
             found=macro,
-            remedy=f"Run `xacro {os.path.basename(path)} > robot.urdf`, and import robot.urdf",
+            remedy=f"Run `xacro {name} > {made}`, and import {made}",
         )
     if root.find("link") is None:
         raise ShotError(
@@ -110,10 +123,11 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
     links = root.findall("link")
     shaped = {link for link in links if link.find("visual") is not None or link.find("collision") is not None}
     without = {link for link in links if link.find("inertial") is None}
+    centred = {link for link in links if link.find("inertial") is not None and link.find("inertial/origin") is None}
     weightless = {link for link in links if _number(link.find("inertial/mass"), "value", 1.0) == 0.0}
     return Description(
         path, URDF, found, _efforts(root), _names(without & shaped), _names(weightless | (without - shaped)),
-        faults(root, prefixes), judged(URDF, _elements(root, path)), soft_limits=_soft_limits(root),
+        _names(centred), faults(root, prefixes), judged(URDF, _elements(root, path)), soft_limits=_soft_limits(root),
     )  # fmt: skip
 
 

@@ -59,7 +59,7 @@ def too_heavy(character: Character) -> tuple[str, ...]:
 
 def _author_values(
     stage: Usd.Stage, units: StageUnits, values: Mapping[str, Any], keeps: Callable[[Usd.Prim], bool]
-) -> None:
+) -> list[Usd.Prim]:
     """Author compiled masses, springs, dampers, gains and what is limited; actuators that are off go.
 
     Args:
@@ -67,6 +67,9 @@ def _author_values(
         units: Of the stage.
         values: As `converters.compiled_values` gives them.
         keeps: Whether a body keeps the mass that it has in the conversion.
+
+    Returns:
+        Bodies that weigh nothing.
 
     Raises:
         ShotError: The conversion has other bodies than MuJoCo.
@@ -82,12 +85,18 @@ def _author_values(
     joints: dict[Any, Usd.Prim] = {}
     for prim in joint_prims(stage):
         joints.setdefault(prim.GetPath().GetParentPath(), prim)
+    weightless = []
     for prim, body in zip(bodies, values["bodies"], strict=True):
-        if body["mass"] > _LIGHTEST and not keeps(prim):
+        if keeps(prim):
+            pass
+        elif body["mass"] <= _LIGHTEST:
+            weightless.append(prim)
+        else:
             _author_mass(prim, body, units)
         for joint in body["joints"]:
             _author_joint(joints[prim.GetPath()], joint)
     author_actuators(stage, values, [joints.get(prim.GetPath()) for prim in bodies])
+    return weightless
 
 
 def _author_mass(prim: Usd.Prim, body: Mapping[str, Any], units: StageUnits) -> None:
@@ -119,9 +128,10 @@ class _Author:
         """Densities of the links that have no inertia, and a milligram for those that have no mass."""
         from pxr import Gf, UsdPhysics
 
+        weightless: list[Usd.Prim] = []
         if self._options.compiled is not None:
-            _author_values(self._stage, self._units, self._options.compiled, self._keeps_mass)
-        frames = [prim for prim in self._bodies if self._is_frame(prim)]
+            weightless = _author_values(self._stage, self._units, self._options.compiled, self._keeps_mass)
+        frames = [prim for prim in self._bodies if prim in weightless or self._is_frame(prim)]
         if self._options.mjcf:
             _refuse_moving_frames(self._stage, frames)
         for prim in frames:
@@ -132,6 +142,9 @@ class _Author:
         if frames:
             names = ", ".join(map(named, frames))
             self.notes.append(f"links of mass 0 are frames, and get {1e6 * _FRAME_MASS:g} mg each: {names}")
+        for prim in self._bodies:
+            if named(prim) in self._options.robot.centred:  # else the reader takes the centre of its geometry
+                UsdPhysics.MassAPI.Apply(prim).CreateCenterOfMassAttr(Gf.Vec3f(0.0))
         self._raise_moments()
         without = [prim for prim in self._bodies if named(prim) in self._options.robot.without_mass]
         if self._options.solid is not None:

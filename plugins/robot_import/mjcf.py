@@ -17,6 +17,7 @@ _PLACES = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 _LIGHT, _LIGHT_INERTIA = "1e-6", "1e-9"  # of a body between two joints [kg], [kg m^2]
 _INNER = ("body", "frame", "replicate")  # what contains bodies
 _FOLDERS = ("meshdir", "texturedir", "assetdir")
+_ANGLES = {"angle": "degree", "eulerseq": "xyz"}  # what a compiler says of angles, and takes where it says nothing
 _SHOWN = 4  # missing files in a message
 _MAIN = "main"  # the default class of what names none
 _ACTUATOR = "general"
@@ -113,19 +114,60 @@ def refuse_missing_meshes(found: Sequence[Part]) -> None:
         )
 
 
+def refuse_other_compilers(found: Sequence[Part]) -> None:
+    """Refuse robots within a robot that count angles in another way: a converter reads them as those of the first file.
+
+    Raises:
+        ShotError: There is one, or its meshes are in another folder, where the converter does not look for them.
+    """
+    models = _models(found)
+    for part in found[1:]:
+        if os.path.basename(part.path) not in models:
+            continue
+        first, own = _compiler(found[0]), _compiler(part)
+        other = [f'{name}="{own[name]}"' for name in _ANGLES if own[name].lower() != first[name].lower()]
+        if any(node.get("file") for node in part.root.iter("mesh")) and own["folder"] != first["folder"]:
+            other.append(f"meshes in {own['folder']}")
+        if other:
+            raise ShotError(
+                "a robot within the robot is read with the compiler of the file around it, which is another one",
+                path=part.path,
+                attribute="compiler",
+                found=", ".join(other),
+                remedy="Give both files the same angle and eulerseq, and one folder for their meshes; or write the "
+                "robot in one file",
+            )
+
+
+def _compiler(part: Part) -> dict[str, str]:
+    """How a file counts angles, and the folder of its meshes."""
+    found = dict(_ANGLES)
+    for node in part.root.iter("compiler"):
+        found |= node.attrib
+    folder = found.get("meshdir", found.get("assetdir", ""))
+    return found | {"folder": os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(part.path)), folder))}
+
+
 def elements(found: Sequence[Part]) -> list[Element]:
     """The elements of a robot's files, with their defaults; equalities that are switched off have no effect."""
     classes: dict[str, Settings] = {_MAIN: {}}
     for part in found:
         for node in part.root.findall("default"):
             _collect(node, classes, {})
+    files = {os.path.basename(part.path): part for part in found[1:]}
+    models = _models(found)
     return [
         element
         for part in found
+        if part is found[0] or os.path.basename(part.path) in models
         for section in part.root
-        if section.tag != "default"
-        for element in _below(section, "", _MAIN, classes, part.path)
+        for element in _below(section, "", _MAIN, classes, part.path, files)
     ]
+
+
+def _models(found: Sequence[Part]) -> set[str]:
+    """Names of the files of robots within a robot."""
+    return {os.path.basename(node.get("file", "")) for part in found for node in part.root.iter("model")}
 
 
 def locks(listed: Sequence[Element]) -> dict[str, float]:
@@ -245,16 +287,30 @@ def _collect(node: xml.Element, classes: dict[str, Settings], inherited: Setting
 
 
 def _below(
-    node: xml.Element, above: str, default: str, classes: Mapping[str, Settings], file: str, about: str = ""
+    node: xml.Element,
+    above: str,
+    default: str,
+    classes: Mapping[str, Settings],
+    file: str,
+    files: Mapping[str, Part],
+    about: str = "",
 ) -> Iterator[Element]:
     """An element and those in it.
 
     Args:
         above: Place of the element around it.
         default: Class of those in a body that name none.
+        files: Those that may be included, by name.
         about: Name of the element around it.
     """
     tag = str(node.tag)
+    if tag == "include":
+        name = os.path.basename(node.get("file", ""))
+        others = {key: part for key, part in files.items() if key != name}  # files may include each other
+        for child in files[name].root if name in files else ():
+            yield from _below(child, above, default, classes, files[name].path, others, about)
+    if tag in ("include", "default"):
+        return
     place = f"{above}/{tag}".lstrip("/")
     if tag in ("worldbody", *_INNER):
         place = (
@@ -270,4 +326,4 @@ def _below(
     yield Element(place, name, file, values)
     for child in node:
         inner = place if tag not in _INNER or child.tag == "frame" else "body"
-        yield from _below(child, inner, node.get("childclass", default), classes, file, name if above else "")
+        yield from _below(child, inner, node.get("childclass", default), classes, file, files, name if above else "")

@@ -317,7 +317,9 @@ def _moved(axes: Sequence[Axis], motion: MotorTracks | None) -> dict[str, MotorT
                     "several joints have this name" if fitting else "no joint of the robot has this name",
                     path=motion.origin,
                     found=name,
-                    remedy=f"{nearest(name, names)}Its joints are {', '.join(names)}",
+                    remedy=f"Name each by its path: {', '.join(axis.path for axis in fitting)}"
+                    if fitting
+                    else f"{nearest(name, names)}Its joints are {', '.join(names)}",
                 )
             )
         else:

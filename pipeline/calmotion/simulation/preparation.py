@@ -179,10 +179,15 @@ def _remedy_at_rest(prepared: Prepared, component: int) -> str:
     """What would hold a body that finds no static equilibrium."""
     tree, character = prepared.model.tree, prepared.character
     joint, body = character.joints[tree.joint[component]], character.bodies[tree.body[component]]
-    driven = any(motor.joint == tree.joint[component] for motor in character.motors)
+    driven = {motor.joint for motor in character.motors}
+    free = [other.path for k, other in enumerate(character.joints) if k not in driven and other.kind in _FREE]
+    free.sort(key=lambda path: path != joint.path)  # another one may give way with it, or carry it
     ways = []
-    if not driven and joint.kind != "fixed":
-        ways.append(f"give {joint.path} a motor (a drive), or replace it by a fixed joint where it does not move")
+    if len(free) == 1:
+        ways.append(f"give {free[0]} a motor (a drive), or replace it by a fixed joint where it does not move")
+    elif free:
+        more = f" and {len(free) - _SHOWN} more" if len(free) > _SHOWN else ""
+        ways.append(f"give {', '.join(free[:_SHOWN])}{more} motors (drives), or fixed joints where they do not move")
     if body.flexible is not None:
         ways.append("raise physics:youngsModulus of its material (in the stage's units)")
     ways.append("check physics:mass and physics:centerOfMass of what it carries, and the joints that close its chain")
@@ -190,6 +195,8 @@ def _remedy_at_rest(prepared: Prepared, component: int) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
+_FREE = ("revolute", "prismatic", "spherical")
+_SHOWN = 3  # joints in a remedy
 _FAR = 0.25  # deflection over length that explains a failure
 _CLOSED = "whether the closed chains can reach the poses that their motors ask for"
 _REASONS = {

@@ -192,6 +192,12 @@ REFUSALS = {
 }  # fmt: skip
 
 
+def test_parts_of_a_body_may_be_in_another_file(read, tmp_path):
+    (tmp_path / "part.xml").write_text('<mujocoinclude><geom size="1"/><body gravcomp="1" name="b"/></mujocoinclude>')
+    found = read('<mujoco><worldbody><body name="a"><include file="part.xml"/></body></worldbody></mujoco>').unread
+    assert len(found) == 1 and found[0].endswith("gravcomp is not read: b")
+
+
 @pytest.mark.parametrize("included", [False, True])
 @pytest.mark.parametrize("name", REFUSALS)
 def test_what_would_be_another_robot_is_refused(read, tmp_path, name, included):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
@@ -76,6 +77,40 @@ def test_masses_and_inertias_are_those_of_mujoco(tmp_path, name):
         assert mass.mass == pytest.approx(model.body_mass[k], rel=1e-6)
         np.testing.assert_allclose(mass.center, model.body_ipos[k], atol=1e-7)
         np.testing.assert_allclose(mass.inertia, inertia, atol=1e-6 * np.abs(inertia).max())
+
+
+def test_gravity_that_is_switched_off_is_off(tmp_path):
+    made, _ = imported(tmp_path, robot(head='<option><flag gravity="disable"/></option>'))
+    assert made.character.gravity.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_geometry_gives_no_mass_where_the_compiler_does_not(tmp_path):
+    inertial = INERTIAL.format('diaginertia="0.001 0.002 0.0025"')
+    post = ROBOT.replace('<body name="post">', f'<body name="post">{inertial}')
+    text = post.format(head='<compiler inertiafromgeom="false"/>', joint="", grip="", tail="", arm=inertial,
+                       hand=BALL.format(""))  # fmt: skip
+    with pytest.raises(ShotError, match="without mass moves"):
+        imported(tmp_path, text)
+
+
+def test_a_base_that_nothing_drives_is_told_and_can_get_motors(tmp_path):
+    """The floating base of a planar walker."""
+    joints = "".join(
+        f'<joint name="{name}" type="slide" axis="{axis}"/>' for name, axis in (("x", "1 0 0"), ("z", "0 0 1"))
+    )
+    text = robot(tail=POSITION.format("")).replace('<body name="post">', f'<body name="post">{joints}')
+    (tmp_path / "wave.csv").write_text("time_s,lift\n0,0\n0.1,0.1\n0.2,0\n")
+    imported(tmp_path, text, motion=tmp_path / "wave.csv")
+    with pytest.raises((ShotError, cm.RunError), match=r"Give \S+/x, \S+/z, \S+/grip motors"):
+        cm.simulate(tmp_path / "robot.usda", step=0.01)
+    made, _ = imported(tmp_path, text, motion=tmp_path / "wave.csv", motors=["all"])
+    assert len(made.character.motors) == 4 and cm.simulate(tmp_path / "robot.usda", step=0.01)
+
+
+def test_one_link_at_the_world_is_where_its_joint_is(tmp_path):
+    body = '<body name="arm" pos="0 0 0.1"><joint name="lift"/><geom size="0.1"/></body>'
+    made, _ = imported(tmp_path, f'<mujoco model="m"><worldbody>{body}</worldbody></mujoco>')
+    assert not any("do not meet" in note for note in made.notes)
 
 
 def test_a_robot_in_two_files_has_the_masses_of_both(tmp_path):

@@ -90,8 +90,13 @@ def compare(robot: Path, folder: Path) -> tuple[float, float]:
     return float(np.abs(torques - expected["torques"]).max() / np.abs(expected["torques"]).max()), float(max(far))
 
 
-def test_two_links_of_a_urdf_need_the_torques_that_mujoco_finds(tmp_path):
-    (tmp_path / "arm.urdf").write_text(TWO_LINKS)
+BAR = '<collision><origin xyz="0.2 0 0"/><geometry><box size="0.4 0.02 0.02"/></geometry></collision></link>'
+AT_ORIGIN = TWO_LINKS.replace('<origin xyz="0.2 0.01 0"/>', "").replace("</inertial></link>", f"</inertial>{BAR}")
+
+
+@pytest.mark.parametrize("text", [TWO_LINKS, AT_ORIGIN], ids=["", "inertia_without_origin"])
+def test_two_links_of_a_urdf_need_the_torques_that_mujoco_finds(tmp_path, text):
+    (tmp_path / "arm.urdf").write_text(text)
     torque, far = compare(tmp_path / "arm.urdf", tmp_path)
     assert torque < 1e-4 and far < 1e-6
 

@@ -95,6 +95,12 @@ MESHED = '<mujoco model="m"><asset><mesh name="a" file="arm.stl" {}/></asset>' +
 )
 PID = '<actuator><pid joint="lift" kp="50" kd="2"/></actuator>'
 
+ATTACHED = '<mujoco model="h"><compiler angle="radian"/><worldbody><body name="hand"><joint name="turn" range="-1 1"/>'
+ATTACHED += '<geom size="0.02"/></body></worldbody></mujoco>'
+ATTACHES = '<mujoco model="m"><asset><model name="h" file="hand.xml"/></asset>' + MJCF[18:].replace(
+    "</body>", '<attach model="h" body="hand" prefix="l_"/></body>'
+)
+
 CASES = {
     "a missing mesh": Case(with_mesh("arm.stl"), "missing", "Put the files there", with_mesh("arm.stl"),
                            prepare=mesh_file),
@@ -110,7 +116,17 @@ CASES = {
                       type="fixed"><parent link="base"/><child link="b"/></joint></robot>""")),
     "a joint that follows itself": Case(URDF.replace("<axis", '<mimic joint="lift"/><axis'), "in a circle",
                                         "Remove the <mimic>", URDF),
-    "an expression of xacro": Case(URDF.replace('lower="-2"', 'lower="${-2}"'), "xacro", "Run `xacro", URDF),
+    "an expression of xacro": Case(URDF.replace('lower="-2"', 'lower="${-2}"'), "xacro",
+                                   "`xacro robot.urdf > expanded.urdf`", URDF),
+    "a rotation that is not rpy": Case(URDF.replace("<axis", '<origin quat_xyzw="0 0 1 0"/><axis'), "this rotation",
+                                       "Write it as rpy", URDF.replace("<axis", '<origin rpy="0 0 3.14159"/><axis')),
+    "an attached robot in radians": Case(ATTACHES, "the compiler of the file around it", "the same angle",
+                                         ATTACHES.replace("<asset>", '<compiler angle="radian"/><asset>'),
+                                         prepare=lambda f, done: (f / "hand.xml").write_text(ATTACHED)),
+    "joints without names": Case(MJCF.replace(BODY, TWO).replace('name="lift"', "").replace('name="turn"', ""),
+                                 "several joints have this name", "by its path: .*/m/Geometry/arm/PhysicsRevoluteJoint",
+                                 motion=TABLE.replace("lift", "PhysicsRevoluteJoint"),
+                                 fixed_motion=TABLE.replace("lift", "/m/Geometry/arm/PhysicsRevoluteJoint")),
     "geometry without inertia": Case(URDF.replace(f"{INERTIAL}{BOX}", BOX), "no inertia", "--solid (abs)",
                                      instead=lambda found: {"solid": found[1]}),
     "a link that is not there": Case(URDF, "no link", "Did you mean (arm)",

@@ -42,6 +42,15 @@ def test_the_conventions_of_usdphysics_are_followed(tmp_path, direction, magnitu
     assert np.allclose(found, expected, atol=1e-6)
 
 
+@pytest.mark.parametrize("on", [False, True])
+def test_newton_can_switch_gravity_off(tmp_path, on):
+    def edit(stage):
+        scene(stage)
+        stage.GetPrimAtPath("/scene").CreateAttribute("newton:gravityEnabled", Sdf.ValueTypeNames.Bool).Set(on)
+
+    assert read(tmp_path, edit).gravity.tolist() == [0.0, 0.0, -9.81 * on]
+
+
 def test_of_several_scenes_that_of_the_bodies_counts(tmp_path):
     def edit(stage, *owners):
         for name, magnitude in (("earth", 9.81), ("moon", 1.62)):

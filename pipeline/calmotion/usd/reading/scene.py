@@ -27,7 +27,7 @@ def gravity(reading: Reading, bodies: Sequence[str] = ()) -> Array:
     """Gravity [m/s^2], shape [3], world: of the PhysicsScene, else 9.81 down the up axis.
 
     UsdPhysics: a direction (0, 0, 0) means down, a negative magnitude means that of the Earth. Of several scenes that
-    one counts which the bodies name as their `physics:simulationOwner`.
+    one counts which the bodies name as their `physics:simulationOwner`. `newton:gravityEnabled` switches it off.
 
     Args:
         bodies: Paths of the bodies.
@@ -57,6 +57,9 @@ def gravity(reading: Reading, bodies: Sequence[str] = ()) -> Array:
             raise ShotError(
                 "is not finite", path=scene.GetPath(), attribute=name, found=value, remedy="Author a finite value"
             )
+    switch = scene.GetAttribute("newton:gravityEnabled")
+    if switch and switch.Get(reading.start) is False:
+        return np.zeros(3)
     size = float(np.linalg.norm(direction))
     along: Array = down if size == 0.0 else direction / size
     return along * (EARTH_GRAVITY if magnitude < 0.0 else reading.units.acceleration(magnitude))

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _KINDS = ("fixed", "revolute", "prismatic", "spherical")
 AWAY = 1e-2  # from each other, over the size of the robot
+_ROUNDED = 1e-6  # likewise, over the farthest coordinate: positions of frames are single precision
 TURNED = 1.0  # [deg]
 
 
@@ -36,12 +37,13 @@ def tell_what_is_elsewhere(reading: Reading, joints: Sequence[JointPrim], poses:
     places = np.array([pose.position for pose in poses.values()]) * meters
     anchors = [joint.frame1.position for joint in joints] + [j.frame0.position for j in joints if j.body0]
     size = max([float(np.max(np.ptp(places, axis=0))), *(float(np.linalg.norm(at)) for at in anchors)])
+    far = max(float(np.abs(at).max()) for at in (places, *(joint.frame0.position for joint in joints)))
     found = []
     for joint in joints:
         if joint.prim is None or joint.whole is not None or joint.closes_chain or joint.kind not in _KINDS:
             continue
         away, turned = _apart(joint, poses, meters)
-        if away > AWAY * size or turned > TURNED:
+        if away > max(AWAY * size, _ROUNDED * far) or turned > TURNED:
             found.append((away / max(size, 1e-300) + np.radians(turned), away, turned, joint))
     if not found:
         return
