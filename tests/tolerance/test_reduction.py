@@ -87,10 +87,10 @@ def test_fine_reductions_see_pairs_as_for_a_tenth_of_the_tolerance(arm, animatio
 def test_reductions_are_compared_by_one_integrator(arm, animation, meshes, monkeypatch):
     reference_run, runs = module.reference_run, []
 
-    def gives_way_for_the_second(shot, options, step):
+    def gives_way_for_the_second(shot, options, step, **wanted):
         if len(runs) == 1:
             options = dataclasses.replace(options, integrator="bdf2")
-        runs.append(reference_run(shot, options, step).run)
+        runs.append(reference_run(shot, options, step, **wanted).run)
         return ReferenceRun(animation, runs[-1])
 
     monkeypatch.setattr(module, "reference_run", gives_way_for_the_second)

@@ -27,6 +27,8 @@ class LoadEnvelope:
         closed_chain: Whether the body is part of a closed chain. The other bodies of the chain may constrain any motion
             of its interfaces. The simulation of the rigid robot does not give these loads, so the body needs a
             coordinate for each motion of its interfaces.
+        directed: Whether the directions are those of loads on the flexible robot. A rigid robot that swings in a plane
+            does not twist its links. A flexible one may, because deflections move the loads out of the plane.
     """
 
     acceleration: Array
@@ -37,6 +39,7 @@ class LoadEnvelope:
     frequency: float = 0.0
     target_distance: Array | None = None
     closed_chain: bool = False
+    directed: bool = False
 
     @property
     def lever_arm(self) -> Array:
@@ -47,9 +50,6 @@ class LoadEnvelope:
 
 def load_direction_envelope(load_envelope: LoadEnvelope, angle: float, size: float) -> LoadEnvelope:
     """The envelope over all directions that the loads may take when deflections rotate the robot by up to an angle.
-
-    A rigid robot that swings in a plane does not twist its links. A flexible one does, because deflections move the
-    loads out of the plane.
 
     Args:
         angle: Largest rotation about any axis [rad].
@@ -69,6 +69,21 @@ def load_direction_envelope(load_envelope: LoadEnvelope, angle: float, size: flo
         force=in_all_directions(load_envelope.force),
         moment=np.maximum(in_all_directions(load_envelope.moment), moment_of_force),
     )
+
+
+def directed_load_envelope(rigid: LoadEnvelope, flexible: LoadEnvelope, overshoot: float) -> LoadEnvelope:
+    """The envelope of a rigid robot's loads with the directions of those on the flexible one.
+
+    Args:
+        overshoot: How far the loads on the flexible robot may exceed those on the rigid one in the same motion; what uses
+            an envelope multiplies it by this.
+    """
+
+    def largest(name: str) -> Array:
+        return np.asarray(np.maximum(getattr(rigid, name), getattr(flexible, name) / overshoot))
+
+    names = ("acceleration", "angular_acceleration", "angular_velocity", "force", "moment")
+    return replace(rigid, directed=True, **{name: largest(name) for name in names})
 
 
 def patch_load_envelope(

@@ -12,7 +12,8 @@ from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import body_anchors
 from calmotion.multibody.model.topology import span_tree
-from calmotion.reduction.load_envelope import LoadEnvelope
+from calmotion.reduction.basis.static_loads import OVERSHOOT
+from calmotion.reduction.load_envelope import LoadEnvelope, directed_load_envelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.simulation.bodies import bodies_in_parallel, full_model_of, reduce_bodies
 from calmotion.simulation.preparation import grid_of
@@ -97,6 +98,19 @@ class BodyReduction:
         result = BodyReduction(self.character, meshes, loads, self._repeats and models is not None)
         if models is not None:
             result._full = models.only(finer.values())
+        return result
+
+    def with_directions(self, flexible: Sequence[LoadEnvelope]) -> BodyReduction:
+        """The reduction for loads in the directions that they have in a simulation of the flexible robot.
+
+        Args:
+            flexible: Loads on each body in it.
+        """
+        if self.loads is None:
+            return self
+        loads = [directed_load_envelope(*pair, OVERSHOOT) for pair in zip(self.loads, flexible, strict=True)]
+        result = BodyReduction(self.character, self.meshes, loads, self._repeats)
+        result._full = self._full
         return result
 
     def release(self) -> None:

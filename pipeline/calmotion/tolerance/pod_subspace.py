@@ -228,9 +228,9 @@ def _candidates(shot: CompiledShot, options: RunSettings) -> list[int]:
     return found
 
 
-def reference_run(shot: CompiledShot, options: RunSettings, step: float) -> ReferenceRun:
+def reference_run(shot: CompiledShot, options: RunSettings, step: float, loads: bool = False) -> ReferenceRun:
     """The shot by its current curves, simulated with all coordinates; arguments as of `simulate_at`."""
-    run = by_fast_scheme(options, lambda options: simulate_at(shot, options, step, elastic=True))
+    run = by_fast_scheme(options, lambda options: simulate_at(shot, options, step, elastic=True, loads=loads))
     return ReferenceRun(shot.animation, run)
 
 

@@ -48,6 +48,7 @@ def converged_reduction(
         ShotError: A body cannot be reduced, or the shot not be simulated.
     """
     refined = _Refinement(shot, options, retargeted, progress)
+    reduction = reduction.with_directions(refined.known().run.loads)
     refined.refine(reduction)
     # Meshes come second: most reductions are made on the first ones, which are some times smaller.
     if refined.limit_m <= refined.allowed:
@@ -87,7 +88,7 @@ class _Refinement:
     ):
         self._options, self._retargeted, self._progress = options, retargeted, progress
         self._requested = self._tolerance = tolerance_of(shot.character, options.tolerance)
-        self._tried = 0
+        self._tried, self._counts_shake = 0, retargeted
         self.shot, self.off, self.allowed = shot, 0.0, SHARE * self._requested
         self.found: ReferenceRun | None = None
 
@@ -127,16 +128,13 @@ class _Refinement:
         return reduction.bodies(tolerance, max(1.0, PAIRS * self._requested / tolerance), progress)
 
     def _compare(self, finer: CompiledShot) -> None:
-        first = self.found is None
-        if self.found is None:
-            before, then = _simulated(self._options, self.shot, finer)
-        else:
-            before, then = self.found, *_simulated(self._options, finer)
+        before, then = self.known(), *_simulated(self._options, finer)
         if then.run.integrator != before.run.integrator:  # it gave way for one of them, which differs by more
             self._options = replace(self._options, integrator=self._options.scheme)
             before, then = _simulated(self._options, self.shot, finer)
         self.off = distance(then.run.positions, before.run.positions)
-        if self._retargeted and first:
+        if self._counts_shake:
+            self._counts_shake = False
             shake = distance(before.run.positions, intended_positions(self.shot, self._options))
             self.allowed = max(self.allowed, OF_SHAKE * shake)
         self.shot, self.found = finer, then
@@ -150,7 +148,7 @@ class _Refinement:
 
 
 def _simulated(options: RunSettings, *shots: CompiledShot) -> list[ReferenceRun]:
-    return in_parallel(lambda shot: reference_run(shot, options, options.step or MAX_STEP), shots)
+    return in_parallel(lambda shot: reference_run(shot, options, options.step or MAX_STEP, loads=True), shots)
 
 
 def _with_modes_by_tolerance(reduction: BodyReduction) -> BodyReduction | None:

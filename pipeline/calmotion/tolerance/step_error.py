@@ -15,6 +15,7 @@ from calmotion.model.character import contact_joints
 from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import ForwardRun, reactions_at, run_forward
@@ -22,6 +23,7 @@ from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.open_chains import open_joints
 from calmotion.simulation.preparation import Prepared, failure_error, prepare
 from calmotion.simulation.report import elastic_by_body
+from calmotion.simulation.rigid_run import excitation_of
 from calmotion.tolerance.integrator_choice import SAFE
 
 CLOSED_GAP = 1e-6  # largest position gap of a joint that counts as none [m]
@@ -44,6 +46,7 @@ class StepRun:
         gap: Largest position gap of a joint at any step [m].
         efforts: Of the motors [N m] or [N], shape [f, M]; None where they are not known.
         order: With which power of the step its error goes.
+        loads: On each body of the character; empty where nobody asked for them.
     """
 
     step: float
@@ -53,6 +56,7 @@ class StepRun:
     gap: float = 0.0
     efforts: Array | None = None
     order: int = ORDER
+    loads: tuple[LoadEnvelope, ...] = ()
 
 
 def order_of(character: Character) -> int:
@@ -63,14 +67,16 @@ def order_of(character: Character) -> int:
 
 
 def simulate_at(
-    shot: CompiledShot, options: RunSettings, step: float, elastic: bool = False, divides: bool = True
-) -> StepRun:
+    shot: CompiledShot, options: RunSettings, step: float, elastic: bool = False, divides: bool = True,
+    loads: bool = False,
+) -> StepRun:  # fmt: skip
     """One simulation of a shot's current curves.
 
     Args:
         step: [s].
         elastic: Whether the elastic coordinates are wanted.
         divides: Whether a step that cannot be solved is divided into smaller ones, where the shot does not loop.
+        loads: Whether the loads on the bodies are wanted.
 
     Raises:
         ShotError: The shot cannot be simulated by this step.
@@ -90,6 +96,7 @@ def simulate_at(
     return StepRun(
         grid.h, run.target_positions[grid.frames], tuple(part.astype(np.float32) for part in parts), options.scheme,
         run.trajectory.max_joint_gap, _efforts(prepared, run, grid.frames), order_of(shot.character),
+        excitation_of(shot.character, model, run, grid.h) if loads else (),
     )  # fmt: skip
 
 

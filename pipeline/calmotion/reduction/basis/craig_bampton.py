@@ -166,17 +166,13 @@ def _chosen(fixed: FixedInterface, outputs: _Outputs, settings: FlexibleSettings
     limit = frequency_limit(settings, _BAND * outputs.load_envelope.frequency)
     columns, U, units = _candidates(fixed, outputs, limit)
     static = outputs.at_peaks(units)
-    size = float(np.linalg.norm(np.ptp(fixed.model.mesh.nodes, axis=0)))
-    used = _used(outputs)
-    outputs = replace(
-        outputs,
-        load_envelope=load_direction_envelope(
-            outputs.load_envelope, largest_displacement(static.response) / size, size
-        ),
-    )
-    if not np.array_equal(used, _used(outputs)):  # else the same vectors, whatever the sizes of their loads
-        columns, U, units = _candidates(fixed, outputs, limit)
-    static = outputs.at_peaks(units)
+    if not outputs.load_envelope.directed:
+        used, size = _used(outputs), float(np.linalg.norm(np.ptp(fixed.model.mesh.nodes, axis=0)))
+        angle = largest_displacement(static.response) / size
+        outputs = replace(outputs, load_envelope=load_direction_envelope(outputs.load_envelope, angle, size))
+        if not np.array_equal(used, _used(outputs)):  # else the same vectors, whatever the sizes of their loads
+            columns, U, units = _candidates(fixed, outputs, limit)
+        static = outputs.at_peaks(units)
     kept = static.omega_squared <= (2.0 * np.pi * limit) ** 2
     if settings.max_frequency < 0.0:
         kept |= largest_displacement_by_mode(static) * _dynamic_part(static.omega_squared, limit) > tolerance
