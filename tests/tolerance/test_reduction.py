@@ -4,12 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model import FEMeshes
 from calmotion.model.character import with_settings
 from calmotion.model.run import RunSettings
 from calmotion.simulation import body_reduction
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.body_reduction import reduction_for
+from calmotion.simulation.body_reduction import BodyReduction, reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.testing import beam_arm, quintic, shot_of
 from calmotion.tolerance import reduction as module
 from calmotion.tolerance.integrator_choice import FAST
 from calmotion.tolerance.pod_subspace import ReferenceRun
@@ -46,6 +48,31 @@ def test_the_motion_keeps_the_tolerance_against_a_far_finer_reduction(arm, anima
     np.testing.assert_allclose(converged.known.run.positions, found, rtol=0.0, atol=1e-10)  # but for rounding
     if tolerance > 5e-4:
         assert count(converged.shot) < count(fine[0])
+
+
+def swung(turned):
+    """An arm of two flat links that swings in a plane, turned about their axes by an angle to it [rad]."""
+    character, meshes = beam_arm(2, length=0.3, thickness=0.016, payload=0.2, across=1)
+    cosine, sine = np.cos(turned), np.sin(turned)
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+    flat = FEMeshes(
+        tuple(dataclasses.replace(mesh, points=mesh.points * [1.0, 2.0, 1.0] @ turn.T) for mesh in meshes.meshes)
+    )
+    move, back = quintic(0.8, 0.4, 0.2), quintic(-1.1, 0.35, 0.9)
+    return character, shot_of(lambda t: move(t) + back(t), 1.5, motors=2), flat
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.5])
+def test_directions_are_those_of_loads_on_the_flexible_robot(turned, monkeypatch):
+    """In the plane a flat link bends aside of no load; turned, it does, which a rigid robot's loads do not tell."""
+    shot = swung(turned)
+    finest = reduced_shot(*shot, RunSettings(tolerance=1e-6))
+    converged = refined(*shot, 1e-3)
+    positions = [simulate_at(item, BY, STEP).positions for item in (converged.shot, finest)]
+    assert distance(*positions) < 1e-3
+    assert (np.abs(positions[1][:, :, 1]).max() > 1e-3) == (turned > 0.0)
+    monkeypatch.setattr(BodyReduction, "with_directions", lambda self, loads: self)
+    assert count(converged.shot) <= (0.7 if turned == 0.0 else 1.0) * count(refined(*shot, 1e-3).shot)
 
 
 def test_a_tighter_tolerance_keeps_more(arm, animation, meshes):

@@ -75,15 +75,21 @@ def directed_load_envelope(rigid: LoadEnvelope, flexible: LoadEnvelope, overshoo
     """The envelope of a rigid robot's loads with the directions of those on the flexible one.
 
     Args:
-        overshoot: How far the loads on the flexible robot may exceed those on the rigid one in the same motion; what uses
-            an envelope multiplies it by this.
+        overshoot: Loads on the flexible robot over those on the rigid one; who uses an envelope multiplies it by this.
     """
 
-    def largest(name: str) -> Array:
-        return np.asarray(np.maximum(getattr(rigid, name), getattr(flexible, name) / overshoot))
+    def largest(by_rigid: Array, by_flexible: Array) -> Array:
+        return np.asarray(np.maximum(by_rigid, by_flexible / overshoot))
 
-    names = ("acceleration", "angular_acceleration", "angular_velocity", "force", "moment")
-    return replace(rigid, directed=True, **{name: largest(name) for name in names})
+    return replace(
+        rigid,
+        acceleration=largest(rigid.acceleration, flexible.acceleration),
+        angular_acceleration=largest(rigid.angular_acceleration, flexible.angular_acceleration),
+        angular_velocity=largest(rigid.angular_velocity, flexible.angular_velocity),
+        force=largest(rigid.force, flexible.force),
+        moment=largest(rigid.moment, flexible.moment),
+        directed=True,
+    )
 
 
 def patch_load_envelope(

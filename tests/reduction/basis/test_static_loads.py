@@ -1,7 +1,12 @@
 """Unit accelerations, and their peaks."""
 
 import numpy as np
-from calmotion.reduction.load_envelope import LoadEnvelope, load_direction_envelope, patch_load_envelope
+from calmotion.reduction.load_envelope import (
+    LoadEnvelope,
+    directed_load_envelope,
+    load_direction_envelope,
+    patch_load_envelope,
+)
 
 
 def an_excitation(rng, rows=2):
@@ -38,3 +43,11 @@ def test_a_rotated_body_gets_components_of_every_load_in_all_directions():
     assert np.allclose(found.moment, [[0.2, 0.2, 2.0]])
     assert np.allclose(load_direction_envelope(item, 7.0, 0.2).force, 5.0)  # no more than all of it
     assert np.array_equal(load_direction_envelope(item, 0.0, 0.2).force, force)
+
+
+def test_a_flexible_robot_tells_directions_and_no_smaller_loads():
+    rigid = LoadEnvelope(np.array([0.0, 9.81, 0.0]), *np.zeros((2, 3)), np.array([[3.0, 0.0, 0.0]]), np.zeros((1, 3)))
+    flexible = LoadEnvelope(np.array([0.0, 9.0, 0.4]), *np.zeros((2, 3)), np.array([[8.0, 0.2, 0.0]]), np.ones((1, 3)))
+    found = directed_load_envelope(rigid, flexible, 2.0)
+    assert np.allclose(found.acceleration, [0.0, 9.81, 0.2]) and np.allclose(found.force, [[4.0, 0.1, 0.0]])
+    assert np.allclose(found.moment, 0.5) and found.directed and not rigid.directed

@@ -50,7 +50,7 @@ class FixedInterface:
     solver: SparseSolver
     constraint: Array
     _softer: tuple[FixedInterface, float] | None = field(default=None, repr=False)  # see `scaled`
-    _normal: dict[float, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
+    _normal: list[tuple[Array, Array]] = field(default_factory=list, init=False, repr=False)
     _inertial: list[tuple[Array, Array]] = field(default_factory=list, init=False, repr=False)
     # links that are copies are reduced in several threads
     _lock: threading.RLock = field(default_factory=threading.RLock, init=False, repr=False)
@@ -93,7 +93,7 @@ class FixedInterface:
         """Constraint modes and enough normal modes for `count` accurate modes of the body, shape [3n, 6p + k]."""
         # as many as modes are kept: with constraint modes alone the lowest frequencies would be too high
         count = min(max(count, _FEWEST), len(self.interior))
-        return self._columns(lowest_modes(self.K, self.M, count, solver=self.solver)[1])
+        return self._columns(self._normal_modes(count)[1][:, :count])
 
     def usual(self, settings: FlexibleSettings) -> tuple[Array, int]:
         """Constraint modes, normal modes and residual vectors of a body whose loads are not known.
@@ -103,10 +103,11 @@ class FixedInterface:
         """
         if settings.max_frequency >= 0.0:
             limit = (2.0 * np.pi * settings.max_frequency) ** 2
-            values, vectors = lowest_modes(self.K, self.M, 1, solver=self.solver, below=limit)
+            values, vectors = self._normal_modes(1, limit)
             values, vectors = values[values <= limit], vectors[:, values <= limit]
         else:
-            values, vectors = lowest_modes(self.K, self.M, min(_MOST, len(self.interior)), solver=self.solver)
+            most = min(_MOST, len(self.interior))
+            values, vectors = (part[..., :most] for part in self._normal_modes(most))
             count = self._automatic_count(values, vectors)
             values, vectors = values[:count], vectors[:, :count]
         residual = self._residual(values, vectors, self._work_weight(), _COMPLIANCE_LEFT)
@@ -122,21 +123,33 @@ class FixedInterface:
         return self._columns(vectors, self._residual(values, vectors, peaks, 0.0))
 
     def _up_to(self, below: float) -> tuple[Array, Array]:
-        """Normal modes up to a squared frequency [1/s^2] and one above, some at least; kept for other loads."""
-        if self._softer is not None:
-            other, factor = self._softer
-            values, vectors = other._up_to(below / factor)
-            return factor * values, vectors
-        bound = _GRID ** np.ceil(np.log(below) / np.log(_GRID)) if below > 0.0 else 0.0
+        """Normal modes up to a squared frequency [1/s^2] and one above, some at least."""
         least = min(_MOST, len(self.interior))
-        with self._lock:
-            if bound not in self._normal:
-                self._normal[bound] = lowest_modes(
-                    self.K, self.M, least, solver=self.solver, below=bound, most=_CANDIDATES
-                )
-        values, vectors = self._normal[bound]
+        values, vectors = self._normal_modes(least, below, _CANDIDATES)
         count = max(least, int(np.count_nonzero(values <= below)) + 1)
         return values[:count], vectors[:, :count]
+
+    def _normal_modes(self, count: int, below: float = 0.0, most: int | None = None) -> tuple[Array, Array]:
+        """At least `count` normal modes, those up to a squared frequency [1/s^2] and one above, as far as there are
+        `most`; what was found is kept."""
+        if self._softer is not None:
+            other, factor = self._softer
+            values, vectors = other._normal_modes(count, below / factor, most)
+            return factor * values, vectors
+        with self._lock:
+            if not self._normal or not self._is_enough(self._normal[0][0], count, below, most):
+                bound = _GRID ** np.ceil(np.log(below) / np.log(_GRID)) if below > 0.0 else None
+                count = min(max(count, _MOST), len(self.interior))
+                self._normal[:] = [
+                    lowest_modes(self.K, self.M, count, solver=self.solver, below=bound, most=most and max(most, count))
+                ]
+            return self._normal[0]
+
+    def _is_enough(self, values: Array, count: int, below: float, most: int | None) -> bool:
+        """Whether known modes are all that are asked for."""
+        if len(values) >= min(len(self.interior), np.inf if most is None else most):
+            return True
+        return len(values) >= count and bool(values[-1] > below)
 
     def balance(self, force: Array, imposed: Array) -> tuple[Array, Array]:
         """Static equilibrium under forces, with displacements imposed on the patches besides their rigid motions.
