@@ -131,7 +131,7 @@ def late(h: float, command: Array, start: float, length: float, out: Array) -> N
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def march(h: float, place: Array, mass: Array, damping: Array, stiffness: Array, force: Array, out: Array) -> None:
-    """A linear system whose matrices change from pose to pose, from rest; by the implicit midpoint rule.
+    """A linear system whose matrices change from pose to pose, from rest in a place; by the implicit midpoint rule.
 
         mass y'' + (damping + mass' / 2) y' + stiffness y = force
 
@@ -140,11 +140,11 @@ def march(h: float, place: Array, mass: Array, damping: Array, stiffness: Array,
         place: Between which poses the robot is, shape [T].
         mass, damping, stiffness: In the poses, shape [P, n, n].
         force: Shape [T, n].
-        out: y, y' and y'', shape [3, T, n].
+        out: y, y' and y'', shape [3, T, n]; y begins with the value that is there.
     """
     poses, n = mass.shape[0], mass.shape[1]
     M, A = np.zeros((n, n)), np.zeros((n, n))
-    y, v = np.zeros(n), np.zeros(n)
+    y, v = out[0, 0].copy(), np.zeros(n)
     before = mass[0].copy()
     for t in range(len(force) - 1):
         at = min(max(0.5 * (place[t] + place[t + 1]), 0.0), poses - 1.0)

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from calmotion.arrays import Array, BoolArray
 from calmotion.model import DRIVE, ON_ERROR, RunSettings, curve_of
-from calmotion.multibody import Model, PoseModel, SimulationFailure, pose_model, rigid_poses
+from calmotion.multibody import Model, PoseModel, SimulationFailure, VelocityForces, pose_model, rigid_poses
 from calmotion.simulation import CompiledShot, compile_shot, prepare
-from scipy.linalg import eigh
+from scipy.linalg import block_diag, eigh
 from scipy.spatial.transform import Rotation
 
-HIGHEST, MOST = 150.0, 8  # frequency [Hz] up to which coordinates of links are used, and their largest number
+HIGHEST, MOST = 150.0, 8  # frequency [Hz] up to which modes of the links are used, and the largest number of shapes
+OFTEN = 0.01  # at which forces that change with the pose are taken [s]
+SMALL = 0.02  # shapes that all modes need by less than this, of the one they need most, are left out
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,30 +60,37 @@ class FlexibleRobot:
     """Small motions of the robot with its links, in poses along the motion (M motors, K targets).
 
     The n coordinates y are the same in all poses: deflections of the motors' loops, command less joint, shape [M], and
-    elastic coordinates of the links.
+    sizes of deflections of the links that span their modes.
 
-        mass y'' + damping y' + stiffness y + loops = by_acceleration q''
+        mass y'' + damping y' + stiffness y + loops = by_acceleration q'' + pushes
 
     Attributes:
-        times: At which the robot is in each pose [s], shape [P].
+        place: Between which poses the robot is, shape [T].
         mass, damping, stiffness: Without the gains and dampings of the loops, shape [P, n, n].
         by_acceleration: Of the commands, shape [P, n, M].
         targets: Motion of the targets, position in world axes and turn in target axes, shape [P, K, 6, n].
+        pushed, pushes: Weight, centrifugal and Coriolis forces, shape [F, n], and when they act [s], shape [F].
     """
 
-    times: Array
+    place: Array
     mass: Array
     damping: Array
     stiffness: Array
     by_acceleration: Array
     targets: Array
+    pushed: Array
+    pushes: Array
 
     def lowest(self, gains: Array, factor: float = 1.0) -> float:
-        """Lowest frequency over the poses [Hz] with loops of these gains, and a factor of the links' frequencies."""
+        """Lowest frequency over the poses [Hz] with loops of these gains, infinite of joints that follow exactly, and a
+        factor of the links' frequencies."""
         loops = np.zeros(self.mass.shape[1])
         loops[: len(gains)] = gains
+        free = np.flatnonzero(np.isfinite(loops))
         found = [
-            eigh(factor**2 * K + np.diag(loops), M, eigvals_only=True)[0]
+            eigh(
+                (factor**2 * K)[free[:, None], free] + np.diag(loops[free]), M[free[:, None], free], eigvals_only=True
+            )[0]
             for M, K in zip(self.mass, self.stiffness, strict=True)
         ]
         return float(np.sqrt(max(min(found), 0.0)) / (2.0 * np.pi))
@@ -184,27 +193,50 @@ def flexible_robot(
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(command, axis=0)).sum(axis=1))])
     at = np.unique(np.clip(np.searchsorted(way, np.linspace(0.0, way[-1], poses)), 0, len(times) - 1))
     found = [_in_coordinates(pose_model(model, command[k], world), rows, sign) for k in at]
-    M, C, K, by, targets = (np.array(part) for part in zip(*found, strict=True))
+    M, C, K, by, targets, motions = (np.array(part) for part in zip(*found, strict=True))
     count = len(gains)
     K[:, range(count), range(count)] -= gains
     C[:, range(count), range(count)] -= dampings
-    own = np.einsum("pii->pi", K)[:, count:].mean(0) / np.einsum("pii->pi", M)[:, count:].mean(0)
-    low = np.flatnonzero(own < (2.0 * np.pi * HIGHEST) ** 2)
-    kept = np.concatenate([np.arange(count), count + low[np.argsort(own[low])][:MOST]])
-    if len(kept) == count:
+    shapes = _shapes(M[:, count:, count:], K[:, count:, count:])
+    if not shapes.shape[1]:
         return None
-    return FlexibleRobot(
-        times[at], M[:, kept[:, None], kept], C[:, kept[:, None], kept], K[:, kept[:, None], kept], by[:, kept],
-        targets[..., kept],
-    )  # fmt: skip
+    basis = block_diag(np.eye(count), shapes)
+    M, C, K = (basis.T @ matrices @ basis for matrices in (M, C, K))
+    some = slice(None, None, max(1, round(OFTEN / (times[1] - times[0]))))
+    forces, rates = VelocityForces(model, world), np.gradient(command, times, axis=0)
+    acting = np.array([forces.with_weight(*both) for both in zip(command[some], rates[some], strict=True)])
+    # in the coordinates of the pose before and of that behind, as those of the bodies turn
+    place = np.interp(way, way[at], np.arange(len(at)))
+    first = np.minimum(place[some].astype(int), max(len(at) - 2, 0))
+    second, share = np.minimum(first + 1, len(at) - 1), (place[some] - first)[:, None]
+    sides = (np.einsum("fN,fNn->fn", acting, (motions @ basis)[side]) for side in (first, second))
+    pushes = -((1.0 - share) * next(sides) + share * next(sides))
+    return FlexibleRobot(place, M, C, K, basis.T @ by, targets @ basis, times[some], pushes)
+
+
+def _shapes(M: Array, K: Array) -> Array:
+    """Deflections of the links that span their modes in all poses while the joints hold, most compliant first, shape
+    [n, r]: mass and stiffness have shape [P, n, n]."""
+    found = []
+    for mass, stiffness in zip(M, K, strict=True):
+        squares, modes = eigh(stiffness, mass)
+        low = (squares > 0.0) & (squares < (2.0 * np.pi * HIGHEST) ** 2)
+        found.append(modes[:, low] / squares[low])
+    L = np.linalg.cholesky(K.mean(axis=0))
+    U, sizes, _ = np.linalg.svd(L.T @ np.concatenate(found, axis=1), full_matrices=False)
+    kept = sizes[:MOST] > SMALL * sizes.max(initial=0.0)
+    return np.asarray(np.linalg.solve(L.T, U[:, :MOST][:, kept]))
 
 
 def _in_coordinates(pose: PoseModel, rows: Sequence[int], sign: Array) -> list[Any]:
     """Mass, damping and stiffness in some of the robot's own coordinates, which determine all others; what the
-    commands' accelerations do to them, and what they do to the targets."""
+    commands' accelerations do to them, and what they do to the targets and to all coordinates."""
     Y = np.linalg.inv(pose.shapes[rows] * sign[:, None])
     stiffness = Y.T @ (pose.omega[:, None] ** 2 * Y)
-    return [Y.T @ Y, Y.T @ pose.damping @ Y, stiffness, Y.T @ pose.by_acceleration, pose.targets_by_mode @ Y]
+    return [
+        Y.T @ Y, Y.T @ pose.damping @ Y, stiffness, Y.T @ pose.by_acceleration, pose.targets_by_mode @ Y,
+        pose.shapes @ Y,
+    ]  # fmt: skip
 
 
 def _carried(model: Model) -> BoolArray:

@@ -52,10 +52,10 @@ def situation_of(
     if not command.size:
         command = np.zeros((len(times), 0))
     sensors = _sensors(shot, channels, paths, end, notes)
-    sensors = _on_one_clock(sensors, times, command, notes)
     motors = shot.character.motors if shot is not None else (None,) * len(paths)
     situation = Situation(STEP, command, sent, command, (), sensors, None, None, False, tuple(notes))
-    situation = with_guessed_loops(_along(situation, shot, paths, motors, command))
+    situation = _on_one_clock(_along(situation, shot, paths, motors, command))
+    situation = with_guessed_loops(situation)
     if situation.mechanics is None or shot is None:
         return situation
     # once more along the motion of a healthy robot, which lags behind the command
@@ -239,15 +239,15 @@ def _thinned(times: Array, values: Array, noise: float) -> tuple[Array, Array, f
     return times[: count * group].reshape(count, group).mean(axis=1), own, noise / np.sqrt(group)
 
 
-def _on_one_clock(sensors: tuple[Sensor, ...], times: Array, command: Array, notes: list[str]) -> tuple[Sensor, ...]:
-    """The sensors, moved in time where encoders follow their command much later or earlier."""
-    shifts = []
-    for sensor in sensors:
-        if sensor.kind != ANGLE or sensor.index < 0 or np.ptp(command[:, sensor.index]) < 1e-3:
+def _on_one_clock(situation: Situation) -> Situation:
+    """The situation with sensors moved in time where encoders follow a healthy robot much later or earlier."""
+    shifts, times = [], situation.times
+    for sensor in situation.sensors:
+        if sensor.kind != ANGLE or sensor.index < 0 or np.ptp(situation.command[:, sensor.index]) < 1e-3:
             continue
         grid = np.arange(sensor.times[0], sensor.times[-1], 0.01)
         measured = np.interp(grid, sensor.times, sensor.values[:, 0])
-        asked = np.interp(grid, times, command[:, sensor.index])
+        asked = np.interp(grid, times, situation.motion[0][:, sensor.index])
         lags = np.arange(-300, 301)
         cost = [_difference(measured, asked, int(lag)) for lag in lags]
         # a robot that follows badly seems to be early or late, too
@@ -255,14 +255,14 @@ def _on_one_clock(sensors: tuple[Sensor, ...], times: Array, command: Array, not
         shifts.append(0.01 * float(lags[int(np.argmin(cost))]) if clear else 0.0)
     shift = float(np.median(shifts)) if shifts else 0.0
     if abs(shift) < SHIFTED:
-        return sensors
-    notes.append(f"the recording follows the command by {shift:.2f} s, which is taken as a difference of their clocks")
-    moved = [replace(s, times=s.times - shift) for s in sensors]
+        return situation
+    told = f"the recording follows the command by {shift:.2f} s, which is taken as a difference of their clocks"
     kept = []
-    for s in moved:
-        rows = (s.times >= 0.0) & (s.times <= times[-1])
-        kept.append(replace(s, times=s.times[rows], values=s.values[rows]))
-    return tuple(kept)
+    for s in situation.sensors:
+        own = s.times - shift
+        rows = (own >= 0.0) & (own <= times[-1])
+        kept.append(replace(s, times=own[rows], values=s.values[rows]))
+    return replace(situation, sensors=tuple(kept), notes=(*situation.notes, told))
 
 
 def _difference(measured: Array, asked: Array, lag: int) -> float:

@@ -69,12 +69,14 @@ class Situation:
 
     @cached_property
     def healthy(self) -> Drive:
-        """Loops of the gains that are known, damped so that they do not ring, without friction and delay."""
+        """Loops of the gains that are known, damped so that they do not ring, without friction and delay. What is
+        damped more multiplies the command's rate, too, so that a loop lags as the shot's own does."""
         gain = np.array([joint.gain or np.inf for joint in self.joints])
-        least = [HEALTHY * j.critical(j.gain) for j in self.joints]
-        damping = np.array([max(j.damping, own) for j, own in zip(self.joints, least, strict=True)])
+        damping = np.array([max(j.damping, HEALTHY * j.critical(j.gain)) for j in self.joints])
+        on_joint = [(1.0 - j.share) * j.damping for j in self.joints]
+        share = 1.0 - np.divide(on_joint, damping, out=np.ones(len(gain)), where=damping > 0.0)
         none = np.zeros(len(gain))
-        return Drive(gain, damping, np.array([j.share for j in self.joints]), none, none, none)
+        return Drive(gain, damping, share, none, none, none)
 
     def moved(self, drive: Drive, command: Array | None = None, only: int | None = None) -> Array:
         """Motion of the joints: values, rates and accelerations, shape [3, T, M], or of one of them, [3, T, 1]."""
@@ -122,7 +124,7 @@ class Situation:
         rest = motion - self.moved(linear)
         gain, damping = self.finite(drive)
         inertia = np.stack([joint.inertia for joint in self.joints], axis=1)
-        more = rest[0] + (inertia * rest[2] + damping * rest[1]) / gain
+        more = rest[0] + np.where(np.isfinite(drive.gain), (inertia * rest[2] + damping * rest[1]) / gain, 0.0)
         late = [np.interp(self.times - d, self.times, c) for d, c in zip(drive.delay, self.command.T, strict=True)]
         return np.asarray(np.stack(late, axis=1) + more)
 

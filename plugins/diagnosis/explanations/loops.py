@@ -57,7 +57,7 @@ class ServoGains(LoopExplanation):
     def changed(self, situation: Situation, drive: Drive, motor: int, values: Values) -> Drive:
         """A loop of this frequency and damping."""
         drive = _with_frequency(situation, drive, motor, values["frequency"], values["damping"])
-        return drive.with_joint(motor, {"share": values["share"]}) if "share" in values else drive
+        return drive.with_joint(motor, {"share": values.get("share", situation.joints[motor].share)})
 
     def remedy(self, situation: Situation, parameters: Sequence[Mapping[str, Any]]) -> str:
         """Raise the damping, or the gain."""
@@ -117,7 +117,7 @@ class Delay(LoopExplanation):
         """The delay."""
         joint = situation.joints[motor]
         late = Parameter("delay", "s", (max(joint.delay, 0.03), 0.03, 0.08), -0.05, 0.5)
-        return (late, _frequency(situation, motor)) if joint.guessed else (late,)
+        return (late, _frequency(situation, motor)) if joint.guessed and joint.gain else (late,)
 
     def changed(self, situation: Situation, drive: Drive, motor: int, values: Values) -> Drive:
         """With a delay."""
@@ -126,6 +126,8 @@ class Delay(LoopExplanation):
     def remedy(self, situation: Situation, parameters: Sequence[Mapping[str, Any]]) -> str:
         """Send commands earlier."""
         late = float(np.median([row["value"] for row in parameters if row["name"] == "delay"]))
+        if late < 0.0:
+            return f"the recording is {-1e3 * late:.0f} ms ahead of its commands: log both on one clock"
         return (
             f"the robot moves {1e3 * late:.0f} ms after its command: send commands that much earlier (set "
             "calm:motor:delay, so that calmotion optimize does it), or shorten buffers of the bus and the driver"

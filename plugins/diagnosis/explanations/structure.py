@@ -8,10 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.recordings import ANGLE
+from scipy.linalg import eigh
 from scipy.optimize import least_squares
 
 from ..kernels import march
-from ..signals import Drive, at_places
+from ..signals import Drive, at_places, on_grid
 from ..situation import Situation
 from .base import AddedExplanation, Columns, Effect, Parameter, State
 
@@ -133,32 +134,41 @@ class Links(Structure):
         robot, h = situation.flexible, situation.h
         assert robot is not None
         M = command.shape[1]
-        n = robot.mass.shape[1] if bends else M
-        gain, damping = situation.finite(drive)
-        K, C = float(values[0]) ** 2 * robot.stiffness[:, :n, :n], float(values[1]) * robot.damping[:, :n, :n]
-        K[:, range(M), range(M)] += gain
-        C[:, range(M), range(M)] += damping
-        place = np.interp(situation.times, robot.times, np.arange(len(robot.times)))
+        moves = np.flatnonzero(np.isfinite(drive.gain))  # the loops of the others do not give
+        free = np.concatenate([moves, np.arange(M, robot.mass.shape[1] if bends else M)])
+        both = np.ix_(np.arange(len(robot.mass)), free, free)
+        K, C = float(values[0]) ** 2 * robot.stiffness[both], float(values[1]) * robot.damping[both]
+        loops = np.arange(len(moves))
+        K[:, loops, loops] += drive.gain[moves]
+        C[:, loops, loops] += drive.damping[moves]
+        place = robot.place
         rates = np.gradient(command, h, axis=0)
-        force = np.einsum("tnm,tm->tn", at_places(place, robot.by_acceleration[:, :n]), np.gradient(rates, h, axis=0))
-        force[:, :M] += rates * damping * (1.0 - drive.share)
+        push = at_places(place, robot.by_acceleration[:, free])
+        force = np.einsum("tnm,tm->tn", push, np.gradient(rates, h, axis=0))
+        force[:, loops] += (rates * drive.damping * (1.0 - drive.share))[:, moves]
+        force += on_grid(situation.times, robot.pushed, robot.pushes[:, free])
         some = slice(None, None, self.COARSER)
-        coarse = np.zeros((3, len(place[some]), n))
-        arrays = (np.ascontiguousarray(part) for part in (place[some], robot.mass[:, :n, :n], C, K, force[some]))
+        coarse = np.zeros((3, len(place[some]), len(free)))
+        coarse[0, 0] = np.linalg.solve(K[0], force[0])
+        mass = robot.mass[both]
+        K += _lowered(mass, K, self.COARSER * h)
+        arrays = (np.ascontiguousarray(part) for part in (place[some], mass, C, K, force[some]))
         march(self.COARSER * h, *arrays, coarse)
         between = np.arange(len(command)) / self.COARSER
         y = np.stack([at_places(between, part) for part in coarse])
         shown = {}
         for index in {s.index for s in situation.sensors if s.kind != ANGLE and s.index >= 0}:
-            by = at_places(place, robot.targets[:, index, :, :n])
+            by = at_places(place, robot.targets[:, index][:, :, free])
             moved, felt = np.einsum("tin,tn->ti", by, y[0]), np.einsum("tin,tn->ti", by[:, :3], y[2])
             shown[index] = moved[:, :3], felt, np.einsum("tij,tj->ti", situation.axes(index), moved[:, 3:])
-        return shown, -y[0][:, :M]
+        joints = np.zeros_like(command)
+        joints[:, moves] = -y[0][:, loops]
+        return shown, joints
 
     def rows(self, situation: Situation, values: Array, sizes: Array) -> tuple[dict[str, Any], ...]:
         """The lowest frequency, and the rest."""
         assert situation.flexible is not None
-        lowest = situation.flexible.lowest(situation.finite(situation.healthy)[0], float(values[0]))
+        lowest = situation.flexible.lowest(situation.healthy.gain, float(values[0]))
         named = (
             ("frequency", lowest, "Hz"),
             ("factor", values[0], "of the model"),
@@ -173,6 +183,18 @@ class Links(Structure):
         if abs(rows["factor"] - 1.0) > 0.03:
             told += f", {rows['factor']:.3g} times what the model says: run calmotion calibrate first"
         return f"{told}; calmotion optimize changes the motor curves so that they do not"
+
+
+def _lowered(M: Array, K: Array, h: float) -> Array:
+    """What raises the modes below a tenth of the step's rate by as much as the midpoint rule lowers them: a frequency
+    w to 2/h atan(w h/2); mass and stiffness of shape [P, n, n]."""
+    out = np.zeros_like(K)
+    for added, mass, stiffness in zip(out, M, K, strict=True):
+        squares, modes = eigh(stiffness, mass) if len(mass) else (np.zeros(0), mass)
+        low = np.sqrt(np.maximum(squares, 0.0)) * h < 0.2 * np.pi
+        momenta = mass @ modes[:, low]
+        added += h**2 / 6.0 * (momenta * squares[low] ** 2) @ momenta.T
+    return out
 
 
 class Base(Structure):

@@ -43,8 +43,17 @@ class VelocityForces:
         Args:
             values, rates: Of the motors' inputs [rad or m], shape [M] each.
         """
+        moving, rest = self._both(values, rates)
+        return moving - rest
+
+    def with_weight(self, values: Array, rates: Array) -> Array:
+        """The forces of `at` and, against it, the weight of the undeformed robot, shape [N]."""
+        return self._both(values, rates)[0]
+
+    def _both(self, values: Array, rates: Array) -> tuple[Array, Array]:
+        """The residuals of the moving robot, and at rest."""
         if not self.known:
-            return np.zeros(int(self._sizes.sum()))
+            return (np.zeros(int(self._sizes.sum())),) * 2
         model, h = self._model, self.DISTANCE_S
         joints = model.joint_angles(values + h * np.array([-1.0, 0.0, 1.0])[:, None] * rates)
         world = None if self._world is None else np.repeat(self._world[None], 3, axis=0)
@@ -61,11 +70,11 @@ class VelocityForces:
         accelerations[:, :3], accelerations[:, 3:6] = (c[2] - 2.0 * c[1] + c[0]) / h**2, (ahead + back) / h**2
         for joint in model.system.servos:
             state.V[model.system.side[joint, 1], 6 + model.system.rotor[joint]] = speeds[joint]
-        moving = self._residual(state, accelerations, joints[1], speeds) - rest
-        return np.concatenate([part[:size] for part, size in zip(moving, self._sizes, strict=True)])
+        return self._residual(state, accelerations, joints[1], speeds), rest
 
     def _residual(self, state: State, accelerations: Array, angles: Array, rates: Array) -> Array:
         ws, moving = self._workspace, IMPLICIT["bdf2"](1.0)
         ws.scratch.Hv[:] = 0.0
         assemble(self._system, moving, state, accelerations, angles, rates, ws.scratch.Hv, False, ws.work, ws.blocks)
-        return np.array(ws.blocks.res)
+        residual = zip(np.array(ws.blocks.res), self._sizes, strict=True)
+        return np.concatenate([part[:size] for part, size in residual])
