@@ -72,4 +72,7 @@ def test_scenery_near_the_character_belongs_into_the_picture_and_a_stage_does_no
     hidden = dataclasses.replace(box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1)), visible=False)
     near = near_scenery(dataclasses.replace(character, scenery=(stage, lamp, head, hidden)), cloud)
     np.testing.assert_array_equal(np.sort(near, axis=0), np.sort(head.points, axis=0))
+    table = box((0.2, -0.5, 0.0), (0.8, 1.2, 0.3))  # the picture would cut it, and has the greater part of it
+    near = near_scenery(dataclasses.replace(character, scenery=(stage, table)), cloud)
+    np.testing.assert_array_equal(np.sort(near, axis=0), np.sort(table.points, axis=0))
     assert near_scenery(dataclasses.replace(character, scenery=()), cloud).shape == (0, 3)

@@ -15,6 +15,7 @@ SIDE = np.radians(38.0)
 ELEVATION = np.radians(17.0)
 STILL = 1e-3  # of a body that does not move: range of its place [m] and of its quaternion
 ROOM = 1.2  # largest growth of a picture for the scenery
+ROOM_FOR_CUT = 1.5  # for a piece of which the picture has at least half without it
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +98,8 @@ def moving_cloud(character: Character, skins: tuple[Skin | None, ...], motion: M
 def near_scenery(character: Character, cloud: Array) -> Array:
     """Corners of the hulls of the still surfaces that belong into a picture: a robot's head and feet, what it hits.
 
-    Not those, such as a stage, for which the picture would have to be much larger than for the character.
+    Not those, such as a stage, for which the picture would have to be much larger than for the character. It is made
+    larger for those that it would cut through, such as a table of which it has the greater part.
 
     Args:
         character: With its scenery.
@@ -107,17 +109,22 @@ def near_scenery(character: Character, cloud: Array) -> Array:
         [m], shape [k, 3]; empty where there are none.
     """
     low, high = cloud.min(axis=0), cloud.max(axis=0)
-    limit = ROOM * float(np.linalg.norm(high - low))
+    diagonal = float(np.linalg.norm(high - low))
 
     def grown(piece: Array) -> tuple[float, Array, Array]:
         lower, upper = np.minimum(low, piece.min(axis=0)), np.maximum(high, piece.max(axis=0))
-        return float(np.linalg.norm(upper - lower)), lower, upper
+        return float(np.linalg.norm(upper - lower)) / diagonal, lower, upper
+
+    def share_inside(piece: Array) -> float:
+        lower, upper = piece.min(axis=0), piece.max(axis=0)
+        inside = np.minimum(high, upper) - np.maximum(low, lower)
+        return float(np.prod(np.clip(inside, 0.0, None) / np.maximum(upper - lower, 1e-12)))
 
     pieces = [surface.points[hull_corners(surface.points)] for surface in character.scenery if surface.drawn]
     kept = [np.zeros((0, 3))]
     for piece in sorted(pieces, key=lambda piece: grown(piece)[0]):
-        diagonal, lower, upper = grown(piece)
-        if diagonal <= limit:
+        growth, lower, upper = grown(piece)
+        if growth <= (ROOM_FOR_CUT if share_inside(piece) >= 0.5 else ROOM):
             low, high = lower, upper
             kept.append(piece)
     return np.concatenate(kept)
