@@ -18,6 +18,7 @@ from calmotion.cli import (
     quantity,
     say,
     shot_arguments,
+    up_to,
 )
 
 if TYPE_CHECKING:
@@ -108,7 +109,7 @@ def _print(report: dict[str, Any], console: Console) -> None:
     allowed, kept, lowest = length(report["allowed_loss_m"]), report["loss_kept"], report["lowest_rate_hz"]
     say(
         console,
-        f"Playing the commands costs up to {length(report['max_loss_m'])} at the targets, "
+        f"Playing the commands costs {up_to(report['max_loss_m'])} at the targets, "
         f"{'within' if kept else 'more than'} the allowed {allowed}.",
     )
     if report["searched"] and lowest:
@@ -140,6 +141,6 @@ def _print(report: dict[str, Any], console: Console) -> None:
         f"each {way}; {report['simulations']} simulations with steps of {1e3 * report['step_s']:.3g} ms",
     )
     slowest = max((row["delay_cost_m_per_s"] for row in report["targets"]), default=0.0)
-    say(console, f"each millisecond by which the controller starts late costs up to {length(1e-3 * slowest)}")
+    say(console, f"each millisecond by which the controller starts late costs {up_to(1e-3 * slowest)}")
     for note in report["notes"]:
         say(console, f"note: {note}")

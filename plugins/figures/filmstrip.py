@@ -22,6 +22,7 @@ from calmotion.views import (
     fit_camera,
     floor_below,
     moving_cloud,
+    near_scenery,
     new_figure,
     prepare,
     sample_motion,
@@ -67,6 +68,7 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
     every = (result.reference, *(run.motion for run, _, _ in runs))
     clouds = [moving_cloud(character, result.skins, motion) for motion in (reference, *motions)]
     cloud = np.concatenate([*clouds, *(trail_of(motion, time).reshape(-1, 3) for motion in every for time in times)])
+    cloud = np.concatenate([cloud, near_scenery(character, cloud)])
     probe = fit_camera(view, cloud, PANEL, PANEL, 0.0).project(cloud)[:, :2]
     aspect = float(np.clip(np.ptp(probe[:, 1]) / max(np.ptp(probe[:, 0]), 1e-9), 0.35, 1.8))
     camera = fit_camera(view, cloud, SMOOTH * PANEL, round(SMOOTH * PANEL * aspect))

@@ -6,6 +6,7 @@ import json
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from functools import cache
 from html import escape
 from pathlib import Path
@@ -108,12 +109,16 @@ def _table(table: TextTable) -> str:
     columns = [[row[n] for row in table.rows] for n in range(len(table.columns))]
     kinds = ["text" if n < table.texts or _has_words(cells) else "number" for n, cells in enumerate(columns)]
     head = "".join(f'<th class="{kind}">{escape(cell)}</th>' for kind, cell in zip(kinds, table.columns, strict=True))
-    rows = "".join(
-        "<tr>" + "".join(f'<td class="{k}">{escape(cell)}</td>' for k, cell in zip(kinds, row, strict=True)) + "</tr>"
-        for row in table.rows
-    )
-    caption = f"<caption>{escape(table.title)}</caption>"
-    return f'<div class="wide"><table>{caption}<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+    divided = [zip(kinds, map(_divisible, row), strict=True) for row in table.rows]
+    rows = "".join("<tr>" + "".join(f'<td class="{k}">{cell}</td>' for k, cell in row) + "</tr>" for row in divided)
+    title = escape(table.title)  # beside the part that scrolls on a narrow screen
+    body = f'<table aria-label="{title}"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
+    return f'<h3>{title}</h3><div class="wide">{body}</div>'
+
+
+def _divisible(text: str) -> str:
+    """Text whose paths a narrow cell breaks after slashes, not within names."""
+    return escape(text).replace("/", "/<wbr>")
 
 
 def _has_words(cells: Sequence[str]) -> bool:
@@ -127,7 +132,8 @@ def _provenance(origin: Mapping[str, Any]) -> str:
     if command := origin.get("command"):
         lines.append(f"<p>Command: <code>{escape(command)}</code></p>")
     if created := origin.get("created"):
-        lines.append(f"<p>Made: {escape(created)}</p>")
+        when = datetime.fromisoformat(created).astimezone(UTC)
+        lines.append(f"<p>Made: {when:%Y-%m-%d %H:%M} UTC</p>")
     if inputs := origin.get("inputs"):
         rows = tuple((row["role"], row["path"], row["sha256"]) for row in inputs)
         lines.append(_table(TextTable("Inputs", ("input", "file", "SHA-256"), rows, texts=3)))

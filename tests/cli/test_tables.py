@@ -15,6 +15,7 @@ from calmotion.cli.tables import (
     print_table,
     quantity_in,
     say,
+    up_to,
 )
 
 HEADS = ["motor", "limits", "peak speed", "may change"]
@@ -88,6 +89,10 @@ def test_nothing_is_printed_without_rows(printed):
 )  # fmt: skip
 def test_lengths_have_no_powers_of_ten(meters, text):
     assert length(meters) == text
+
+
+def test_a_largest_error_is_up_to_it_or_less_than_can_be_shown():
+    assert (up_to(1e-9), up_to(2e-3)) == ("less than 0.0001 mm", "up to 2 mm")
 
 
 @pytest.mark.parametrize(

@@ -31,3 +31,4 @@ from calmotion.cli.tables import measured as measured
 from calmotion.cli.tables import print_table as print_table
 from calmotion.cli.tables import quantity_in as quantity_in
 from calmotion.cli.tables import say as say
+from calmotion.cli.tables import up_to as up_to

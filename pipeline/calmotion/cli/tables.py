@@ -29,6 +29,12 @@ def length(meters: float | None) -> str:
     return f"{1000.0 * meters:.4g} mm" if abs(meters) < 9.9995 else f"{meters:.4g} m"
 
 
+def up_to(meters: float) -> str:
+    """A largest error, after a verb."""
+    text = length(meters)
+    return f"less than {text[2:]}" if text.startswith("< ") else f"up to {text}"
+
+
 def about(meters: float | None) -> str:
     """An estimated length or error as text, to two digits."""
     return length(meters if meters is None or not math.isfinite(meters) else float(f"{meters:.2g}"))

@@ -143,8 +143,14 @@ def requested_files(host: Host, outputs: OutputPaths) -> list[type]:
             _refuse_unprovided(host, kind, option, path)
             kinds.append(kind)
     if outputs.html is not None:
-        _refuse_unprovided(host, HtmlPage, "--html", outputs.html)
+        _refuse_page(host, outputs.html)
     return kinds
+
+
+def _refuse_page(host: Host, page: str) -> None:
+    _refuse_unprovided(host, HtmlPage, "--html", page)
+    if os.path.splitext(page)[1].lower() not in (".html", ".htm"):
+        raise SettingError("the page is not named like one", path="--html", found=page, remedy="Name a .html file.")
 
 
 def _refuse_unprovided(host: Host, kind: type, option: str, path: str) -> None:
@@ -167,7 +173,7 @@ def prepare_page(host: Host, page: str, inputs: Mapping[str, str]) -> None:
     Raises:
         SettingError: It cannot, no plugin writes pages, or it is one of the files that are read.
     """
-    _refuse_unprovided(host, HtmlPage, "--html", page)
+    _refuse_page(host, page)
     prepare_outputs(inputs, OutputPaths(html=page))
 
 

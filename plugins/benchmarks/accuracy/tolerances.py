@@ -132,7 +132,14 @@ def main(arguments: list[str] | None = None) -> int:
     """The command: exit status 1 when a tolerance is not kept."""
     parser = bench_parser("tolerances", __doc__, SAMPLES)
     parser.add_argument(
-        "--tolerances", metavar="LENGTH", nargs="+", type=quantity("m", positive=True), default=list(TOLERANCES)
+        "--tolerances",
+        metavar="LENGTH",
+        nargs="+",
+        type=quantity("m", positive=True),
+        default=list(TOLERANCES),
+        help="tolerances to simulate with, each with a unit (default: "
+        + ", ".join(f"{1e3 * t:g}mm" for t in TOLERANCES)
+        + ")",
     )
     parser.add_argument("--optimize", action="store_true", help="optimise the shots, which takes much longer")
     options = parser.parse_args(arguments)

@@ -95,9 +95,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         type=quantity("m", needs_unit=True, positive=True),
         help="accuracy of the simulation at the targets, with a unit (1mm; default: the tolerance of the shot)",
     )
-    command.add_argument(
-        "--integrator", metavar="NAME", help="bdf2, newmark or generalized-alpha (default: the last one)"
-    )
+    command.add_argument("--integrator", metavar="NAME", help="bdf2, newmark or generalized-alpha (the default)")
     command.add_argument("--figures", metavar="DIR", help="draw measured and simulated signals into this folder")
     html_option(command)
     command.add_argument(

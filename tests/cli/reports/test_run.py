@@ -170,6 +170,8 @@ def test_how_far_motors_move_and_why_errors_remain_are_told():
     remaining = [cause | {"path": "/Cup", "max_error_m": 1.4e-3, "causes": ["motors"]}]
     remaining += [cause | {"path": "/Elbow", "max_error_m": 5.5e-3, "causes": ["motors"]}]
     remaining += [cause | {"path": "/Nose", "max_error_m": 2e-3, "causes": ["limits", "sag"]}]
+    one = {"motors": 1, "directions": 3}
+    remaining += [one | {"path": "/Tip", "max_error_m": 1e-3, "causes": ["sag", "motors"]}]
     motors = [{"path": f"/J{k}", "changed": k < 8, "max_offset_rad": 0.01 * k} for k in range(9)]
     stream = io.StringIO()
     print_remaining(console_on(stream), two_targets() | {"motors": motors, "remaining_errors": remaining})
@@ -179,8 +181,9 @@ def test_how_far_motors_move_and_why_errors_remain_are_told():
         "What remains, 5.5 mm at /Elbow, 1.4 mm at /Cup: 5 motors cannot follow the targets in all 9 "
     )
     assert lines[2].startswith(
-        "What remains, 2 mm at /Nose: limits of motors hold it (see the table of limits) and gravity"
+        "What remains, 2 mm at /Nose: limits of motors hold it (see the table of limits); gravity"
     )
+    assert lines[3].endswith("already at rest; 1 motor cannot follow the target in all 3 directions.")
 
 
 def test_curves_on_random_robots_are_a_table():

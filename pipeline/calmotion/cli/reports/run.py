@@ -291,7 +291,7 @@ def print_work(console: Console, report: dict[str, Any]) -> None:
         if row["processor_s"] >= SHORT_STAGE
     ]
     if stages:
-        print_table(console, "Stages", ["operator", "processor time", "memory at most so far"], stages)
+        print_table(console, "Stages", ["operator", "processor time", "peak memory so far"], stages)
     for row in report["reactions"]:
         force, moment = f"{row['max_force_n']:.4g} N", f"{row['max_moment_n_m']:.4g} N m"
         say(console, f"the world holds {row['body']} with up to {force} and {moment}")

@@ -28,8 +28,7 @@ CAUSES = {
     "limits": "limits of motors hold it (see the table of limits)",
     "search": "the search ended early (see below)",
     "sag": "gravity alone causes half of it, already at rest",
-    "motors": "{motors} motors cannot follow the targets in all {directions} directions, so that their weights decide "
-    "(CalmTargetAPI)",
+    "motors": "{motors} cannot follow {targets}",
     "weight": "other targets have larger weights",
     "reach": "these motors cannot take away more, and the search has converged",
 }
@@ -133,7 +132,11 @@ def print_remaining(console: Console, report: dict[str, Any]) -> None:
             say(console, f"{kind} of motors change by at most: {', '.join(told)}.")
     groups: dict[str, list[str]] = {}
     for row in sorted(report["remaining_errors"], key=lambda row: -row["max_error_m"]):
-        causes = " and ".join(CAUSES[cause].format(**row) for cause in row["causes"])
+        targets = "the targets in all {directions} directions, so that their weights decide (CalmTargetAPI)"
+        if row["directions"] <= 3:  # a position or a rotation: nothing is weighed against it
+            targets = "the target in all 3 directions"
+        words = {"motors": counted(row["motors"], "motor"), "targets": targets.format(**row)}
+        causes = "; ".join(CAUSES[cause].format(**words) for cause in row["causes"])
         groups.setdefault(causes, []).append(f"{length(row['max_error_m'])} at {row['path']}")
     for causes, errors in groups.items():
         more = f" and {counted(len(errors) - HEADLINES, 'more target')}" if len(errors) > HEADLINES else ""
