@@ -27,18 +27,14 @@ from calmotion.support import (
     too_large,
 )
 
-TIME = "time_s"
+from .units import TIME, are_units, named_unit, with_unit
+
 _OUTPUTS = (".x", ".y", ".z", ".error", ".rotation_error", ".input", ".output", ".effort")
 _REMEDY = (
     "Write a column time_s in seconds, and one for each joint, named after it, in rad (or with a comment "
     "'# units: angle deg') or m"
 )
 _DEGREES = re.compile(r"(angle|units?)\W+deg", re.IGNORECASE)
-_BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(](?P<unit>[^\[\]()]+)[\])]")
-_SCALES = {
-    "rad": 1.0, "radian": 1.0, "radians": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3,
-    **dict.fromkeys(("deg", "degree", "degrees", "\u00b0"), float(np.radians(1.0))),
-}  # fmt: skip
 _LONGEST = 1e5  # of a motion [s]: a day
 _UNITS = {"ms": "milliseconds (0.001 s)", "us": "microseconds (1e-6 s)", "ns": "nanoseconds (1e-9 s)"}
 _EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
@@ -152,6 +148,9 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
             ]
             head = [old if own else new for old, new, own in zip(head, names, kept, strict=True)]
         rows, lines = rows[1:], lines[1:]
+        if rows and len(rows[0]) == len(head) and are_units(rows[0]):
+            head = [with_unit(name, cell) for name, cell in zip(head, rows[0], strict=True)]
+            rows, lines = rows[1:], lines[1:]
     if any(name.endswith(_OUTPUTS) for name in head):
         raise ShotError(
             "this is a table that --csv wrote",
@@ -168,7 +167,7 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
     columns: dict[str, Array] = {}
     for k, name in enumerate(head):
         if name != "-":
-            own, scale = _named_unit(name)
+            own, scale = named_unit(name)
             columns[own] = scale * _column(path, lines, [row[k] for row in rows], name, head, between)
     return columns, degrees
 
@@ -206,19 +205,13 @@ def _wrong_row(path: str, line: tuple[int, str], count: int, remedy: str) -> Sho
     )
 
 
-def _named_unit(name: str) -> tuple[str, float]:
-    """A name without the unit in brackets behind it, and that unit in rad or m; a column of times keeps its own."""
-    match = _BRACKETS.fullmatch(name)
-    scale = None if match is None or names_times(name) else _SCALES.get(match["unit"].strip().lower())
-    return (name, 1.0) if match is None or scale is None else (match["name"].strip(), scale)
-
-
 def _npz(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
     """The same of an NPZ file: an array for each joint, or `positions` with `joint_names`; `time_s` or `fps`."""
     arrays = _arrays(path)
     columns: dict[str, Array] = {}
     unit = str(arrays.pop("units", ""))
-    fps = float(_numbers(path, "fps", arrays.pop("fps"), 0)) if "fps" in arrays else 0.0
+    rate = arrays.pop("fps", np.zeros(()))
+    fps = float(_numbers(path, "fps", rate.reshape(()) if rate.size == 1 else rate, 0))
     if "positions" in arrays:
         positions = _numbers(path, "positions", arrays["positions"], 2)
         given = np.atleast_1d(arrays["joint_names"]) if "joint_names" in arrays else names
