@@ -8,7 +8,7 @@ import re
 
 import pytest
 from calmotion.usd import dialects
-from calmotion.usd.reading.unread import OF_BODIES, OF_JOINTS
+from calmotion.usd.reading.unread import OF_BODIES, OF_JOINTS, OF_SCHEMAS
 
 WRITES = "CALMOTION_WRITE_PAGES"  # set it, and the test writes the page
 SPELLED = {
@@ -44,6 +44,7 @@ def unused_table():
     for name, low, high, why in (*OF_BODIES, *OF_JOINTS):
         harmless = f"{low:g}" if low == high else f"{low:g} and more" if math.isinf(high) else f"{low:g} to {high:g}"
         lines.append(f"| `{shown(name)}` | {harmless} | {why} |")
+    lines += [f"| schemas `{begin}…` | | {why} |" for begin, why in OF_SCHEMAS]
     return "\n".join(lines)
 
 

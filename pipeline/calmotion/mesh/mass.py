@@ -12,6 +12,8 @@ from calmotion.mesh.parts import Makeup
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.model.character import Body, MassProperties, SurfaceMesh
 
+_OFF = 0.1  # of a radius of gyration, by which a centre of mass may be elsewhere
+_OTHER = 1.3  # ratio of radii of gyration that is told
 _HOLLOW = 0.7  # of the mass of a solid of the material, below which a body may be hollow
 
 
@@ -77,3 +79,25 @@ def density_note(body: Body, volume: float, same: float) -> tuple[str, ...]:
         f"its density is {material.density * ratio:.4g} instead of {material.density:.4g} kg/m^3"
     )
     return (note + ("; if it is hollow, author calm:flexible:wallThickness" if ratio < _HOLLOW else ""),)
+
+
+def balance_note(body: Body, own: MassProperties) -> tuple[str, ...]:
+    """Message about a centre of mass or an inertia that is not that of the solid, over which the mass is spread.
+
+    Args:
+        body: Any.
+        own: Of its solid.
+    """
+    stated = body.mass
+    if stated is None or body.flexible is None:
+        return ()
+    away = float(np.linalg.norm(own.center - stated.center))
+    turns, theirs = (float(np.sqrt(np.trace(m.inertia) / (2.0 * m.mass))) for m in (own, stated))
+    ratio = turns / theirs if theirs > 0.0 else np.inf
+    if away <= _OFF * turns and 1.0 / _OTHER <= ratio <= _OTHER:
+        return ()
+    return (
+        f"its mass is spread evenly over the solid: the centre is {1e3 * away:.3g} mm from that of the shot's mass, "
+        f"the radius of gyration {1e3 * turns:.3g} instead of {1e3 * theirs:.3g} mm; heavy parts, such as motors, are "
+        "best bodies of their own, which fixed joints hold",
+    )

@@ -119,3 +119,15 @@ def test_attributes_of_other_programs_are_named_where_they_have_an_effect(tmp_pa
 
     (note,) = found(value)
     assert note.startswith(f"{path}: ") and why in note and not found(harmless)
+
+
+def test_tendons_and_forces_of_physx_are_told(tmp_path):
+    def edit(stage):
+        stage.GetPrimAtPath(ELBOW).AddAppliedSchema("PhysxTendonAxisRootAPI:cable")
+        stage.GetPrimAtPath(FORE).AddAppliedSchema("PhysxForceAPI")
+
+    found = [note for note in notes_unused(tmp_path, edit) if "is not used" in note]
+    assert [note.partition(" is not")[0] for note in found] == [
+        f"{FORE}: PhysxForceAPI",
+        f"{ELBOW}: PhysxTendonAxisRootAPI:cable",
+    ]

@@ -10,7 +10,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.mesh.element_sizes import envelope
-from calmotion.mesh.mass import density_note
+from calmotion.mesh.mass import balance_note, density_note, mass_of_tets
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.mesh.tetrahedralize.filling import INTERSECTS, MAX_VOLUME_ERROR, filled
 from calmotion.mesh.tetrahedralize.tetwild import ProcessorTime
@@ -93,8 +93,14 @@ def volume_note(quality: MeshQuality) -> tuple[str, ...]:
 
 
 def mass_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
-    """Message about a stated mass that is not that of the solid and its material; the density follows the mass."""
-    return density_note(body, mesh.quality.volume, _SAME_MASS)
+    """Messages about a stated mass that is not that of the solid and its material, or is elsewhere."""
+    if body.mass is None or body.flexible is None:
+        return ()
+    from calmotion.mesh.parts import makeup_of
+
+    makeup = makeup_of(mesh.points, mesh.tets, body.flexible.material)
+    own = mass_of_tets(mesh.points, mesh.tets, body.flexible.material.density, body.mass.mass, makeup)
+    return (*density_note(body, mesh.quality.volume, _SAME_MASS), *balance_note(body, own))
 
 
 def makeup_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:

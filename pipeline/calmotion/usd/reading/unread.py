@@ -116,6 +116,12 @@ OF_JOINTS = (
     ("isaac:physics:JerkLimit", _NEVER, math.inf, "calm:motor:maxJerk is"),
 )
 
+# begin of the names of schemas; why they are not used
+OF_SCHEMAS = (
+    ("PhysxTendon", "tendons are not simulated, so that they couple no joints"),
+    ("PhysxForce", "a force on a body is not simulated"),
+)
+
 
 def tell_what_is_not_used(reading: Reading, bodies: Iterable[Usd.Prim], joints: Sequence[JointPrim]) -> None:
     """Note attributes of the character's bodies and joints that have a value and no effect.
@@ -125,10 +131,12 @@ def tell_what_is_not_used(reading: Reading, bodies: Iterable[Usd.Prim], joints: 
     """
     for prim in bodies:
         _tell(reading, prim, "", OF_BODIES)
+        _tell_of_schemas(reading, prim)
     told: set[tuple[str, str]] = set()
     for joint in joints:
         if joint.prim is not None and (joint.prim_path, joint.drive) not in told:
             told.add((joint.prim_path, joint.drive))
+            _tell_of_schemas(reading, joint.prim)
             _tell(reading, joint.prim, joint.drive, OF_JOINTS)
 
 
@@ -137,6 +145,14 @@ def _tell(reading: Reading, prim: Usd.Prim, drive: str, rows: Sequence[tuple[str
         name = attribute.format(drive=drive)
         if any(not low <= value <= high for value in _authored(prim, name, reading.start)):
             reading.note(f"{prim.GetPath()}: {name} is not used: {why}")
+
+
+def _tell_of_schemas(reading: Reading, prim: Usd.Prim) -> None:
+    for begin, why in OF_SCHEMAS:
+        applied = map(str, prim.GetPrimTypeInfo().GetAppliedAPISchemas())  # those that this USD does not know too
+        found = next((name for name in applied if name.startswith(begin)), None)
+        if found is not None:
+            reading.note(f"{prim.GetPath()}: {found} is not used: {why}")
 
 
 def _authored(prim: Usd.Prim, name: str, time: float) -> tuple[float, ...]:
