@@ -1,6 +1,7 @@
 """Installs a wheel and what it asks for into a new environment and runs the demo in an empty folder, as a user would.
 
-`wheel_test.py WHEEL SAMPLE` (`make wheel`): the kernels that the wheel carries must do, so nothing may be compiled.
+`wheel_test.py WHEEL SAMPLE` (`make wheel`): the kernels that the wheel carries must do, so nothing may be compiled. A
+folder with one wheel does as well.
 """
 
 import json
@@ -51,9 +52,10 @@ def test(wheel: Path, sample: Path) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         venv.create(folder / "environment", with_pip=True)
-        python = folder / "environment" / "bin" / "python"
+        commands = folder / "environment" / ("Scripts" if os.name == "nt" else "bin")
+        python = commands / "python"
         run(python, "-m", "pip", "install", "--quiet", wheel, folder=folder)
-        run(folder / "environment" / "bin" / "calmotion", "--version", folder=folder)
+        run(commands / "calmotion", "--version", folder=folder)
         shutil.copytree(sample, folder / sample.name)
         (folder / "count.py").write_text(COUNTING)
         shot = Path(sample.name) / f"{sample.name}.usda"
@@ -69,4 +71,6 @@ def test(wheel: Path, sample: Path) -> None:
 
 
 if __name__ == "__main__":
-    test(Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve())
+    given = Path(sys.argv[1]).resolve()
+    (built,) = given.glob("calmotion-*.whl") if given.is_dir() else [given]
+    test(built, Path(sys.argv[2]).resolve())
