@@ -1,8 +1,8 @@
 """What slower motors cost in time, and in error: `optimize --retime` against one tempo for the whole, and TOPP-RA.
 
-`calmotion bench tempo SHOT ...` gives each motor of a shot limits of speed or effort that are a share of what the
-animation needs, and finds tempo and curves. Added times are compared with the lower bound of the rigid robot, with
-what TOPP-RA adds (where the package `toppra` is there; it knows no efforts here), and with one tempo for the whole.
+`calmotion bench tempo SHOT ...` gives each motor of a shot limits of speed, acceleration or effort that are a share of
+what the animation needs, and finds tempo and curves. Added times are compared with the lower bound of the rigid robot,
+with what TOPP-RA adds (where the package `toppra` is there; it knows no efforts), and with one tempo for the whole.
 Limits are checked on fine samples of the curves, efforts in a simulation by Newmark's scheme and a quarter of the
 step. The command fails where a limit is exceeded by more than a thousandth, or the error is above the tolerance and
 was not at full tempo.
@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from calmotion.arrays import Array
@@ -27,11 +28,13 @@ from calmotion.tolerance import found_tracks
 from ..common.reporting import bench_parser, finish, keep, say
 from ..common.shots import SAMPLES, load
 
-QUANTITIES = ("velocity", "effort")
+ORDERS = {"velocity": 1, "acceleration": 2}  # which derivative of a curve each is
+QUANTITIES = (*ORDERS, "effort")
 SHARES = (0.8, 0.6, 0.4)
 SLOWEST = 10.0  # largest stretch
 EXCEEDED = 1e-3  # of a limit
 FINE = 20_000  # samples of a curve
+NO_LIMIT = 1e6  # [1/s], of the rate of the tempo: TOPP-RA takes no infinite one
 LEAST = 1e-3  # of the largest limit of all motors, that one has at least
 
 
@@ -75,12 +78,12 @@ def limited_shot(shot: CompiledShot, quantity: str, share: float) -> CompiledSho
     """The shot with motors that have a share of what the animation needs.
 
     Args:
-        quantity: `velocity` or `effort`, which is that of the rigid robot.
+        quantity: One of `QUANTITIES`; the effort is that of the rigid robot.
     """
     free, end = without_limits(shot.character), float(shot.animation.frame_times[-1])
-    if quantity == "velocity":
-        times = np.linspace(0.0, end, FINE)
-        needed = np.abs(commanded_curves(free, replace(shot.animation, current=shot.animation.tracks), None)(times, 1))
+    if quantity in ORDERS:
+        times, curves = np.linspace(0.0, end, FINE), _as_animated(free, shot)
+        needed = np.abs(curves(times, ORDERS[quantity]))
     else:
         limited = replace(free, motors=tuple(replace(motor, max_torque=1e12) for motor in free.motors))
         given = tempo_input(shot.with_character(limited), RunSettings(), shot.animation.tracks)
@@ -89,11 +92,10 @@ def limited_shot(shot: CompiledShot, quantity: str, share: float) -> CompiledSho
         needed = np.abs(given.efforts.at_rest + given.efforts.by_square)
     most = share * needed.max(axis=0)
     most = np.maximum(most, LEAST * most.max())
-    speeds = most if quantity == "velocity" else np.full(len(most), np.inf)
-    efforts = most if quantity == "effort" else np.full(len(most), np.inf)
+    speeds, accelerations, efforts = (most if quantity == own else np.full(len(most), np.inf) for own in QUANTITIES)
     motors = tuple(
-        replace(motor, max_velocity=float(speed), max_torque=float(effort))
-        for motor, speed, effort in zip(free.motors, speeds, efforts, strict=True)
+        replace(motor, max_velocity=float(speed), max_acceleration=float(acceleration), max_torque=float(effort))
+        for motor, speed, acceleration, effort in zip(free.motors, speeds, accelerations, efforts, strict=True)
     )
     return shot.with_character(replace(free, motors=motors))
 
@@ -120,7 +122,7 @@ def measure(name: str, shot: CompiledShot, quantity: str, share: float, full: tu
     given = tempo_input(limited, options, shot.animation.tracks)
     found = find_tempo(given, TempoSettings(slowest=SLOWEST), shot.character.path)
     added = 0.0 if found.map is None else found.map.added
-    toppra = toppra_added(limited) if quantity == "velocity" else np.nan
+    toppra = toppra_added(limited) if quantity in ORDERS else np.nan
     bounds = found.report.lower_bound, toppra, added, found.report.uniform_added
     row = Row(name, quantity, share, *bounds, tolerance_mm=1e3 * tolerance_of(shot.character, None))
     if full is None:
@@ -148,11 +150,12 @@ def excess_of(limited: CompiledShot, result: Result, quantity: str) -> float:
     """By how much curves exceed limits, as a share of them, by other means than those of the search."""
     performance = limited.at(result.retimed)
     motors, animation = performance.character.motors, performance.animation
-    if quantity == "velocity":
-        times = np.linspace(0.0, float(animation.frame_times[-1]), FINE)
+    if quantity in ORDERS:
+        times, order = np.linspace(0.0, float(animation.frame_times[-1]), FINE), ORDERS[quantity]
         values = commanded_curves(performance.character, animation, result)(times, 0)
-        reached = np.abs(np.diff(values, axis=0)).max(axis=0) / (times[1] - times[0])
-        return float(np.max(reached / [motor.max_velocity for motor in motors])) - 1.0
+        reached = np.abs(np.diff(values, order, axis=0)).max(axis=0) / (times[1] - times[0]) ** order
+        most = [motor.max_velocity if order == 1 else motor.max_acceleration for motor in motors]
+        return float(np.max(reached / most)) - 1.0
     finer = RunSettings(step=0.25 * result.step_s, pre_roll=result.pre_roll_s, integrator="newmark")
     played = performance.with_tracks(found_tracks(result, animation))
     run = simulate_shot(played, finer, lambda fraction, message: None).before.motion
@@ -161,26 +164,35 @@ def excess_of(limited: CompiledShot, result: Result, quantity: str) -> float:
 
 
 def toppra_added(shot: CompiledShot) -> float:
-    """What TOPP-RA adds for the limits of speed, never faster than the animation [s]; NaN without the package."""
+    """What TOPP-RA adds for limits of speed and acceleration, never faster than the animation [s]; NaN without it."""
     try:
         from toppra import SplineInterpolator, setup_logging
         from toppra.algorithm import TOPPRA
-        from toppra.constraint import JointVelocityConstraint
+        from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
     except ImportError:
         return np.nan
     setup_logging("ERROR")
     end = float(shot.animation.frame_times[-1])
     times = np.linspace(0.0, end, 120 * int(np.ceil(end)) + 1)
-    curves = commanded_curves(shot.character, replace(shot.animation, current=shot.animation.tracks), None)
+    curves, motors = _as_animated(shot.character, shot), shot.character.motors
     # a joint that moves as the animation's time does keeps the tempo from exceeding it
-    most = np.array([*(motor.max_velocity for motor in shot.character.motors), 1.0])
+    speeds = np.array([*(motor.max_velocity for motor in motors), 1.0])
+    limits = [JointVelocityConstraint(np.stack([-speeds, speeds], axis=1))]
+    if np.isfinite(most := np.array([motor.max_acceleration for motor in motors])).all():
+        most = np.append(most, NO_LIMIT)
+        limits.append(JointAccelerationConstraint(np.stack([-most, most], axis=1)))
     path = SplineInterpolator(times, np.concatenate([curves(times, 0), times[:, None]], axis=1))
-    program = TOPPRA([JointVelocityConstraint(np.stack([-most, most], axis=1))], path, gridpoints=times)
+    program = TOPPRA(limits, path, gridpoints=times)
     for ends in (1.0, 0.0):  # at rest where it would be too fast there
         _, speeds, _ = program.compute_parameterization(ends, ends)
         if speeds is not None:
             break
     return float(np.sum(2.0 * np.diff(times) / (speeds[1:] + speeds[:-1]))) - end
+
+
+def _as_animated(character: Character, shot: CompiledShot) -> Any:
+    """The curves of the animation itself."""
+    return commanded_curves(character, replace(shot.animation, current=shot.animation.tracks), None)
 
 
 def _largest(errors: Array) -> float:
