@@ -18,11 +18,19 @@ CORE = (
 )  # fmt: skip
 
 
-def test_the_core_works_where_nothing_of_posix_is_there(repository):
+# What has to do with files, processes or the command line besides.
+MORE = (
+    "tests/support", "tests/host", "tests/workflow", "tests/cli", "tests/mesh", "tests/recordings",
+    "tests/test_end_to_end.py", "tests/plugins/shows", "tests/plugins/live", "tests/plugins/rerun_logger",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("tests", [CORE, pytest.param(MORE, marks=pytest.mark.long)], ids=["core", "more"])
+def test_tests_pass_where_nothing_of_posix_is_there(repository, tests):
     """Modules, functions and signals are taken away from Calmotion and links from all; processes are spawned."""
     path = [repository / "tests" / "helpers" / "deprived", repository / "pipeline", os.environ.get("PYTHONPATH", "")]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, path))}
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *CORE]
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
     done = subprocess.run(command, cwd=repository, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-4000:]
     skipped = "this system has no links, owners, pipes or signals of POSIX"
