@@ -33,7 +33,7 @@ def make_blueprint(character: Character, animation: Animation, result: Result, s
     legend = f"green: intended, orange: {1e3 * scale:.3g} mm off"
     views = [spatial_view(f"As animated{_farthest(result.before)} ({legend})", INPUT, eye)]
     if result.after is not None:
-        views.append(spatial_view(f"Optimised{_farthest(result.after)} (colours as beside)", OPTIMIZED, eye))
+        views.append(spatial_view(f"Optimised{_farthest(result.after)} (same colours)", OPTIMIZED, eye))
     tabs = [plot("Position error [mm]", "errors/position_mm")]
     if any(target.rotation_weight > 0.0 for target in character.targets):
         tabs.append(plot("Rotation error [deg]", "errors/rotation_deg"))

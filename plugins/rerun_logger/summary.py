@@ -66,7 +66,7 @@ def sizes(character: Character, result: Result, system: SystemModes | None) -> s
     """Size of the model and cost of the run."""
     lines = [
         f"- {len(character.bodies)} bodies, {len(character.motors)} motors, {result.dof} position coordinates",
-        f"- time step {1e3 * result.step_s:g} ms, pre-roll {result.pre_roll_s:g} s",
+        f"- time step {1e3 * result.step_s:.3g} ms, pre-roll {result.pre_roll_s:g} s",
     ]
     if system is not None:
         frequencies = ", ".join(f"{f:.1f}" for f in system.frequencies[:SHOWN_MODES])

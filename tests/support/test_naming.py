@@ -45,8 +45,8 @@ def test_words_are_compared_without_case():
     [
         (["/a/b: it holds 3: still", "no scene: down", "/c: it holds 3: still", "/d: moves"],
          ["/a/b and c: it holds 3: still", "no scene: down", "/d: moves"]),
-        ([f"/R/j{k}: its limit is that of /R/Physics/act{k} (MuJoCo)" for k in range(7)],
-         ["/R/j0, j1, j2 and 4 more: its limit is that of /R/Physics/… (MuJoCo)"]),
+        ([f"/R/j{k}: effort limit from /R/Physics/act{k} (MuJoCo)" for k in range(7)],
+         ["/R/j0, j1, j2 and 4 more: effort limit from /R/Physics/… (MuJoCo)"]),
         (["/a: removed an open sheet"] * 10, ["/a: removed an open sheet (10 times)"]),
         (["ignored /a/x, a copy of /b"] * 2 + ["ignored /a/y, a copy of /b"], ["ignored /a/…, a copy of /b (3 times)"]),
         ([f"/a{k}: still" for k in range(4)], ["/a0, a1, a2 and a3: still"]),

@@ -119,5 +119,8 @@ def _print_one(motor: MotorType, output: Output) -> None:
     print_table(console, f"{names}: {motor.title}", ["quantity", "source", "value"], rows, texts=2)
     for number, source in enumerate(sources):
         say(console, f"[{number + 1}] {source}")
-    unknown = [quantity.title for name, quantity in QUANTITIES.items() if name not in motor.values]
-    say(console, f"not known: {', '.join(unknown)}")
+    # terms of the laws of friction come last: a motor without them has Coulomb friction
+    plain = list(QUANTITIES)[: list(QUANTITIES).index("stribeck")]
+    unknown = [QUANTITIES[name].title for name in plain if name not in motor.values]
+    if unknown:
+        say(console, f"not known: {'; '.join(unknown)}")

@@ -132,14 +132,13 @@ def _print_answer(console: Console, report: dict[str, Any]) -> None:
 def _print_sources(console: Console, report: dict[str, Any]) -> None:
     """What frequencies are rough, and what others come from."""
     sources = [body.get("frequencies_from") for body in report["bodies"]]
-    rough, earlier = sources.count(SECTIONS), sources.count(EARLIER_MESH)
-    if rough:
-        whose = "The frequency" if rough == 1 else f"The frequencies of {rough} bodies"
+    if SECTIONS in sources:
         say(
             console,
-            f"{whose} marked `about` {'is' if rough == 1 else 'are'} rough: from beams and sections, within a factor "
-            "of two for about 9 of 10 links. What follows from them is as rough. --meshes aims at 1%, in minutes.",
+            "Frequencies marked `about` are from beams and sections: right within a factor of two for 9 of 10 links. "
+            "So is what follows from them. --meshes finds them to about 1%, in minutes.",
         )
+    earlier = sources.count(EARLIER_MESH)
     if earlier:
         say(console, f"{earlier} of the flexible bodies have their mesh from an earlier run")
 
@@ -151,7 +150,8 @@ def _expected(row: dict[str, Any]) -> str:
     from calmotion.tolerance.cost import readable_hours
 
     time, size = readable_hours(row["hours"]), decimal(round(1e9 * row["memory_gb"]))
-    return f"optimize is expected to take about {time} of processor time, and {size} of memory for the search"
+    about = "" if time.startswith("less") else "about "
+    return f"optimize is expected to take {about}{time} of processor time, and {size} of memory for the search"
 
 
 def _print_gains(console: Console, report: dict[str, Any]) -> None:

@@ -47,7 +47,7 @@ def effort_limit(motor: DescribedMotor) -> float:
     if not math.isfinite(limit):
         limit = _mujoco_limit(motor)
     if not math.isfinite(limit) and newton is not None and 0.0 < newton.effort < math.inf:
-        motor.notes.append(f"{joint.path}: its limit is taken from {newton.path} (Newton)")
+        motor.notes.append(f"{joint.path}: effort limit from {newton.path} (Newton)")
         limit = motor.effort(newton.effort)
     return float(limit)
 
@@ -69,7 +69,7 @@ def velocity_limit(motor: DescribedMotor) -> float:
         if found is not None and found[1] < math.inf:
             if not found[1] > 0.0:
                 return math.inf  # in these dialects 0 means no limit
-            motor.notes.append(f"{motor.joint.path}: its limit is taken from {found[0]} ({spelling.dialect})")
+            motor.notes.append(f"{motor.joint.path}: speed limit from {found[0]} ({spelling.dialect})")
             return motor.length(found[1])
     return math.inf
 
@@ -86,7 +86,7 @@ def _mujoco_limit(motor: DescribedMotor) -> float:
     source = min(found, key=found.__getitem__)
     if not found[source] < math.inf:
         return math.inf
-    motor.notes.append(f"{joint.path}: its limit is taken from {source} (MuJoCo)")
+    motor.notes.append(f"{joint.path}: effort limit from {source} (MuJoCo)")
     return motor.effort(found[source])
 
 
