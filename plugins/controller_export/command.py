@@ -123,8 +123,8 @@ def _print(report: dict[str, Any], console: Console) -> None:
     elif report["searched"]:
         say(
             console,
-            "next: no rate keeps it; see the columns of rounding and start delay: servos with more ticks, smaller "
-            "steps or an earlier start would help",
+            "next: no rate is enough, since rounding and a late start alone cost more than is allowed: use servos with "
+            "more ticks, smaller steps or an earlier start",
         )
     heads = ["target", "rate", "rounding", "start delay", "in all"]
     rows = [

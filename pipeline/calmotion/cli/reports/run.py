@@ -153,6 +153,7 @@ def print_run(report: dict[str, Any], console: Console, verbose: bool = False) -
     """
     report, shortened = _with_short_paths(report)
     print_verdict(console, report)
+    print_retiming(console, report["retime"])
     print_errors(console, report, verbose)
     print_remaining(console, report)
     print_robustness(console, report)
@@ -242,7 +243,6 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
             f"at rest, friction of motors may leave {held['path']} up to {about(held['max_error_m'])} away from its "
             "place; the errors above do not include this, and no command removes it",
         )
-    print_retiming(console, report["retime"])
     print_limits(console, report["limits"], bool(suffix))
     sags = {target["path"]: target[f"sag{suffix}_m"] or 0.0 for target in report["targets"]}
     hanging = max(sags, key=sags.__getitem__, default="")
@@ -300,6 +300,7 @@ def print_work(console: Console, report: dict[str, Any]) -> None:
 def _print_answer(report: dict[str, Any], console: Console) -> None:
     report, shortened = _with_short_paths(report)
     print_verdict(console, report)
+    print_retiming(console, report["retime"])
     print_remaining(console, report)
     print_errors(console, report)
     print_robustness(console, report)
