@@ -337,7 +337,7 @@ QUESTIONS = (
         "The report names the largest part",
     ),
     ("How do I stop a long run and go on later?", ("how_to/#stop-a-run-and-go-on",), "Press Ctrl-C once"),
-    ("Does it run on Windows?", ("installation/#systems",), "core of the suite without POSIX"),
+    ("Does it run on Windows?", ("installation/#systems",), "plugins without POSIX"),
     ("What will it not do?", ("concepts/limits/",), "collision"),
     ("What does maxTorque do, and what is its default?", ("reference/schemas/",), "calm:motor:maxTorque"),
 )

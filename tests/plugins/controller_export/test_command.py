@@ -25,7 +25,7 @@ REPORT = {
     [
         (True, 8, "says how the file is played"),
         (False, 40, "--rate 40"),
-        (False, None, "no rate keeps it"),
+        (False, None, "no rate is enough"),
     ],
 )  # fmt: skip
 def test_the_answer_is_first_and_the_next_step_before_the_numbers(kept, lowest, then):
