@@ -23,8 +23,10 @@ from .mjcf import (
 )
 from .repairs import (
     PACKAGE,
+    JointFrame,
     faults,
     in_package,
+    joint_frames,
     leader,
     parsed,
     repaired_copy,
@@ -49,6 +51,7 @@ class Description:
         without_mass: Links of a URDF with geometry and without inertia.
         massless: Links of a URDF whose mass is 0, and those with neither inertia nor geometry: frames.
         centred: Links of a URDF whose inertia has no origin: their centre of mass is that of the link's frame.
+        frames: Of each joint of a URDF: position [m], roll, pitch, yaw [rad] and axis.
         unread: What of the robot is not read, as sentences for the user.
         locks: Joints of an MJCF that an equality holds at one value [rad or m].
         soft_limits: Narrower limits of joints of a URDF, which its safety controllers keep [rad or m].
@@ -62,6 +65,7 @@ class Description:
     without_mass: tuple[str, ...] = ()
     massless: tuple[str, ...] = ()
     centred: tuple[str, ...] = ()
+    frames: Mapping[str, JointFrame] = field(default_factory=dict)
     faults: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
     locks: Mapping[str, float] = field(default_factory=dict)
@@ -127,7 +131,8 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
     weightless = {link for link in links if _number(link.find("inertial/mass"), "value", 1.0) == 0.0}
     return Description(
         path, URDF, found, _efforts(root), _names(without & shaped), _names(weightless | (without - shaped)),
-        _names(centred), faults(root, prefixes), judged(URDF, _elements(root, path)), soft_limits=_soft_limits(root),
+        _names(centred), joint_frames(root), faults(root, prefixes), judged(URDF, _elements(root, path)),
+        soft_limits=_soft_limits(root),
     )  # fmt: skip
 
 

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from calmotion.usd import (
     StageUnits,
     authored,
     body_on,
+    is_rigid_body,
     joint_prims,
     prims_of,
 )
@@ -25,10 +27,84 @@ from .robot_motors import LIMITS, Axis, axes_of, free_axes, is_driven, named
 if TYPE_CHECKING:
     from pxr import Usd
 
+_AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 _SLOW = 1e5  # time in which the spring beside a damper alone would pull a joint back [s]
 _REVOLUTE = "PhysicsRevoluteJoint"
 _KINDS = (_REVOLUTE, "PhysicsPrismaticJoint")
 _ACTUATOR = "MjcActuator"
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where a body is in the one that carries it, as the robot's file says.
+
+    Attributes:
+        body: Its prim.
+        parent: Path of the body that carries it; empty for the world.
+        joint: Between the two, of which the body is the second one; None: there is none.
+        position: Of the body in its parent [m].
+        rotation: Likewise, a quaternion w, x, y, z.
+        axis: Of the joint, in the body; None where it has none.
+    """
+
+    body: Usd.Prim
+    parent: str
+    joint: Usd.Prim | None
+    position: Sequence[float]
+    rotation: Sequence[float]
+    axis: Sequence[float] | None = None
+
+
+def author_frames(units: StageUnits, placements: Iterable[Placement]) -> None:
+    """Author poses of bodies and frames of their joints. The converters find angles from their cosine in single
+    precision, by which those of calibrated robots are lost: 0.02 degrees, 0.1 mm on a forearm."""
+    from pxr import Gf
+
+    for place in placements:
+        turn = Gf.Quatd(*place.rotation).GetNormalized()
+        at = Gf.Vec3d(*place.position) / units.length(1.0)
+        above = place.body.GetParent()
+        if str(above.GetPath()) == place.parent or (not place.parent and not above.HasAPI("PhysicsRigidBodyAPI")):
+            _set_precisely(place.body, "xformOp:translate", at)
+            _set_precisely(place.body, "xformOp:orient", turn)
+        if place.joint is None:
+            continue
+        own, anchor = (place.joint.GetAttribute(f"physics:local{what}1").Get() for what in ("Rot", "Pos"))
+        own = Gf.Quatd(own)
+        if place.axis is not None and (token := str(place.joint.GetAttribute("physics:axis").Get())) in _AXES:
+            own = _between(own.Transform(Gf.Vec3d(*_AXES[token])), Gf.Vec3d(*place.axis).GetNormalized()) * own
+            _set_precisely(place.joint, "physics:localRot1", own)
+        _set_precisely(place.joint, "physics:localRot0", turn * own)
+        _set_precisely(place.joint, "physics:localPos0", at + turn.Transform(Gf.Vec3d(anchor)))
+
+
+def urdf_placements(stage: Usd.Stage, frames: Mapping[str, Any]) -> Iterator[Placement]:
+    """Those of the joints of a URDF, by their names; each is where its child is."""
+    from pxr import Gf
+
+    for prim in joint_prims(stage):
+        body = stage.GetPrimAtPath(body_on(stage, prim, 1) or "/")
+        if named(prim) in frames and is_rigid_body(body):
+            position, angles, axis = frames[named(prim)]
+            turn = Gf.Quatd(1.0)
+            for angle, unit in zip(angles, _AXES.values(), strict=True):  # about the axes of the parent, x first
+                turn = Gf.Quatd(float(np.cos(0.5 * angle)), Gf.Vec3d(*unit) * float(np.sin(0.5 * angle))) * turn
+            rotation = (turn.GetReal(), *turn.GetImaginary())
+            yield Placement(body, body_on(stage, prim, 0), prim, position, rotation, axis)
+
+
+def _between(start: Any, end: Any) -> Any:
+    """The smallest rotation from one direction to another one, which is not opposite to it."""
+    from pxr import Gf
+
+    return Gf.Quatd(1.0 + start * end, Gf.Cross(start, end)).GetNormalized()
+
+
+def _set_precisely(prim: Usd.Prim, name: str, value: Any) -> None:
+    """A vector or rotation in the type of its attribute."""
+    attribute = prim.GetAttribute(name)
+    if attribute:
+        attribute.Set(attribute.GetTypeName().type.pythonClass(value))
 
 
 def author_actuators(stage: Usd.Stage, values: Mapping[str, Any], joints: Sequence[Usd.Prim | None]) -> None:

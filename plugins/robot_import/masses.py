@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.model import Character
 from calmotion.usd import StageUnits, body_on, is_applied, is_rigid_body, joint_prims, prims_of
 
-from .joints import author, author_actuators
+from .joints import Placement, author, author_actuators, author_frames
 from .options import RobotOptions, carried_by, geoms_of
 from .robot_motors import named
 
@@ -96,7 +96,17 @@ def _author_values(
         for joint in body["joints"]:
             _author_joint(joints[prim.GetPath()], joint)
     author_actuators(stage, values, [joints.get(prim.GetPath()) for prim in bodies])
+    author_frames(units, _placements(bodies, values["bodies"], joints))
     return weightless
+
+
+def _placements(
+    bodies: Sequence[Usd.Prim], values: Sequence[Mapping[str, Any]], joints: Mapping[Any, Usd.Prim]
+) -> Iterator[Placement]:
+    for prim, body in zip(bodies, values, strict=True):
+        parent = str(bodies[body["parent"]].GetPath()) if body["parent"] >= 0 else ""
+        axis = body["joints"][0]["axis"] if len(body["joints"]) == 1 else None
+        yield Placement(prim, parent, joints.get(prim.GetPath()), body["position"], body["rotation"], axis)
 
 
 def _author_mass(prim: Usd.Prim, body: Mapping[str, Any], units: StageUnits) -> None:

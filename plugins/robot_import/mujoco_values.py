@@ -28,6 +28,9 @@ def compiled(path: str) -> tuple[Any, Any]:
         for unused in (*spec.materials, *spec.textures, *spec.skins, *spec.sensors, *spec.keys):
             spec.delete(unused)
         spec.compiler.fusestatic = False
+        spec.compiler.alignfree = False  # bodies keep the frames that the file gives them
+        for joint in spec.joints:
+            joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
         spec.compiler.boundmass = max(least, spec.compiler.boundmass)
         spec.compiler.boundinertia = max(least, spec.compiler.boundinertia)
         try:
@@ -53,6 +56,9 @@ def values(path: str) -> dict[str, Any]:
                 "axes": model.body_iquat[body].tolist(),
                 "moments": model.body_inertia[body].tolist(),
                 "joints": [joint for joint in joints if joint],
+                "parent": int(model.body_parentid[body]) - 1,
+                "position": model.body_pos[body].tolist(),
+                "rotation": model.body_quat[body].tolist(),
             }
         )
     names = [actuator.name or f"Actuator_{actuator.id}" for actuator in spec.actuators]
@@ -72,6 +78,7 @@ def _joint(model: Any, joint: int) -> dict[str, Any]:
         return {}
     return {
         "angle": kind == int(mujoco.mjtJoint.mjJNT_HINGE),
+        "axis": model.jnt_axis[joint].tolist(),
         "mjc:stiffness": float(model.jnt_stiffness[joint]),
         "newton:damping": float(model.dof_damping[model.jnt_dofadr[joint]]),
         "mjc:actuatorfrclimited": "true" if model.jnt_actfrclimited[joint] else "false",

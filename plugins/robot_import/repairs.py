@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 PACKAGE = "package://"
+JointFrame = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]  # [m], [rad], a direction
 _FOREIGN = "urn:undeclared:"
 _PREFIX = re.compile(r"(?:</?|\s)([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*(?=[\s/>=])")
 _ROOT = re.compile(r"<(robot|mujoco)(?=[\s/>])")
@@ -141,6 +142,24 @@ def leader(joint: xml.Element) -> str | None:
     """The joint that one follows (mimics); None where it moves by itself."""
     mimic = joint.find("mimic")
     return None if mimic is None else mimic.get("joint")
+
+
+def joint_frames(root: xml.Element) -> dict[str, JointFrame]:
+    """Position, angles and axis of the joints of a URDF whose numbers are right; the converter refuses others."""
+    found = {}
+    for joint in root.findall("joint"):
+        origin, axis = joint.find("origin"), joint.find("axis")
+        try:
+            numbers = (_three(origin, "xyz"), _three(origin, "rpy"), _three(axis, "xyz", "1 0 0"))
+        except ValueError:
+            continue
+        if all(len(part) == 3 for part in numbers) and any(numbers[2]):
+            found[joint.get("name", "")] = numbers
+    return found
+
+
+def _three(node: xml.Element | None, name: str, default: str = "0 0 0") -> tuple[float, ...]:
+    return tuple(float(word) for word in (default if node is None else node.get(name, default)).split())
 
 
 def _leaders_first(root: xml.Element) -> Iterator[xml.Element]:

@@ -11,7 +11,14 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.support import nearest
 from calmotion.usd import StageUnits, author_material, is_rigid_body, open_stage, prims_of, quiet, units_of
 
-from .joints import author_locks, author_springs, passive_joints, shift_limits
+from .joints import (
+    author_frames,
+    author_locks,
+    author_springs,
+    passive_joints,
+    shift_limits,
+    urdf_placements,
+)
 from .masses import MUJOCO_DENSITY, author_masses
 from .options import RobotOptions, carried_by, geoms_of, is_named
 from .robot_motors import author_motors, named, narrow_limits
@@ -104,6 +111,7 @@ class _Author:
         """Drives, see `robot_motors`."""
         shift_limits(self._stage)
         options = self._options
+        author_frames(self._units, urdf_placements(self._stage, options.robot.frames))
         self.notes += narrow_limits(self._stage, self._units, options.robot.soft_limits)
         author_motors(self._stage, self._units, options.motion, self._rate, options.robot.efforts, options.motors)
         self.notes += author_springs(self._stage, self._units)

@@ -94,7 +94,10 @@ BAR = '<collision><origin xyz="0.2 0 0"/><geometry><box size="0.4 0.02 0.02"/></
 AT_ORIGIN = TWO_LINKS.replace('<origin xyz="0.2 0.01 0"/>', "").replace("</inertial></link>", f"</inertial>{BAR}")
 
 
-@pytest.mark.parametrize("text", [TWO_LINKS, AT_ORIGIN], ids=["", "inertia_without_origin"])
+CALIBRATED = TWO_LINKS.replace('rpy="0.3 0.1 0"', 'rpy="0.0003 0 1e-4"').replace('"0 0.6 0.8"', '"0.0002 0 1"')
+
+
+@pytest.mark.parametrize("text", [TWO_LINKS, AT_ORIGIN, CALIBRATED], ids=["", "inertia_without_origin", "small_angles"])
 def test_two_links_of_a_urdf_need_the_torques_that_mujoco_finds(tmp_path, text):
     (tmp_path / "arm.urdf").write_text(text)
     torque, far = compare(tmp_path / "arm.urdf", tmp_path)
@@ -110,6 +113,14 @@ def test_joints_of_one_body_move_one_after_the_other_as_in_mujoco(tmp_path):
     )
     torque, far = compare(tmp_path / "robot.xml", tmp_path)
     assert torque < 1e-4 and far < 1e-6
+
+
+def test_small_rotations_of_an_mjcf_are_kept(tmp_path):
+    """Those of calibrated kinematics; a frame and a joint are turned by 0.01 and 0.02 degrees."""
+    turned = SEVERAL.replace('euler="0.3 0 0.2"', 'quat="1 1e-4 0 -2e-3"').replace('axis="0 0 1"', 'axis="3e-4 0 1"')
+    (tmp_path / "robot.xml").write_text(turned)
+    torque, far = compare(tmp_path / "robot.xml", tmp_path)
+    assert torque < 1e-4 and far < 1e-7
 
 
 @pytest.mark.long
