@@ -84,7 +84,8 @@ def _pins(path: str) -> str:
         with open(path, encoding="utf-8-sig", newline="") as file:
             rows = [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
     except (OSError, UnicodeDecodeError) as error:
-        raise argparse.ArgumentTypeError(f"{path} cannot be read: {error}") from None
+        reason = getattr(error, "strerror", None) or error
+        raise argparse.ArgumentTypeError(f"{path} cannot be read: {reason}") from None
     head = [cell.strip() for cell in rows[0]] if rows else []
     known = [name for name in PIN_COLUMNS if name in head]
     if not known and len(head) != 1:

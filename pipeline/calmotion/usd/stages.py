@@ -232,7 +232,7 @@ def _refusal(error: Pcp.ErrorBase, shot: str) -> ShotError | None:
         )
     if arc == "sublayer":
         return ShotError(
-            "names a sublayer that cannot be opened",
+            "the layer names a sublayer that cannot be opened",
             path=assets[-1] if assets else shot,
             attribute=_ARCS[arc],
             found=f"@{assets[0]}@" if assets else text,

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from calmotion.cli import Output, assignments, notice, opened_shot, progress_display, quantity, shot_arguments
 
 if TYPE_CHECKING:
+    from calmotion.model import Animation
+
     from ..lines import Sink, Source
     from ..session import Live
 
@@ -100,7 +102,7 @@ def _share(text: str) -> float:
 
 def run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.host import SettingError
-    from calmotion.workflow import Hooks
+    from calmotion.workflow import Hooks, Shot, with_shot
 
     from ..lines import LineSink, OscSink, osc_place
     from ..opening import live
@@ -115,6 +117,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
         )
     stamps = args.clock == "stamps" or (args.clock is None and listens is None and (args.replay or _is_file()))
     shot = opened_shot(args)
+    replayed = Shot(with_shot(args.replay)).animation if args.replay else None  # before any mesh
     settings = LiveSettings(sender_rate=args.sender_rate, uncertainty=args.uncertainty, background=not stamps)
     with progress_display(args) as display:
         robot = live(
@@ -135,7 +138,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
             sink = Viewer(args.rrd, sink, robot)
         try:
-            source = _play(robot, args, stamps, listens, sink)
+            source = _play(robot, args, replayed, stamps, listens, sink)
         finally:
             sink.close()
         _tell(robot, source)
@@ -171,15 +174,20 @@ def worth_of_lookahead(args: argparse.Namespace, output: Output) -> int:
     return 0
 
 
-def _play(robot: Live, args: argparse.Namespace, stamps: bool, listens: tuple[str, int] | None, sink: Sink) -> Source:
+def _play(
+    robot: Live,
+    args: argparse.Namespace,
+    replayed: Animation | None,
+    stamps: bool,
+    listens: tuple[str, int] | None,
+    sink: Sink,
+) -> Source:
     from ..lines import Lines, OscSource, Samples
     from ..playing import play_clock, play_stamps, samples_of_animation
 
     source: Source
-    if args.replay:
-        from calmotion.workflow import Shot, with_shot
-
-        source = Samples(samples_of_animation(robot, Shot(with_shot(args.replay)).animation))
+    if replayed is not None:
+        source = Samples(samples_of_animation(robot, replayed))
     elif listens:
         source = OscSource(*listens)
     else:

@@ -55,8 +55,9 @@ def read_plan(path: str | os.PathLike[str]) -> Plan:
     try:
         tree: dict[str, Any] = read_toml(name)
     except (OSError, ValueError) as error:
-        found = getattr(error, "strerror", None) or error
-        raise refuse("the file of clips cannot be read", found=found) from error
+        found = getattr(error, "strerror", None)
+        remedy = "Check the path of the file" if found else ""
+        raise refuse("the file of clips cannot be read", found=found or error, remedy=remedy) from error
     wrong = [key for key in tree if key not in ("clips", "reference", "shortest_transition")]
     if wrong:
         raise refuse("there is no such key", wrong[0], tree[wrong[0]])

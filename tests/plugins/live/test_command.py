@@ -63,6 +63,9 @@ def test_a_recording_has_every_command_and_the_robot(calmotion, shot, joint, tmp
     assert ("/robot/command/targets", "Points3D:positions") in columns
     refused = calmotion("live", shot, "--replay", shot, "--rrd", tmp_path, "--quiet")
     assert refused.returncode == 2 and "this recording cannot be written" in refused.stderr
+    missing = calmotion("live", shot, "--replay", tmp_path / "nowhere.usda")
+    assert missing.returncode == 1 and "the file does not exist" in missing.stderr
+    assert "Reduce" not in missing.stderr + missing.stdout, "before any long work"
 
 
 @pytest.mark.parametrize("command", [("live", "--table"), ("inspect", "--live")])
