@@ -17,7 +17,7 @@ from .explanations.structure import Base, Links
 from .fitting import Fit, fit, independent, score
 from .formats import read_spectrum
 from .ringing import peaks, ringing
-from .situation import Situation
+from .situation import CLOSED, Situation
 
 NONE, UNKNOWN = "none", "unknown"
 
@@ -210,6 +210,8 @@ class Comparison:
 
     def _advice(self) -> str:
         s = self._situation
+        if CLOSED in s.notes:
+            return "record all joints' encoders: of this robot, they alone can be compared with the motion"
         if s.mechanics is None:
             return "name the shot of the robot: its inertias and modes tell joints, links and base apart"
         if not s.encoders:

@@ -10,15 +10,26 @@ from functools import partial
 from typing import Any
 
 from calmotion.host import open_host
-from calmotion.model import RunSettings, Source
-from calmotion.recordings import measured_prims, read_recordings
+from calmotion.model import Character, RunSettings, Source
+from calmotion.recordings import measured_prims, read_recordings, refuse_unknown_channels
 from calmotion.tolerance import compiled_in
 from calmotion.version import __version__
-from calmotion.workflow import Given, Hooks, Path, Progress, Shot, compiled_run, plain, read_settings, with_shot
+from calmotion.workflow import (
+    Given,
+    Hooks,
+    Path,
+    Progress,
+    Shot,
+    carry_out,
+    compiled_run,
+    plain,
+    read_settings,
+    with_shot,
+)
 
 from .comparison import Diagnosis, diagnosis_of, of_spectrum
 from .formats import is_dataset, is_spectrum, read_dataset
-from .opening import situation_of
+from .opening import refuse_incomparable, situation_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +119,12 @@ def diagnose(
     compiled = None
     if shot is not None:
         source = Source("", "", RunSettings(), measured=measured_prims(read))
+        character = carry_out(
+            shot, "simulate", wanted=(Character,), source=source, settings=chosen, hooks=hooks
+        ).require(Character)
+        # before meshes are made, which takes much longer
+        refuse_unknown_channels(character, [*read, *([sent] if sent is not None else [])])
+        refuse_incomparable(read)
         compiled = compiled_in(compiled_run(shot, source, chosen, hooks).run.get)
     situation = situation_of(compiled, read, sent)
     made = DiagnosedShot(diagnosis_of(situation, partial(hooks.tell, "Compare explanations")), (), 0.0)

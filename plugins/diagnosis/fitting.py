@@ -118,7 +118,7 @@ def _fit_loops(
             drive = _applied(situation, loops, drive, m, values)
             kept.append(m)
             for loop in loops:
-                own = {p.name: values[loop.cause, p.name] for p in loop.parameters(situation, m)}
+                own = {p.name: values[loop.cause, p.name] for p in _free(situation, loops, loop, m)}
                 chosen[loop.cause, m] = own
     _add_effects(situation, loops, drive, kept, chosen, found, shared=not encoders)
     return drive
@@ -140,11 +140,20 @@ def _add_effects(
     for loop, deviation in zip(loops, alone, strict=True):
         rows: list[dict[str, Any]] = []
         for m in kept[:1] if shared else kept:
-            for p in loop.parameters(situation, m):
+            for p in _free(situation, loops, loop, m):
                 path = "all joints" if shared else situation.joints[m].path
                 rows.append({"name": p.name, "path": path, "value": chosen[loop.cause, m][p.name], "unit": p.unit})
         shown = deviation + rest
         found[loop.cause] = Effect(situation.of_joints(shown), shown, tuple(rows), len(rows))
+
+
+def _free(
+    situation: Situation, loops: Sequence[LoopExplanation], loop: LoopExplanation, m: int
+) -> tuple[Parameter, ...]:
+    """Its parameters of a joint without those that an explanation before it has, too: a loop has one frequency."""
+    before = loops[: loops.index(loop)]
+    taken = {p.name for other in before for p in other.parameters(situation, m)}
+    return tuple(p for p in loop.parameters(situation, m) if p.name not in taken)
 
 
 def _applied(
@@ -155,7 +164,7 @@ def _applied(
     values: Mapping[tuple[str, str], float],
 ) -> Drive:
     for loop in loops:
-        names = [p.name for p in loop.parameters(situation, m)]
+        names = [p.name for p in _free(situation, loops, loop, m)]
         drive = loop.changed(situation, drive, m, {name: values[loop.cause, name] for name in names})
     return drive
 
@@ -170,8 +179,7 @@ def _fit_group(
     """The values of the parameters of some joints that share them; None where they are not worth it."""
     own: dict[tuple[str, str], Parameter] = {}
     for loop in loops:
-        for p in loop.parameters(situation, group[0]):
-            # two explanations may have the frequency of one loop
+        for p in _free(situation, loops, loop, group[0]):
             own[loop.cause, p.name] = p
     single = len(group) == 1 and group[0] in situation.encoders
     block = situation.blocks[situation.blocks_of[situation.encoders[group[0]]][0]] if single else slice(None)

@@ -96,12 +96,11 @@ class FlexibleRobot:
         return float(np.sqrt(max(min(found), 0.0)) / (2.0 * np.pi))
 
 
-def command_of(shot: CompiledShot, times: Array, order: int = 0) -> Array:
-    """The motors' curves or their derivatives at some times, shape [T, M]; they stand still after the last frame."""
-    end = float(shot.animation.frame_times[-1])
-    curves = [curve_of(track, end, False) for track in shot.animation.current]
-    inside = np.clip(times, 0.0, end)
-    columns = [np.where((inside == times) | (order == 0), curve(inside, order), 0.0) for curve in curves]
+def command_of(shot: CompiledShot, times: Array) -> Array:
+    """The motors' curves at some times, shape [T, M]; their last value stays, or a shot that loops begins again."""
+    end, loops = float(shot.animation.frame_times[-1]), shot.character.retarget.cyclic
+    inside = times if loops else np.clip(times, 0.0, end)
+    columns = [curve_of(track, end, loops)(inside, 0) for track in shot.animation.current]
     return np.stack(columns, axis=1) if columns else np.zeros((len(times), 0))
 
 

@@ -10,18 +10,26 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import ON_ERROR, PRESCRIBED, Motor
 from calmotion.multibody import SimulationFailure
-from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, Channel, SensorRecording
+from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER, STRAIN, Channel, SensorRecording
 from calmotion.simulation import CompiledShot
 from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.signal import butter, sosfiltfilt
 
 from .guessing import with_guessed_loops
 from .mechanics import Mechanics, command_of, flexible_robot, mechanics_of
 from .signals import Joint, Sensor, noise_of, on_grid
-from .situation import Situation
+from .situation import CLOSED, Situation
 
 STEP, COARSE = 1e-3, 4  # of the grid [s], and of the mechanics in steps of the grid
+FASTEST = 15.0  # up to which encoders tell accelerations [Hz]
 LONGEST = 30.0  # part of a recording that is diagnosed [s]
 LEAST_SAMPLES = 50
+COMPARED = (ANGLE, MARKER, ACCELEROMETER)
+TOLD_BY = {
+    EFFORT: "calmotion calibrate estimates gains and friction with efforts",
+    STRAIN: "calmotion calibrate estimates the links' stiffness and damping with strain",
+}
+AHEAD = 0.015  # from which on a recording that is ahead of its command is on another clock [s]
 SHIFTED = 0.3  # from which on the clocks of command and recording are taken to differ [s]
 CLEAR = 0.03  # largest mean square of what then is left, of the variance of the command
 SAME = 0.15  # difference of what was sent from the shot, of the range of its motion, up to which it is the same motion
@@ -40,12 +48,14 @@ def situation_of(
     Raises:
         ShotError: The recordings do not fit the shot, or are too short.
     """
-    channels = [c for recording in recordings for c in recording.channels if c.kind != EFFORT]
+    refuse_incomparable(recordings)
+    channels = [c for recording in recordings for c in recording.channels if c.kind in COMPARED]
     if shot is None and commands is None:
         paths = [c.path for c in channels if c.kind == ANGLE]
     else:
         paths = [m.path for m in shot.character.motors] if shot else [c.path for c in _angles(commands)]
-    notes: list[str] = []
+    others = sorted({c.kind for recording in recordings for c in recording.channels} - {*COMPARED})
+    notes = [f"channels of kind {kind} are not used: {TOLD_BY[kind]}" for kind in others]
     end = min(max(float(c.times[-1]) for c in channels), LONGEST) if channels else 0.0
     times = np.asarray(STEP * np.arange(max(int(end / STEP) + 1, 2)), float)
     command, sent = _commands(shot, commands, paths, times, notes)
@@ -55,19 +65,27 @@ def situation_of(
     motors = shot.character.motors if shot is not None else (None,) * len(paths)
     situation = Situation(STEP, command, sent, command, (), sensors, None, None, False, tuple(notes))
     situation = _on_one_clock(_along(situation, shot, paths, motors, command))
-    situation = with_guessed_loops(situation)
+    if shot is not None and situation.mechanics is None and situation.encoders:
+        # where targets should be is not known
+        kept = tuple(s for s in situation.sensors if s.kind == ANGLE)
+        unused = tuple(f"{s.name} is not used, for the same reason" for s in situation.sensors if s.kind != ANGLE)
+        situation = replace(situation, sensors=kept, notes=(*situation.notes, *unused))
     if situation.mechanics is None or shot is None:
-        return situation
-    # once more along the motion of a healthy robot, which lags behind the command
-    guessed = situation.joints
-    situation = _along(situation, shot, paths, motors, situation.motion[0])
-    joints = tuple(
-        replace(own, gain=g.gain, damping=g.damping, guessed=True, load=own.load if g.load.any() else g.load)
-        if g.guessed
-        else own
-        for own, g in zip(situation.joints, guessed, strict=True)
-    )
-    situation = replace(situation, joints=joints)
+        return with_guessed_loops(situation)
+    # along what the encoders show, so that each joint bears what the motion of the others does to it
+    situation = with_guessed_loops(_along(situation, shot, paths, motors, _measured(situation)))
+    if len(situation.encoders) < len(paths):
+        # other joints move as those of a healthy robot do, which lag behind the command
+        seen = np.array([m in situation.encoders for m in range(len(paths))])
+        guessed = situation.joints
+        situation = _along(situation, shot, paths, motors, np.where(seen, situation.near, situation.motion[0]))
+        joints = tuple(
+            replace(own, gain=g.gain, damping=g.damping, guessed=True, load=own.load if g.load.any() else g.load)
+            if g.guessed
+            else own
+            for own, g in zip(situation.joints, guessed, strict=True)
+        )
+        situation = replace(situation, joints=joints)
     if not any(body.flexible for body in shot.character.bodies):
         return situation
     gains, dampings = situation.finite(situation.healthy)
@@ -76,6 +94,22 @@ def situation_of(
     except SimulationFailure:
         told = "the links have no equilibrium in a pose of the motion: their modes are not used"
         return replace(situation, notes=(*situation.notes, told))
+
+
+def refuse_incomparable(recordings: Sequence[SensorRecording]) -> None:
+    """Refuse recordings of which nothing tells how the robot moved.
+
+    Raises:
+        ShotError: They are such.
+    """
+    kinds = sorted({c.kind for recording in recordings for c in recording.channels})
+    if not any(kind in COMPARED for kind in kinds):
+        raise ShotError(
+            "the recording has no joint, marker or accelerometer: nothing in it says how the robot moved",
+            path=recordings[0].file,
+            found=", ".join(kinds),
+            remedy=f"Record joints (JOINT.angle) beside it; {TOLD_BY[kinds[0]]}",
+        )
 
 
 def _along(
@@ -87,7 +121,7 @@ def _along(
     if shot is not None and len(paths):
         mechanics = mechanics_of(shot, times[::COARSE], near[::COARSE])
         if mechanics is None:
-            notes = (*notes, "joints close chains or move freely: inertias and loads of the joints are not used")
+            notes = (*notes, CLOSED)
     joints = tuple(
         _joint(path, m, motor, mechanics, times, near[:, m])
         for m, (path, motor) in enumerate(zip(paths, motors, strict=True))
@@ -185,13 +219,6 @@ def _sensors(
     found = []
     for channel in channels:
         names = paths if channel.kind == ANGLE else targets
-        if shot is not None and channel.path not in names:
-            raise ShotError(
-                "the recording names what the shot does not have",
-                path=channel.path,
-                found=channel.kind,
-                remedy=f"Name one of {', '.join(names[:8])}",
-            )
         there = np.flatnonzero(np.isfinite(channel.values).any(axis=0))
         rows = np.isfinite(channel.values[:, there]).all(axis=1) & (channel.times >= 0.0) & (channel.times <= end)
         if rows.sum() < LEAST_SAMPLES:
@@ -240,21 +267,12 @@ def _thinned(times: Array, values: Array, noise: float) -> tuple[Array, Array, f
 
 
 def _on_one_clock(situation: Situation) -> Situation:
-    """The situation with sensors moved in time where encoders follow a healthy robot much later or earlier."""
-    shifts, times = [], situation.times
-    for sensor in situation.sensors:
-        if sensor.kind != ANGLE or sensor.index < 0 or np.ptp(situation.command[:, sensor.index]) < 1e-3:
-            continue
-        grid = np.arange(sensor.times[0], sensor.times[-1], 0.01)
-        measured = np.interp(grid, sensor.times, sensor.values[:, 0])
-        asked = np.interp(grid, times, situation.motion[0][:, sensor.index])
-        lags = np.arange(-300, 301)
-        cost = [_difference(measured, asked, int(lag)) for lag in lags]
-        # a robot that follows badly seems to be early or late, too
-        clear = min(cost) < min(CLEAR * float(np.var(asked)), 0.25 * cost[len(lags) // 2])
-        shifts.append(0.01 * float(lags[int(np.argmin(cost))]) if clear else 0.0)
-    shift = float(np.median(shifts)) if shifts else 0.0
+    """The situation with sensors moved in time where encoders follow a healthy robot much later or earlier, or are
+    ahead of the command."""
+    shift, times = _shift(situation, situation.motion[0]), situation.times
     if abs(shift) < SHIFTED:
+        shift = min(_shift(situation, situation.command), 0.0)
+    if shift > -AHEAD and abs(shift) < SHIFTED:
         return situation
     told = f"the recording follows the command by {shift:.2f} s, which is taken as a difference of their clocks"
     kept = []
@@ -263,6 +281,36 @@ def _on_one_clock(situation: Situation) -> Situation:
         rows = (own >= 0.0) & (own <= times[-1])
         kept.append(replace(s, times=own[rows], values=s.values[rows]))
     return replace(situation, sensors=tuple(kept), notes=(*situation.notes, told))
+
+
+def _shift(situation: Situation, motion: Array) -> float:
+    """By how much encoders follow a motion, shape [T, M], later than it is [s]; 0 where that is not clear."""
+    shifts = []
+    for m, k in situation.encoders.items():
+        if np.ptp(situation.command[:, m]) < 1e-3:
+            continue
+        sensor = situation.sensors[k]
+        grid = np.arange(sensor.times[0], sensor.times[-1], 0.01)
+        measured = np.interp(grid, sensor.times, sensor.values[:, 0])
+        asked = np.interp(grid, situation.times, motion[:, m])
+        lags = np.arange(-300, 301)
+        cost = [_difference(measured, asked, int(lag)) for lag in lags]
+        # a robot that follows badly seems to be early or late, too
+        clear = min(cost) < min(CLEAR * float(np.var(asked)), 0.25 * cost[len(lags) // 2])
+        shifts.append(0.01 * float(lags[int(np.argmin(cost))]) if clear else 0.0)
+    return float(np.median(shifts)) if shifts else 0.0
+
+
+def _measured(situation: Situation) -> Array:
+    """The motion that encoders show, without what is too fast for their resolution, and the command of other joints,
+    shape [T, M]."""
+    near = situation.command.copy()
+    for m, k in situation.encoders.items():
+        sensor, own = situation.sensors[k], situation.command[:, m]
+        off = sensor.values[:, 0] - np.interp(sensor.times, situation.times, own)
+        off = np.interp(situation.times, sensor.times, off - np.median(off))
+        near[:, m] = own + sosfiltfilt(butter(2, FASTEST, fs=1.0 / situation.h, output="sos"), off)
+    return near
 
 
 def _difference(measured: Array, asked: Array, lag: int) -> float:

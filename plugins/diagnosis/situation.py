@@ -15,6 +15,11 @@ from .kernels import follow
 from .mechanics import FlexibleRobot, Mechanics
 from .signals import HEALTHY, STRIBECK, Drive, Joint, Sensor, on_grid
 
+CLOSED = (
+    "joints close chains or move freely: inertias and loads are not known, so that links, base and backlash cannot be "
+    "told from other causes"
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Situation:

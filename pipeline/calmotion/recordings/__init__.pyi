@@ -5,6 +5,7 @@ from calmotion.recordings.reading import first_line as first_line
 from calmotion.recordings.reading import hash_of as hash_of
 from calmotion.recordings.reading import measured_prims as measured_prims
 from calmotion.recordings.reading import read_recordings as read_recordings
+from calmotion.recordings.reading import refuse_unknown_channels as refuse_unknown_channels
 from calmotion.recordings.reading import requested as requested
 from calmotion.recordings.recording import ACCELEROMETER as ACCELEROMETER
 from calmotion.recordings.recording import ANGLE as ANGLE

@@ -7,11 +7,13 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from calmotion.errors import ShotError
+from calmotion.errors import ShotError, raise_all
 from calmotion.host import Host, NotAsked, Operator, PropertyValues, RunContext, SettingError, Settings
-from calmotion.recordings.recording import RecordingRequest, SensorRecording, turned_on
+from calmotion.model import Character
+from calmotion.recordings.recording import ANGLE, EFFORT, RecordingRequest, SensorRecording, turned_on
 from calmotion.support.files import refuse_special
 from calmotion.support.foreign_files import refuse_lfs_pointers
+from calmotion.support.naming import nearest
 from calmotion.workflow.problems import value_of
 
 
@@ -139,3 +141,27 @@ def measured_prims(recordings: Sequence[SensorRecording]) -> tuple[str, ...]:
     """Prims at which sensors sit, each once."""
     channels = [channel for recording in recordings for channel in recording.channels]
     return tuple(dict.fromkeys(path for channel in channels for path in channel.prims))
+
+
+def refuse_unknown_channels(character: Character, recordings: Sequence[SensorRecording]) -> None:
+    """Refuse channels of prims that the robot does not have.
+
+    Raises:
+        ShotError: There are some.
+    """
+    targets, motors = [t.path for t in character.targets], [m.path for m in character.motors]
+    problems = []
+    for recording in recordings:
+        for channel in recording.channels:
+            known = motors if channel.kind in (ANGLE, EFFORT) else targets
+            for path in [path for path in channel.prims or (channel.path,) if path not in known]:
+                problems.append(
+                    ShotError(
+                        f"the recording has a channel ({channel.kind}) of a prim that the robot does not have",
+                        path=recording.file,
+                        attribute=path,
+                        found="no such " + ("motor" if known is motors else "prim below a body"),
+                        remedy=f"{nearest(path, known)}Correct the column, or its row in the TOML map",
+                    )
+                )
+    raise_all(problems)

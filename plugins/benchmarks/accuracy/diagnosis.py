@@ -116,8 +116,12 @@ def summary(answers: list[Answer]) -> list[str]:
     ):
         if own:
             right = np.mean([a.right for a in own])
-            wrong = np.mean([not a.right and a.first != UNKNOWN and a.confidence >= SURE for a in own])
-            lines.append(f"{name}: {len(own)} recordings, right first {right:.0%}, wrong with confidence {wrong:.1%}")
+            wrong = np.mean([not a.right and a.first not in (NONE, UNKNOWN) and a.confidence >= SURE for a in own])
+            missed = np.mean([not a.right and a.first == NONE for a in own])
+            lines.append(
+                f"{name}: {len(own)} recordings, right first {right:.0%}, another cause with confidence {wrong:.1%}, "
+                f"error within the noise {missed:.0%}"
+            )
     spent = [a.processor_s for a in answers]
     lines.append(f"processor time of a diagnosis: median {np.median(spent):.1f} s, largest {np.max(spent):.1f} s")
     return lines

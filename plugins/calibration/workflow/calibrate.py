@@ -12,7 +12,7 @@ from typing import Any
 from calmotion.host import SettingError, Settings, merge, nearest, quantity_of
 from calmotion.model import Animation, Character, OutputPaths, Provenance, RunSettings, Source, WrittenLayer
 from calmotion.multibody import IMPLICIT
-from calmotion.recordings import SensorRecording, measured_prims, read_recordings
+from calmotion.recordings import SensorRecording, measured_prims, read_recordings, refuse_unknown_channels
 from calmotion.simulation import CompiledShot
 from calmotion.tolerance import compiled_in
 from calmotion.workflow import (
@@ -31,7 +31,6 @@ from calmotion.workflow import (
 from ..identification.calibrate import CalibrationSettings, calibrate_shots
 from ..identification.parameters import DEFAULT, refuse_unknown
 from ..identification.recordings.plausible import refuse_long
-from ..identification.recordings.sensors import refuse_unknown_channels
 from ..identification.signals import refuse_cyclic
 from ..model.estimates import Calibration, CalibrationFigures, Estimate
 

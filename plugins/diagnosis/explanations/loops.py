@@ -112,11 +112,12 @@ class Delay(LoopExplanation):
     cause = "delay"
     label = "a delay between command and motion"
     tells = "command and motion logged by one device on one clock: an offset of clocks looks like a delay"
+    EARLIEST = -0.005  # no joint moves before its command, but samples have times that are a little off [s]
 
     def parameters(self, situation: Situation, motor: int) -> tuple[Parameter, ...]:
         """The delay."""
         joint = situation.joints[motor]
-        late = Parameter("delay", "s", (max(joint.delay, 0.03), 0.03, 0.08), -0.05, 0.5)
+        late = Parameter("delay", "s", (max(joint.delay, 0.03), 0.03, 0.08), self.EARLIEST, 0.5)
         return (late, _frequency(situation, motor)) if joint.guessed and joint.gain else (late,)
 
     def changed(self, situation: Situation, drive: Drive, motor: int, values: Values) -> Drive:
@@ -126,8 +127,6 @@ class Delay(LoopExplanation):
     def remedy(self, situation: Situation, parameters: Sequence[Mapping[str, Any]]) -> str:
         """Send commands earlier."""
         late = float(np.median([row["value"] for row in parameters if row["name"] == "delay"]))
-        if late < 0.0:
-            return f"the recording is {-1e3 * late:.0f} ms ahead of its commands: log both on one clock"
         return (
             f"the robot moves {1e3 * late:.0f} ms after its command: send commands that much earlier (set "
             "calm:motor:delay, so that calmotion optimize does it), or shorten buffers of the bus and the driver"

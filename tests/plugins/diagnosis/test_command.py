@@ -129,7 +129,8 @@ def test_a_shot_knows_its_command_and_refuses_what_it_does_not_have(calmotion, t
     turn = CubicSpline(np.arange(5) * 0.25, frames)(np.clip(times, 0.0, 1.0))
     table = np.column_stack([times, COUNT * np.round(turn / COUNT)])
     file = tmp_path / "take.csv"
-    np.savetxt(file, table, delimiter=",", header=f"time_s,{HINGE}.angle", comments="")
+    for path in (file, tmp_path / "good.csv"):
+        np.savetxt(path, table, delimiter=",", header=f"time_s,{HINGE}.angle", comments="")
     done = calmotion("diagnose", shot, "--recording", file, "--json")
     assert done.returncode == 0, done.stderr
     assert [row["cause"] for row in json.loads(done.stdout)["causes"]] == ["none"]
@@ -138,9 +139,27 @@ def test_a_shot_knows_its_command_and_refuses_what_it_does_not_have(calmotion, t
     done = calmotion("diagnose", shot, "--recording", file, "--json")
     assert done.returncode == 0, done.stderr
     assert [row["cause"] for row in json.loads(done.stdout)["causes"]] == ["none"], "a marker seen from above"
-    np.savetxt(file, table, delimiter=",", header="time_s,/Robot/Knee.angle", comments="")
+    np.savetxt(file, table, delimiter=",", header=f"time_s,{HINGE.replace('H', 'K')}.angle", comments="")
     done = calmotion("diagnose", shot, "--recording", file)
-    assert done.returncode != 0 and "/Robot/Knee" in done.stderr and HINGE in done.stderr
+    assert done.returncode != 0 and HINGE.replace("H", "K") in done.stderr and f"Did you mean {HINGE}" in done.stderr
+    assert "Reduce" not in done.stderr, "before anything is meshed"
+    done = calmotion("diagnose", shot, "--recording", tmp_path / "good.csv", "--commands", file)
+    assert done.returncode != 0 and f"Did you mean {HINGE}" in done.stderr and "Reduce" not in done.stderr
+
+
+def test_efforts_are_told_as_not_used_and_are_not_enough(calmotion, tmp_path):
+    shot, file = tmp_path / "robot.usda", tmp_path / "take.csv"
+    shot.write_text(ONE_HINGE)
+    times = np.arange(0.0, 1.0, 0.005)
+    table = np.column_stack([times, 0.0 * times, np.sin(times)])
+    np.savetxt(file, table, delimiter=",", header=f"time_s,{HINGE}.angle,{HINGE}.effort", comments="")
+    done = calmotion("diagnose", shot, "--recording", file, "--json")
+    assert done.returncode == 0, done.stderr
+    assert any("effort" in note and "calibrate" in note for note in json.loads(done.stdout)["notes"])
+    np.savetxt(file, table[:, [0, 2]], delimiter=",", header=f"time_s,{HINGE}.effort", comments="")
+    for options in ((shot,), ()):
+        done = calmotion("diagnose", *options, "--recording", file)
+        assert done.returncode != 0 and "JOINT.angle" in done.stderr and "calmotion calibrate" in done.stderr
 
 
 def test_a_dataset_of_lerobot_has_commands_and_motion(calmotion, tmp_path, motion):

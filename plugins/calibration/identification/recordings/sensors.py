@@ -7,20 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.arrays import Array, BoolArray
-from calmotion.errors import ShotError, raise_all
+from calmotion.errors import ShotError
 from calmotion.model import Character
 from calmotion.recordings import (
     ACCELEROMETER,
-    ANGLE,
     COMPONENTS,
-    EFFORT,
     MARKER,
     STRAIN,
     UNITS,
     Channel,
     SensorRecording,
+    refuse_unknown_channels,
 )
-from calmotion.support import nearest
 
 from ...model.estimates import BIAS, CLOCK_DRIFT, CLOCK_OFFSET, GAIN, OFFSET, PLACE, START
 from ..parameters import PRIORS, Parameter
@@ -213,27 +211,3 @@ def own_path(sensor: Sensor) -> str:
 
 def _of_take(path: str, take: int) -> str:
     return path if take == 0 else f"{path} (shot {take + 1})"
-
-
-def refuse_unknown_channels(character: Character, recordings: Sequence[SensorRecording]) -> None:
-    """Refuse channels of prims that the robot does not have.
-
-    Raises:
-        ShotError: There are some.
-    """
-    targets, motors = [t.path for t in character.targets], [m.path for m in character.motors]
-    problems = []
-    for recording in recordings:
-        for channel in recording.channels:
-            known = motors if channel.kind in (ANGLE, EFFORT) else targets
-            for path in [path for path in channel.prims or (channel.path,) if path not in known]:
-                problems.append(
-                    ShotError(
-                        f"the recording has a channel ({channel.kind}) of a prim that the robot does not have",
-                        path=recording.file,
-                        attribute=path,
-                        found="no such " + ("motor" if known is motors else "prim below a body"),
-                        remedy=f"{nearest(path, known)}Correct the column, or its row in the TOML map",
-                    )
-                )
-    raise_all(problems)

@@ -45,7 +45,10 @@ def test_the_table_counts_medium_and_strong_faults():
         and table["two of them"][:2] == ["1", "1"]
         and table["none"][:2] == ["1", "1"]
     )
-    assert summary(rows)[0] == "medium and strong: 3 recordings, right first 67%, wrong with confidence 33.3%"
+    assert summary(rows)[0] == (
+        "medium and strong: 3 recordings, right first 67%, another cause with confidence 33.3%, "
+        "error within the noise 0%"
+    )
 
 
 @pytest.mark.long
