@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,6 +28,9 @@ _READY = "ready"
 _SCRIPT = Path(__file__).with_name("mujoco_values.py")
 LONGEST = 1800.0  # time of a conversion [s]
 _BROKEN_OBJ = re.compile(r'Failed to convert mesh(?: "[^"]*" from|:) (.+?\.obj)(?=:|$)', re.IGNORECASE)
+_PLACE = re.compile(r" \(line: \d+\)$")
+# of pictures and sensors, which change no motion, and of the converter's own code
+_NO_MATTER = re.compile("texture|was deprecated|(cameras|lights|sensors|keys) are not supported")
 _ADDED = re.compile("Unsupported transmission type '.*JOINTINPARENT'|Actuator '.*' is not converted")  # see `joints`
 _BAD_WORDS = ("Failed to", "Cannot", "not found")  # of warnings after which a part of the robot is missing
 
@@ -110,7 +114,7 @@ def convert(description: Description, output: str, python: str) -> tuple[str, tu
     except subprocess.TimeoutExpired:
         raise ShotError(
             f"the converter has not ended after {LONGEST / 60:g} minutes",
-            path=description.path,
+            path=description.shown,
             remedy=f"Make the meshes smaller; `{module}` of the converters' environment shows where it is",
         ) from None
     lines = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
@@ -118,43 +122,44 @@ def convert(description: Description, output: str, python: str) -> tuple[str, tu
     if done.returncode or len(files) != 1:
         raise ShotError(
             "the converter refuses the robot",
-            path=description.path,
+            path=description.shown,
             found=_last_words(lines),
             remedy=f"Correct the file; `{module}` of the converters' environment shows the whole message",
         )
     warnings = [line.partition("] ")[2].partition("] ")[2] or line for line in lines if "Warning" in line]
-    warnings = [line for line in warnings if not _ADDED.search(line)]
+    warnings = [line for line in warnings if not _ADDED.search(line) and not _NO_MATTER.search(line)]
     lost = [line for line in warnings if line.startswith(_BAD_WORDS)]
     if lost:
         broken = [match.group(1) for line in lost if (match := _BROKEN_OBJ.match(line))]
         if len(broken) == len(lost):
-            raise BrokenMeshes(description.path, broken)
+            raise BrokenMeshes(description.shown, broken)
         raise ShotError(
             "a part of the robot cannot be converted",
-            path=description.path,
+            path=description.shown,
             found="; ".join(lost[:3]),
             remedy="Correct the file: meshes are .stl, .obj or .dae, and their names relative to it",
         )
-    return str(files[0]), tuple(warnings)
+    told = Counter(_PLACE.sub("", line) for line in warnings)
+    return str(files[0]), tuple(f"{line} ({count} times)" if count > 1 else line for line, count in told.items())
 
 
-def compiled_values(path: str, python: str) -> dict[str, Any]:
+def compiled_values(description: Description, python: str) -> dict[str, Any]:
     """What MuJoCo makes of an MJCF robot, see `mujoco_values`.
 
     Args:
-        path: Its file.
+        description: The robot.
         python: Of the environment of the converters.
 
     Raises:
         ShotError: MuJoCo does not load it.
     """
-    command = [python, "-I", str(_SCRIPT), os.path.abspath(path)]
+    command = [python, "-I", str(_SCRIPT), os.path.abspath(description.path)]
     done = subprocess.run(command, capture_output=True, text=True, env=_plain_environment(), timeout=LONGEST)
     if done.returncode:
         words = [line.strip() for line in done.stderr.splitlines() if line.strip()]
         raise ShotError(
             "MuJoCo does not load the robot",
-            path=path,
+            path=description.shown,
             found=" ".join(words[-2:])[:300] or None,
             remedy="Correct the file, until MuJoCo's own viewer opens it",
         )
@@ -225,7 +230,9 @@ def _plain_environment() -> dict[str, str]:
 
 
 def _last_words(lines: list[str]) -> str | None:
-    return lines[-1].strip()[:300] if lines else None
+    """The last line, and the one before where that has the error of which the last one says the place."""
+    behind = len(lines) > 1 and "rror" in lines[-2] and "rror" not in lines[-1]
+    return " ".join(line.strip() for line in lines[-2 if behind else -1 :])[:300] or None
 
 
 @contextmanager

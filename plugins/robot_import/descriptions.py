@@ -55,6 +55,7 @@ class Description:
         unread: What of the robot is not read, as sentences for the user.
         locks: Joints of an MJCF that an equality holds at one value [rad or m].
         soft_limits: Narrower limits of joints of a URDF, which its safety controllers keep [rad or m].
+        original: The file of which this one is a repaired copy; empty where it is none.
         faults: What is repaired in a copy before it is converted, as sentences for the user.
     """
 
@@ -70,6 +71,12 @@ class Description:
     unread: tuple[str, ...] = ()
     locks: Mapping[str, float] = field(default_factory=dict)
     soft_limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    original: str = ""
+
+    @property
+    def shown(self) -> str:
+        """The file that the user knows."""
+        return self.original or self.path
 
 
 def read_description(path: str, packages: Mapping[str, str]) -> Description:
@@ -145,14 +152,16 @@ def repaired(description: Description, folder: str, broken_meshes: Sequence[str]
         broken_meshes: OBJ files that cannot be converted as they are.
     """
     root, _ = _root(description.path)
+    given = description.shown
     if description.kind == MJCF:
-        return replace(description, path=nested_copy(root, description.path, folder, lambda file: _root(file)[0]))
+        copy = nested_copy(root, description.path, folder, lambda file: _root(file)[0])
+        return replace(description, path=copy, original=given)
 
     def file(name: str) -> str:
         return mesh_file(name, description.path, description.packages)
 
     with_clean_meshes(root, broken_meshes, folder, file)
-    return replace(description, path=repaired_copy(root, description.path, folder, file))
+    return replace(description, path=repaired_copy(root, description.path, folder, file), original=given)
 
 
 def _macro(node: xml.Element) -> str | None:

@@ -225,7 +225,7 @@ class _Import:
             asset = f"./{os.path.basename(parts)}/{os.path.basename(converted)}"
             options = self._options
             if options.mjcf:
-                options = replace(options, compiled=compiled_values(description.path, python))
+                options = replace(options, compiled=compiled_values(description, python))
             layer, notes = robot_layer(converted, asset, options)
             layer.documentation = f"The robot of {os.path.basename(self._description.path)}, imported by Calmotion."
             draft = os.path.join(work, os.path.basename(self._layer))

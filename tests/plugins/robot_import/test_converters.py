@@ -46,17 +46,30 @@ def test_each_kind_has_its_converter_and_packages_are_named(script, tmp_path, ki
 
 def test_warnings_are_told_and_lost_parts_refused(script, tmp_path):
     robot = Description("r.urdf", "urdf")
-    harmless = script(f"{WRITE}\nprint('[Warning] [some.module.function] keys are not supported')")
-    assert convert(robot, str(tmp_path / "out"), str(harmless))[1] == ("keys are not supported",)
+    said = [
+        "capsule: Invalid (line: 3)",
+        "capsule: Invalid (line: 9)",
+        "keys are not supported",
+        "it was deprecated in 3",
+    ]
+    harmless = script(f"{WRITE}\nfor text in {said}: print('[Warning] [some.module.function] ' + text)")
+    assert convert(robot, str(tmp_path / "out"), str(harmless))[1] == ("capsule: Invalid (2 times)",)
     lossy = script(f"{WRITE}\nprint('[Warning] [some.module.function] Failed to convert mesh: m.dae', file=sys.stderr)")
     with pytest.raises(ShotError, match="Failed to convert mesh"):
         convert(robot, str(tmp_path / "out2"), str(lossy))
 
 
-@pytest.mark.parametrize("lines", ["print('Error: bad joint'); sys.exit(1)", "print('Error: bad joint')"])
+@pytest.mark.parametrize(
+    "lines",
+    [
+        "print('Error: bad joint'); sys.exit(1)",
+        "print('Error: bad joint')",
+        "print('Error: bad joint'); print('Element line 3')",
+    ],
+)
 def test_what_a_converter_refuses_is_refused_in_its_words(script, tmp_path, lines):
     with pytest.raises(ShotError, match="bad joint") as refused:
-        convert(Description("r.urdf", "urdf"), str(tmp_path / "out"), str(script(lines)))
+        convert(Description("copy.urdf", "urdf", original="r.urdf"), str(tmp_path / "out"), str(script(lines)))
     assert refused.value.path == "r.urdf"
 
 
