@@ -91,6 +91,13 @@ def test_slower_motors_perform_the_animation_later_and_within_their_limits(arm, 
     assert found.after.motion.times[-1] == pytest.approx(found.retimed.animation.frame_times[-1])
 
 
+def test_limits_of_effort_hold_by_shorter_steps_than_that_of_the_search(arm, animation, bodies):
+    """Positions that are right to the tolerance leave peaks of efforts some hundredths too low."""
+    shot = compile_shot(limited(arm, animation, bodies, "effort", 0.8), animation, bodies)
+    found = optimize_with_tempo(shot, replace(RETIMED, step=1 / 48), ignore_progress)
+    assert exceeded(shot, found, "effort") <= 1.001
+
+
 def test_both_motions_have_the_elastic_coordinates_of_the_last_search(arm, animation, bodies, meshes):
     slow = with_elasticity(limited(arm, animation, bodies, "velocity", 0.6), "stvk")
     shot = reduced_shot(slow, animation, meshes, RunSettings(tolerance=1e-3))

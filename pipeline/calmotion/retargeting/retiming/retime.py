@@ -36,6 +36,7 @@ from calmotion.tolerance.pod_subspace import ReferenceRun
 from calmotion.tolerance.reduced_bodies import RunMemory
 from calmotion.tolerance.simulation import found_tracks
 from calmotion.tolerance.step_choice import chooses_step
+from calmotion.tolerance.step_error import order_of
 
 ROUNDS = 3  # searches at most that leave limits to the tempo
 LIMITED_SEARCHES = 4  # at most that keep all limits by themselves
@@ -71,7 +72,7 @@ def optimize_with_tempo(
         if found.excess > NOTICED:  # where nothing may be slower, a search has to keep the limits
             break
         done = searches.searched(performance.shot, limited_by_tempo=True)
-        used = performance.used(done)
+        performance, used = performance.with_curves(done), performance.used(done)
         over = _excess(used)
         kept = over <= KEPT
         # commands far ahead of their motors: bending them a little costs less than time
@@ -202,6 +203,10 @@ class _Performance:
         performance = Retimed(performed, with_contacts_at(made.character, tempo), found.report)
         return cls(made, given, tempo, performance, made.at(performance))
 
+    def with_curves(self, result: Result) -> _Performance:
+        """The shot with the curves of a result, from which another search begins."""
+        return replace(self, shot=self.shot.with_tracks(found_tracks(result, self.shot.animation)))
+
     def moved(self, result: Result, found: FoundTempo) -> _Performance:
         """The shot at another tempo, with the offsets of a result where the animation is at the same time."""
         other = _Performance.of(self.made, self.given, found)
@@ -227,14 +232,21 @@ class _Performance:
         }
 
     def _efforts(self, result: Result) -> Array:
-        """Efforts in a result, and as half of its steps show them, shape [n, M]."""
+        """Efforts in a result, and as ever shorter steps would have them, shape [n, M]."""
         assert result.after is not None
-        motions = [result.after.motion]
-        if np.any(np.isfinite(self.given.limits.effort)) and not result.interrupted:
-            shot = self.shot.with_tracks(found_tracks(result, self.shot.animation))
-            finer = RunSettings(step=0.5 * result.step_s, pre_roll=result.pre_roll_s)
-            motions.append(simulate_shot(shot, finer, lambda fraction, message: None).before.motion)
-        return np.concatenate([motion.motor_efforts[motion.judged] for motion in motions])
+        own = result.after.motion.motor_efforts[result.after.motion.judged]
+        if not np.any(np.isfinite(self.given.limits.effort)) or result.interrupted:
+            return own
+        shot = self.shot.with_tracks(found_tracks(result, self.shot.animation))
+        half, quarter = (self._efforts_at(shot, share * result.step_s, result.pre_roll_s) for share in (0.5, 0.25))
+        # a chosen step has positions right to the tolerance, and peaks of efforts to one or two hundredths
+        extrapolated = quarter[::2] + (quarter[::2] - half) / (2.0 ** order_of(shot.character) - 1.0)
+        return np.concatenate([own, quarter, extrapolated])
+
+    def _efforts_at(self, shot: CompiledShot, step: float, pre_roll: float) -> Array:
+        options = RunSettings(step=step, pre_roll=pre_roll)
+        motion = simulate_shot(shot, options, lambda fraction, message: None).before.motion
+        return motion.motor_efforts[motion.judged]
 
     def efforts(self, result: Result) -> MotorEfforts | None:
         """Those of the rigid robot, and what the motion of a result takes beside them, by the square of the tempo."""
