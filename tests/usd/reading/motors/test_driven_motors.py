@@ -123,3 +123,18 @@ def test_samples_that_lock_all_the_time_lock_the_motor(tmp_path):
 
     character, animation, _ = read(tmp_path, edit)
     assert not character.motors[1].optimize and animation.free == ()
+
+
+@pytest.mark.parametrize(("converted", "remedy"), [(True, "Import the robot's .xml file"), (False, "Remove one")])
+def test_two_motors_between_the_same_bodies_are_refused(tmp_path, converted, remedy):
+    """A conversion of an MJCF body with several joints; removing the drive of one would leave both joints."""
+
+    def edit(stage):
+        layer = stage.GetRootLayer()
+        Sdf.CopySpec(layer, ELBOW, layer, f"{ELBOW}2")
+        if converted:
+            stage.GetPrimAtPath(f"{ELBOW}2").AddAppliedSchema("MjcJointAPI")
+
+    with pytest.raises(ShotError, match="same pair") as refused:
+        read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
+    assert refused.value.remedy.startswith(remedy)

@@ -191,7 +191,10 @@ def _refuse_duplicate_motors(drives: Sequence[Drive], reading: Reading) -> None:
                     path=drive.joint.path,
                     attribute=target_attribute(drive.joint),
                     found=rival.joint.path,
-                    remedy="Remove one of the joints, or the drive of one of them",
+                    # a converter of MJCF ties the joints of one body, which act one after the other, to the same two
+                    remedy="Import the robot's .xml file, which gives each joint a body of its own"
+                    if drive.joint.prim is not None and schemas.is_applied(drive.joint.prim, "MjcJointAPI")
+                    else "Remove one of the joints, or the drive of one of them",
                 )
             )
 
