@@ -140,6 +140,7 @@ NOTED = {
     "gravcomp": (robot(body='<body name="c" gravcomp="1"/>'), "in full, gravcomp is not read: c"),
     "filter": (robot(extra=ACTUATOR.format("position", 'kp="5" timeconst="0.1"')), "filter between command"),
     "muscle": (robot(extra=ACTUATOR.format("muscle", "")), "only which joints they move is read: drive"),
+    "speed": (robot(extra=ACTUATOR.format("velocity", 'kv="1"')), "the command of these actuators is a speed"),
     "delay": (robot(extra=ACTUATOR.format("motor", 'delay="0.1"')), "calm:motor:delay"),
     "crank": (
         robot(extra='<actuator><motor name="c" cranksite="a" slidersite="b"/></actuator>'), "drive nothing: c"
