@@ -38,6 +38,10 @@ def test_the_main_target_and_the_causes_of_what_remains_follow_from_weights_moto
     assert remaining_errors(character, ended)[0]["causes"][0] == "search"
     assert remaining_errors(character, replace(result, tolerance_m=1.0)) == []
     assert remaining_errors(character, replace(result, after=None)) == []
+    still = np.full_like(result.after.position_errors, row["max_error_m"])  # as far off at rest
+    for sag, causes in ((0.0, ["motors"]), (2.0 * row["max_error_m"], ["sag", "motors"])):
+        resting = replace(result, after=replace(result.after, position_errors=still, sag=np.array([sag])))
+        assert remaining_errors(character, resting)[0]["causes"] == causes, "gravity alone is blamed for what it moves"
     light = replace(tip, path="/light", position_weight=0.5)
     two = replace(character, targets=(light, tip))
     errors = replace(result.before, position_errors=np.repeat(result.before.position_errors, 2, axis=1))

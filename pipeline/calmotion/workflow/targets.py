@@ -98,12 +98,14 @@ def remaining_errors(character: Character, result: Result) -> list[dict[str, Any
     Returns:
         Rows with `path`, `max_error_m`, the number of `motors` that could change, the `directions` in which all targets
         are followed, and `causes`: `limits` of motors that cost something, `search` that did not converge, `sag` where
-        half of the error is there at rest, `motors` where these are fewer than the directions, `weight` where other
-        targets count more, and `reach` where none of these holds, so that these motors can do no better.
+        half of the error is there at rest and gravity moves the target by as much, `motors` where these are fewer than
+        the directions, `weight` where other targets count more, and `reach` where none of these holds, so that these
+        motors can do no better.
     """
     if result.after is None:
         return []
-    errors = result.after.position_errors
+    errors, sag = result.after.position_errors, result.after.sag
+    sag = sag if len(sag) else np.zeros(errors.shape[1])
     largest = np.max(errors[result.after.motion.judged], axis=0, initial=0.0)
     motors = sum(motor.optimize and not motor.idle and motor.follows is None for motor in character.motors)
     weights = [target.position_weight for target in character.targets]
@@ -112,7 +114,7 @@ def remaining_errors(character: Character, result: Result) -> list[dict[str, Any
     common += ["search"] * (result.search.stopped not in ("", "converged", GOAL_REACHED))
     rows = []
     for k in np.flatnonzero(largest > (result.goal_m or result.tolerance_m)):
-        causes = [*common, *["sag"] * bool(errors[0, k] >= 0.5 * largest[k])]
+        causes = [*common, *["sag"] * bool(min(errors[0, k], sag[k]) >= 0.5 * largest[k])]
         causes += ["motors"] * (motors < directions) + ["weight"] * (0.0 < weights[k] < max(weights))
         row = {"path": character.targets[k].path, "max_error_m": float(largest[k]), "causes": causes or ["reach"]}
         rows.append(row | {"motors": motors, "directions": directions})
