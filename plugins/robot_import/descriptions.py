@@ -22,6 +22,7 @@ from .mjcf import (
     several_joints,
 )
 from .repairs import (
+    MODEL,
     PACKAGE,
     JointFrame,
     faults,
@@ -275,7 +276,7 @@ def _packages(root: xml.Element, path: str, given: Mapping[str, str]) -> dict[st
     Raises:
         ShotError: One is given that is no folder, or one is not found.
     """
-    named = {in_package(name)[0] for _, name in _meshes(root) if name.startswith(PACKAGE)}
+    named = {in_package(name)[0] for _, name in _meshes(root) if name.startswith((PACKAGE, MODEL))}
     problems, found = [], {}
     for name in sorted(named):
         folder = given.get(name) or _above(name, path)
@@ -308,7 +309,7 @@ def _above(name: str, path: str) -> str | None:
 
 def mesh_file(name: str, path: str, packages: Mapping[str, str]) -> str:
     """The file that a mesh of a URDF names."""
-    if name.startswith(PACKAGE):
+    if name.startswith((PACKAGE, MODEL)):
         package, rest = in_package(name)
         return os.path.join(packages[package], rest)
     return os.path.join(os.path.dirname(os.path.abspath(path)), name.removeprefix("file://"))

@@ -14,7 +14,7 @@ import xml.etree.ElementTree as xml
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-PACKAGE = "package://"
+PACKAGE, MODEL = "package://", "model://"  # of ROS and of Gazebo
 JointFrame = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]  # [m], [rad], a direction
 _FOREIGN = "urn:undeclared:"
 _PREFIX = re.compile(r"(?:</?|\s)([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*(?=[\s/>=])")
@@ -57,6 +57,8 @@ def faults(root: xml.Element, prefixes: Sequence[str]) -> tuple[str, ...]:
         found.append(f"joints that follow one that is not there move by themselves: {', '.join(lost)}")
     if any(node.get("filename", "").startswith(f"{PACKAGE}/") for node in root.iter("mesh")):
         found.append(f"meshes are named with {PACKAGE}/, a slash too many")
+    if any(node.get("filename", "").startswith(MODEL) for node in root.iter("mesh")):
+        found.append(f"folders of meshes that are named with {MODEL} are looked for as those of packages")
     loose = [joint.get("name", "") for joint in root_joints(root)]
     if loose:
         found.append(
@@ -68,7 +70,7 @@ def faults(root: xml.Element, prefixes: Sequence[str]) -> tuple[str, ...]:
 
 def in_package(name: str) -> tuple[str, str]:
     """The ROS package that the name of a mesh begins with, and the path in it."""
-    package, _, rest = name.removeprefix(PACKAGE).lstrip("/").partition("/")
+    package, _, rest = name.removeprefix(PACKAGE).removeprefix(MODEL).lstrip("/").partition("/")
     return package, rest
 
 

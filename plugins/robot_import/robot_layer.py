@@ -26,6 +26,7 @@ from .robot_motors import author_motors, named, narrow_limits
 if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
+_TURN = 6.5  # more than one [rad]
 _THICKNESS = "calm:flexible:wallThickness"
 
 
@@ -112,6 +113,9 @@ class _Author:
         shift_limits(self._stage)
         options = self._options
         author_frames(self._units, urdf_placements(self._stage, options.robot.frames))
+        far = [name for name, (_, angles, _) in options.robot.frames.items() if max(map(abs, angles)) > _TURN]
+        if far:
+            self.notes.append(f"rpy of joints goes beyond a turn; degrees taken for radians? {', '.join(far)}")
         self.notes += narrow_limits(self._stage, self._units, options.robot.soft_limits)
         author_motors(self._stage, self._units, options.motion, self._rate, options.robot.efforts, options.motors)
         self.notes += author_springs(self._stage, self._units)

@@ -115,6 +115,12 @@ def test_joints_of_one_body_move_one_after_the_other_as_in_mujoco(tmp_path):
     assert torque < 1e-4 and far < 1e-6
 
 
+def test_angles_in_degrees_are_told(tmp_path):
+    (tmp_path / "arm.urdf").write_text(TWO_LINKS.replace('rpy="0.3 0.1 0"', 'rpy="0 0 90"'))
+    made = import_robot(tmp_path / "arm.urdf", layer=tmp_path / "robot.usda")
+    assert any(note.endswith("degrees taken for radians? a") for note in made.notes)
+
+
 def test_small_rotations_of_an_mjcf_are_kept(tmp_path):
     """Those of calibrated kinematics; a frame and a joint are turned by 0.01 and 0.02 degrees."""
     turned = SEVERAL.replace('euler="0.3 0 0.2"', 'quat="1 1e-4 0 -2e-3"').replace('axis="0 0 1"', 'axis="3e-4 0 1"')

@@ -63,10 +63,13 @@ def test_a_joint_that_follows_one_that_is_not_there_moves_by_itself(tmp_path):
     assert any("not there" in fault and fault.endswith(": c") for fault in description.faults)
 
 
-def test_a_package_with_a_slash_too_many_is_found(tmp_path):
-    robot = written(tmp_path, LINK.format("a", f"package:///{tmp_path.name}/part.obj"))
+@pytest.mark.parametrize(
+    ("prefix", "told"), [("package:///", "a slash too many"), ("model://", "as those of packages")]
+)
+def test_a_package_with_a_slash_too_many_or_of_gazebo_is_found(tmp_path, prefix, told):
+    robot = written(tmp_path, LINK.format("a", f"{prefix}{tmp_path.name}/part.obj"))
     description, root = copy_of(robot, tmp_path / "copy")
-    assert "a slash too many" in description.faults[0]
+    assert told in description.faults[0]
     assert os.path.samefile(root.find("link/visual/geometry/mesh").get("filename"), tmp_path / "part.obj")
 
 
