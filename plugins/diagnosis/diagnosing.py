@@ -10,9 +10,9 @@ from functools import partial
 from typing import Any
 
 from calmotion.host import open_host
-from calmotion.model import Character, RunSettings, Source
+from calmotion.model import Animation, Character, RunSettings, Source
 from calmotion.recordings import measured_prims, read_recordings, refuse_unknown_channels
-from calmotion.tolerance import compiled_in
+from calmotion.simulation import CompiledShot
 from calmotion.version import __version__
 from calmotion.workflow import (
     Given,
@@ -21,7 +21,6 @@ from calmotion.workflow import (
     Progress,
     Shot,
     carry_out,
-    compiled_run,
     plain,
     read_settings,
     with_shot,
@@ -119,13 +118,14 @@ def diagnose(
     compiled = None
     if shot is not None:
         source = Source("", "", RunSettings(), measured=measured_prims(read))
-        character = carry_out(
-            shot, "simulate", wanted=(Character,), source=source, settings=chosen, hooks=hooks
-        ).require(Character)
+        run = partial(carry_out, shot, "simulate", source=source, settings=chosen, hooks=hooks)
         # before meshes are made, which takes much longer
-        refuse_unknown_channels(character, [*read, *([sent] if sent is not None else [])])
+        refuse_unknown_channels(
+            run(wanted=(Character,)).require(Character), [*read, *([sent] if sent is not None else [])]
+        )
         refuse_incomparable(read)
-        compiled = compiled_in(compiled_run(shot, source, chosen, hooks).run.get)
+        # on the first meshes: frequencies of links are fitted, so that finer ones tell no more
+        compiled = run(wanted=(Character, Animation, CompiledShot)).require(CompiledShot)
     situation = situation_of(compiled, read, sent)
     made = DiagnosedShot(diagnosis_of(situation, partial(hooks.tell, "Compare explanations")), (), 0.0)
     drawn = () if figures is None else made.draw(figures)
