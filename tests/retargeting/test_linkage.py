@@ -9,7 +9,7 @@ from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.posing import CLOSENESS, SMOOTHNESS
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.damping_homotopy import LARGE_ANGLE, damping_homotopy
-from calmotion.retargeting.solver.gauss_newton import Search, minimize
+from calmotion.retargeting.solver.gauss_newton import Ends, Search, minimize
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion
 from calmotion.simulation.preparation import modes_of, prepare
@@ -65,7 +65,7 @@ def test_the_way_through_damped_problems_is_shorter(shot):
     start = damping_homotopy(begin, free, float(modes_of(prepared)[0][0]))
     near = start.at.merit
     # as much work as the approach took, spent on the problem itself; a product is a fifth of a simulation
-    direct = minimize(problem, Search.start(zero), free, 1e-6, max_iterations=8)
+    direct = minimize(problem, Search.start(zero), free, Ends(1e-6, 8))
     spent = start.evaluations + 0.2 * start.products
     reached = [i.value for i in direct.history if i.evaluations + 0.2 * i.products <= spent]
     assert len(reached) < len(direct.history) and near < 0.5 * min(reached)

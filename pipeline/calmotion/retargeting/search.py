@@ -29,7 +29,7 @@ from calmotion.retargeting.problem.posing import locked_coefficients
 from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
 from calmotion.retargeting.search_progress import SearchMemory, SearchProgress
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
-from calmotion.retargeting.solver.gauss_newton import Search, minimize
+from calmotion.retargeting.solver.gauss_newton import Ends, Search, minimize
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
@@ -202,16 +202,8 @@ class RetargetSearch:
 
     def _to_gain(self, search: Search, fixed: BoolArray, gain: float) -> Search:
         """Minimise until less is to be gained [m]."""
-        found = minimize(
-            self.problem,
-            search,
-            fixed,
-            gain,
-            self.options.max_iterations,
-            on_iterate=self._on_iterate,
-            onto_limits=lambda at: onto_limits(at, fixed),
-            reached=self._reached,
-        )
+        ends = Ends(gain, self.options.max_iterations, reached=self._reached)
+        found = minimize(self.problem, search, fixed, ends, self._on_iterate, lambda at: onto_limits(at, fixed))
         self.problem = found.at.problem
         return found
 
@@ -268,7 +260,7 @@ class RetargetSearch:
             return
         fixed = fixed | dropped
         begin = replace(search, x=np.where(fixed, 0.0, search.x), reason="", radius=np.inf)
-        pruned = minimize(problem, begin, fixed, self._least, max_iterations=self.options.max_iterations + 3)
+        pruned = minimize(problem, begin, fixed, Ends(self._least, self.options.max_iterations + 3))
         limits = pruned.at.problem.limits
         kept = (limits is None or limits.kept(pruned.at.limited)) and self._reached(at) <= self._reached(pruned.at)
         if kept and pruned.at.merit <= at.merit + 2.0 * budget:

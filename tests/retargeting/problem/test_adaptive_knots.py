@@ -17,7 +17,7 @@ from calmotion.retargeting.problem.adaptive_knots import (
     useful_knots,
 )
 from calmotion.retargeting.problem.offset_basis import basis_on, make_basis, uniform_breaks
-from calmotion.retargeting.solver.gauss_newton import Search, minimize
+from calmotion.retargeting.solver.gauss_newton import Ends, Search, minimize
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.time_grid import make_grid
 from posed import FINE_FRAMES, ignore_progress, jerking, make_problem
@@ -92,7 +92,7 @@ def test_knots_are_wanted_where_something_is_to_be_gained(arm, bodies):
     def free(basis):
         return np.zeros(basis.count * 2, bool)
 
-    at = minimize(problem, Search.start(np.zeros(problem.size)), free(problem.space.basis), 1e-6).at
+    at = minimize(problem, Search.start(np.zeros(problem.size)), free(problem.space.basis), Ends(1e-6)).at
     linear = at.linearized()
     breaks = refined_breaks(at, linear, free, 1e-6)
     new = np.setdiff1d(breaks, problem.space.basis.breaks) / 120.0

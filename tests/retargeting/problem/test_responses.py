@@ -21,7 +21,7 @@ def linear(arm, animation, bodies):
     material = next(body.flexible.material for body in arm.bodies if body.simulated_flexible)
     scenarios = (Scenario(), Scenario({f"modulus {material.path}": 0.9}))
     start, _ = _posed(shot, OPTIONS, animation.tracks, scenarios)
-    mean = power_mean(start.problem, 8, np.ones(len(arm.targets)))
+    mean = power_mean(start.problem, 8, np.ones((len(arm.targets), 2)))
     x = start.x + 1e-3 * np.random.default_rng(1).normal(size=start.problem.size)
     return dataclasses.replace(start.problem, norm=mean).at(x).linearized()
 

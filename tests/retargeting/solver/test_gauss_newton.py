@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from calmotion.multibody.failure import Reason, SimulationFailure
-from calmotion.retargeting.solver.gauss_newton import Search, minimize
+from calmotion.retargeting.solver.gauss_newton import Ends, Search, minimize
 from calmotion.retargeting.solver.preconditioner import Sharpened
 from calmotion.retargeting.solver.recycling import Recycled
 
@@ -96,7 +96,7 @@ FREE = np.zeros(5, bool)
 @pytest.mark.parametrize("seed", range(5))
 def test_minimum_is_stationary_and_every_iterate_is_lower(seed):
     problem = Problem(seed)
-    search = minimize(problem, Search.start(np.zeros(5)), FREE, 1e-14, max_iterations=60)
+    search = minimize(problem, Search.start(np.zeros(5)), FREE, Ends(1e-14, 60))
     assert np.abs(search.at.linearized().gradient).max() < 1e-5 and search.reason == "converged"
     values = [iterate.value for iterate in search.history]
     assert all(b < a for a, b in zip(values, values[1:], strict=False))
@@ -116,7 +116,7 @@ class Saturating(Problem):
 def test_a_small_trust_region_is_no_minimum():
     """What little is to be gained within a region that shrank says nothing of what is to be gained."""
     begin = Search(np.full(3, 1.5), 1e-9, Recycled.none(3))
-    found = minimize(Saturating(), begin, np.zeros(3, bool), 1e-12, max_iterations=60)
+    found = minimize(Saturating(), begin, np.zeros(3, bool), Ends(1e-12, 60))
     assert found.reason == "converged" and np.allclose(np.tanh(found.x), 0.5, atol=1e-5)
 
 
@@ -131,7 +131,7 @@ class Stuck(Problem):
 
 
 def test_a_search_that_gains_nothing_says_so():
-    found = minimize(Stuck(), Search.start(np.zeros(3)), np.zeros(3, bool), 1e-6)
+    found = minimize(Stuck(), Search.start(np.zeros(3)), np.zeros(3, bool), Ends(1e-6))
     assert found.reason == "no further decrease"
 
 
@@ -148,13 +148,13 @@ class Flat(Problem):
 def test_where_little_is_gained_beyond_a_small_region_limits_still_come_to_act(monkeypatch):
     asked = []
     monkeypatch.setattr(Point, "tightened", lambda point: asked.append(point.x))
-    found = minimize(Flat(), Search(np.zeros(1), 1e-9, Recycled.none(1)), np.zeros(1, bool), 1e-3)
+    found = minimize(Flat(), Search(np.zeros(1), 1e-9, Recycled.none(1)), np.zeros(1, bool), Ends(1e-3))
     assert found.reason == "no further decrease" and len(asked) == 1 and np.array_equal(asked[0], found.x)
     assert found.x[0] > 0.0
 
 
 def test_a_curved_valley_is_followed_to_its_end():
-    search = minimize(Rosenbrock(), Search.start(np.array([-1.2, 1.0])), np.zeros(2, bool), 1e-18, max_iterations=60)
+    search = minimize(Rosenbrock(), Search.start(np.array([-1.2, 1.0])), np.zeros(2, bool), Ends(1e-18, 60))
     assert np.allclose(search.x, 1.0, atol=1e-6)
 
 
@@ -162,7 +162,7 @@ def test_fixed_entries_stay_and_the_others_are_optimal():
     problem = Problem(3)
     fixed = np.array([False, True, False, False, True])
     start = np.array([0.0, 0.3, 0.0, 0.0, -0.2])
-    search = minimize(problem, Search.start(start), fixed, 1e-14, max_iterations=60)
+    search = minimize(problem, Search.start(start), fixed, Ends(1e-14, 60))
     assert np.array_equal(search.x[fixed], start[fixed])
     assert np.abs(search.at.linearized().gradient[~fixed]).max() < 1e-5
 
@@ -170,15 +170,15 @@ def test_fixed_entries_stay_and_the_others_are_optimal():
 def test_a_search_resumes_from_any_iterate_with_the_same_result():
     kept = []
     whole = minimize(
-        Rosenbrock(), Search.start(np.array([-1.2, 1.0])), np.zeros(2, bool), 1e-18, on_iterate=kept.append
+        Rosenbrock(), Search.start(np.array([-1.2, 1.0])), np.zeros(2, bool), Ends(1e-18), on_iterate=kept.append
     )
     for search in kept[::3]:
-        again = minimize(Rosenbrock(), search, np.zeros(2, bool), 1e-18)
+        again = minimize(Rosenbrock(), search, np.zeros(2, bool), Ends(1e-18))
         assert np.array_equal(again.x, whole.x) and len(again.history) == len(whole.history)
 
 
 def test_the_expected_gain_at_the_end_is_below_the_requested_gain():
-    search = minimize(Problem(1), Search.start(np.zeros(5)), FREE, 1e-3)
+    search = minimize(Problem(1), Search.start(np.zeros(5)), FREE, Ends(1e-3))
     assert search.reason == "converged" and 0.0 <= search.history[-1].gain < 1e-3
 
 
@@ -189,7 +189,7 @@ def test_points_that_cannot_be_evaluated_are_kept_away_from():
                 raise SimulationFailure(0.0, 0, Reason.SINGULAR)
             return super().at(x, near)
 
-    search = minimize(Walled(2), Search.start(np.zeros(5)), FREE, 1e-12, max_iterations=40)
+    search = minimize(Walled(2), Search.start(np.zeros(5)), FREE, Ends(1e-12, 40))
     assert np.isfinite(search.history[-1].value) and np.linalg.norm(search.x) <= 0.2
 
 
@@ -222,7 +222,7 @@ class Poor(Problem):
 def test_a_better_preconditioner_is_made_where_systems_take_long():
     fixed, start = np.zeros(40, bool), Search.start(np.zeros(40))
     plain, sharpened = Poor(None), Poor(8)
-    before, after = (minimize(problem, start, fixed, 1e-9) for problem in (plain, sharpened))
+    before, after = (minimize(problem, start, fixed, Ends(1e-9)) for problem in (plain, sharpened))
     assert after.reason == before.reason == "converged"
     assert np.allclose(after.x, before.x, atol=1e-4) and after.products < 0.7 * before.products
     assert before.sharpened is None and len(after.sharpened.point) == 40

@@ -23,7 +23,7 @@ from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
 from calmotion.retargeting.robust.measure import largest_errors
 from calmotion.retargeting.robust.robots import robots_of
-from calmotion.retargeting.solver.gauss_newton import Search, minimize
+from calmotion.retargeting.solver.gauss_newton import Ends, Search, minimize
 from calmotion.retargeting.solver.norm import PowerMean
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_curves
@@ -94,7 +94,7 @@ def least_maximum(
         at = search.at.of(replace(search.at.problem, norm=mean, damping=damping))
         enough = own.GAIN * float(np.sqrt(2.0 * at.objective_value / at.problem.unit))
         begun = replace(search, history=(), reason="", radius=np.inf, at=at)
-        search = minimize(at.problem, begun, fixed, enough, 1, own.PRODUCTS)
+        search = minimize(at.problem, begun, fixed, Ends(enough, 1, own.PRODUCTS))
         shortened = search.evaluations - begun.evaluations > 2
         if shortened or np.array_equal(search.x, at.x):  # multipliers are those of a step that was not taken
             search = replace(search, at=search.at.with_limits(at.problem.limits))

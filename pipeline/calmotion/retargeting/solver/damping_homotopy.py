@@ -13,7 +13,7 @@ from dataclasses import replace
 from calmotion.arrays import BoolArray
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.retargeting.problem.problem import Evaluation
-from calmotion.retargeting.solver.gauss_newton import Search, minimize
+from calmotion.retargeting.solver.gauss_newton import Ends, Search, minimize
 
 LARGE_ANGLE = 0.1  # error over the largest lever arm of a motor [rad] from which the homotopy is used
 DAMPING_RATIOS = (0.2, 0.05)  # damping ratios of the lowest mode
@@ -38,7 +38,7 @@ def damping_homotopy(start: Evaluation, fixed: BoolArray, frequency: float) -> S
             with suppress(SimulationFailure):
                 there = damped.at(best.x)
                 begin, gain = Search.start(best.x, there), STAGE_GAIN * there.error
-                stage = minimize(damped, begin, fixed, gain, max_iterations=STAGE_ITERATIONS)
+                stage = minimize(damped, begin, fixed, Ends(gain, STAGE_ITERATIONS))
                 best = stage.at
                 evaluations, gradients = evaluations + stage.evaluations, gradients + stage.gradients
                 products += stage.products

@@ -134,191 +134,198 @@ class Search:
         return cls(x, np.inf, Recycled.none(len(x)), at=at)
 
 
-@dataclass
-class _Counter:
-    """Calls of a problem."""
+@dataclass(frozen=True)
+class Ends:
+    """When a search ends.
 
-    fixed: BoolArray
-    evaluations: int = 0
-    gradients: int = 0
-    products: int = 0
+    Attributes:
+        gain: A smaller predicted gain ends it [m].
+        iterations: Most iterations, including those of the state that it resumes from.
+        products: Most products of one iteration.
+        reached: Whether a point is good enough.
+    """
 
-    def at(self, problem: LeastSquares, x: Array, near: Any) -> Any:
-        """The evaluation of a point; None where it cannot be evaluated."""
-        self.evaluations += 1
-        try:
-            return problem.at(x, near)
-        except SimulationFailure:
-            return None
+    gain: float
+    iterations: int = 30
+    products: int = 60
+    reached: Callable[[Any], bool] = lambda at: False
 
-    def gradient(self, linear: Linear) -> Array:
-        self.gradients += 1
-        return np.where(self.fixed, 0.0, linear.gradient)
 
-    def product(self, linear: Linear) -> Callable[[Array], Array]:
-        def times(d: Array) -> Array:
-            self.products += 1
-            return np.where(self.fixed, 0.0, linear.product(d))
-
-        return times
+OntoLimits = Callable[[Any], tuple[Any, Array]]
 
 
 def minimize(
-    problem: LeastSquares,
-    search: Search,
-    fixed: BoolArray,
-    gain: float,
-    max_iterations: int = 30,
-    max_products: int = 60,
-    on_iterate: Callable[[Search], None] | None = None,
-    onto_limits: Callable[[Any], tuple[Any, Array]] | None = None,
-    reached: Callable[[Any], bool] = lambda at: False,
-) -> Search:
+    problem: LeastSquares, search: Search, fixed: BoolArray, ends: Ends,
+    on_iterate: Callable[[Search], None] | None = None, onto_limits: OntoLimits | None = None,
+) -> Search:  # fmt: skip
     """Minimise over the entries that are not fixed.
 
     Args:
         search: State to begin or to resume from, whose point can be evaluated.
         fixed: Entries that keep their values, shape [n].
-        gain: A smaller predicted gain ends the search [m].
-        max_iterations: Most iterations, including those of the state.
-        max_products: Most products of one iteration.
+        ends: When it ends.
         on_iterate: Called with the search after every iteration.
         onto_limits: The problem and the point with which to go on where limits begin to act, from the minimum without
             them.
-        reached: Whether a point is good enough, so that the search ends there.
 
     Raises:
         SimulationFailure: The first point cannot be evaluated.
     """
-    calls = _Counter(fixed, search.evaluations, search.gradients, search.products)
-    radius, recycled, history, sharpened = search.radius, search.recycled, list(search.history), search.sharpened
-    eager = sharpened is not None
-    calls.evaluations += 1
-    at = problem.at(search.x, search.at)
-    if sharpened is not None and len(sharpened.point) != len(search.x):
-        sharpened = None
-
-    def here(reason: str = "") -> Search:
-        counts = calls.evaluations, calls.gradients, calls.products
-        return Search(at.x, radius, recycled, sharpened, tuple(history), *counts, reason, at)
-
-    while True:
-        widened = False
-        ended = GOAL_REACHED if reached(at) else "iteration limit" if len(history) >= max_iterations else ""
-        if ended:
-            history.append(Iterate(at.merit, np.nan, np.nan, calls.evaluations, calls.products))
-            return here(ended)
-        linear = at.linearized()
-        gradient = calls.gradient(linear)
-        norm = float(np.linalg.norm(gradient))
-        enough = UNPREDICTED_SHARE * at.merit_of_gain(gain)
-        if at.limits_act:
-            if (patience := linear.patience(sharpened)) is not None and _last_products(history) > patience:
-                sharpened = linear.sharpened()
-            limited = limited_step(linear, fixed, FORCING_TERM, enough, max_products, sharpened)
-            calls.products += limited.products
-            at, predicted = at.with_limits(limited.limits), limited.predicted(1.0)
-        else:
-            before = radius
-            least = partial(at.gain, value=at.merit), gain
-            path, (recycled, sharpened), radius = _solved(
-                linear, calls, gradient, (recycled, sharpened), radius, enough, max_products, eager, least
-            )  # fmt: skip
-            predicted, widened = path.within(radius)[1], radius > before
-        expected = at.gain(predicted, at.merit)
-        history.append(Iterate(at.merit, norm, expected, calls.evaluations, calls.products))
-        better = None
-        if expected >= gain:
-            better = _limited_step(calls, at, limited) if at.limits_act else _step(calls, at, path, radius)
-        if better is not None and widened and at.gain(at.merit - better[0].merit, at.merit) < gain:
-            (at, radius), better = better, None
-        if better is None:
-            tightened = at.tightened()
-            if tightened is None:
-                return here("converged" if expected < gain else "no further decrease")
-            if onto_limits is not None and not at.limits_act:
-                tightened = _moved(calls, tightened, *onto_limits(tightened))
-            better = tightened, np.inf
-        at, radius = better
+    run = _GaussNewton(problem, search, fixed, ends, onto_limits)
+    while not (reason := run.iterate()):
         if on_iterate is not None:
-            on_iterate(here())
+            on_iterate(run.state(reason))
+    return run.state(reason)
 
 
-def _moved(calls: _Counter, at: Any, problem: LeastSquares, x: Array) -> Any:
-    """Another point of another problem; the same point of that problem where the other cannot be evaluated."""
-    found = None if np.array_equal(x, at.x) else calls.at(problem, x, at)
-    return at.of(problem) if found is None else found
+class _GaussNewton:
+    """A search that goes on by one iteration at a time; arguments as of `minimize`."""
+
+    def __init__(
+        self, problem: LeastSquares, search: Search, fixed: BoolArray, ends: Ends, onto_limits: OntoLimits | None
+    ):
+        self._fixed, self._ends, self._onto_limits = fixed, ends, onto_limits
+        self._evaluations, self._gradients, self._products = search.evaluations + 1, search.gradients, search.products
+        self._at = problem.at(search.x, search.at)
+        self._radius, self._recycled, self._history = search.radius, search.recycled, list(search.history)
+        self._sharpened = search.sharpened
+        self._eager = self._sharpened is not None  # the first preconditioner has failed already
+        if self._sharpened is not None and len(self._sharpened.point) != len(search.x):
+            self._sharpened = None
+
+    def state(self, reason: str) -> Search:
+        """What the search has, from which another one may resume."""
+        found = self._at.x, self._radius, self._recycled, self._sharpened, tuple(self._history)
+        return Search(*found, self._evaluations, self._gradients, self._products, reason, self._at)
+
+    def iterate(self) -> str:
+        """One step; why there is none, else nothing."""
+        reached = self._ends.reached(self._at)
+        if reached or len(self._history) >= self._ends.iterations:
+            self._note(np.nan, np.nan)
+            return GOAL_REACHED if reached else "iteration limit"
+        linear: Linear = self._at.linearized()
+        self._gradients += 1
+        gradient = np.where(self._fixed, 0.0, linear.gradient)
+        limited = self._at.limits_act
+        predicted, take = self._under_limits(linear) if limited else self._in_trust_region(linear, gradient)
+        expected = self._gain_of(predicted)
+        self._note(float(np.linalg.norm(gradient)), expected)
+        if expected >= self._ends.gain and take():
+            return ""
+        tightened = self._at.tightened()
+        if tightened is None:
+            return "converged" if expected < self._ends.gain else "no further decrease"
+        if self._onto_limits is not None and not limited:
+            tightened = self._moved(tightened, *self._onto_limits(tightened))
+        self._at, self._radius = tightened, np.inf
+        return ""
+
+    def _gain_of(self, decrease: float) -> float:
+        return float(self._at.gain(decrease, self._at.merit))
+
+    @property
+    def _enough(self) -> float:
+        """Decrease of the merit that a linear system may leave."""
+        return float(UNPREDICTED_SHARE * self._at.merit_of_gain(self._ends.gain))
+
+    def _note(self, norm: float, gain: float) -> None:
+        self._history.append(Iterate(self._at.merit, norm, gain, self._evaluations, self._products))
+
+    def _evaluated(self, problem: LeastSquares, x: Array, near: Any) -> Any:
+        """The evaluation of a point; None where it cannot be evaluated."""
+        self._evaluations += 1
+        try:
+            return problem.at(x, near)
+        except SimulationFailure:
+            return None
+
+    def _moved(self, at: Any, problem: LeastSquares, x: Array) -> Any:
+        """Another point of another problem; the same point of that problem where the other cannot be evaluated."""
+        found = None if np.array_equal(x, at.x) else self._evaluated(problem, x, at)
+        return at.of(problem) if found is None else found
+
+    def _under_limits(self, linear: Linear) -> tuple[float, Callable[[], bool]]:
+        """The decrease that the model with limits predicts, and a function that takes its step, if it decreases."""
+        patience = linear.patience(self._sharpened)
+        if patience is not None and self._last_products() > patience:
+            self._sharpened = linear.sharpened()
+        limited = limited_step(
+            linear, self._fixed, FORCING_TERM, self._enough, self._ends.products, self._sharpened
+        )  # fmt: skip
+        self._products += limited.products
+        self._at = self._at.with_limits(limited.limits)
+        return limited.predicted(1.0), partial(self._takes_limited, limited)
+
+    def _last_products(self) -> int:
+        """Products of the last linear system."""
+        counts = [0, *(iterate.products for iterate in self._history)]
+        return counts[-1] - counts[-2] if self._history else 0
+
+    def _takes_limited(self, limited: LimitedStep) -> bool:
+        """Step under limits; the step is shortened until the simulation agrees with the model."""
+        at, t = self._at, 1.0
+        for _ in range(STEP_REDUCTIONS):
+            there, predicted = self._evaluated(at.problem, at.x + t * limited.step, at), limited.predicted(t)
+            if there is not None and predicted > 0.0 and at.merit - there.merit > ACCEPTED_RATIO * predicted:
+                self._at, self._radius = there, np.inf
+                return True
+            t *= 0.3
+        return False
+
+    def _in_trust_region(self, linear: Linear, gradient: Array) -> tuple[float, Callable[[], bool]]:
+        """The decrease that is predicted in the trust region, and a function that takes the step, if it is worth it.
+
+        Where this would end the search, there is no region. One shrinks where the model is poor, and what little is to
+        be gained within it says nothing of a minimum.
+        """
+        before = self._radius
+        for self._radius in (before, np.inf):
+            path = self._path(linear, gradient)
+            self._recycled = self._recycled.followed_by(path.p, path.Hp, RECYCLED_PAIRS)
+            _, predicted, length = path.within(self._radius)
+            if self._gain_of(predicted) >= self._ends.gain or length < self._radius:
+                break
+        return predicted, partial(self._takes, path, self._radius > before)
+
+    def _path(self, linear: Linear, gradient: Array) -> Path:
+        """Conjugate gradients; if they take long, again with a better preconditioner."""
+
+        def product(d: Array) -> Array:
+            self._products += 1
+            return np.where(self._fixed, 0.0, linear.product(d))
+
+        most, patience = self._ends.products, linear.patience(self._sharpened)
+        if self._eager and patience is not None and self._sharpened is None:
+            self._sharpened, patience = linear.sharpened(), None
+        for limit in (most if patience is None else min(patience, most), most):
+            inverse = self._recycled.inverse(linear.precondition(self._fixed, self._sharpened))
+            path = conjugate_gradients(product, gradient, inverse, self._radius, FORCING_TERM, self._enough, limit)
+            if len(path.p) < limit or limit == most:
+                break
+            self._sharpened = linear.sharpened()
+        return path
+
+    def _takes(self, path: Path, widened: bool) -> bool:
+        """Step along a path; whether that was worth it where the trust region was given up for it."""
+        better = _step(self._evaluated, self._at, path, self._radius)
+        if better is None:
+            return False
+        gained = self._gain_of(self._at.merit - better[0].merit)
+        self._at, self._radius = better
+        return not (widened and gained < self._ends.gain)
 
 
-def _last_products(history: list[Iterate]) -> int:
-    """Products of the last linear system."""
-    counts = [0, *(iterate.products for iterate in history)]
-    return counts[-1] - counts[-2] if history else 0
-
-
-def _solved(
-    linear: Linear, calls: _Counter, gradient: Array, known: tuple[Recycled, Sharpened | None], radius: float,
-    enough: float, max_products: int, eager: bool, least: tuple[Callable[[float], float], float],
-) -> tuple[Path, tuple[Recycled, Sharpened | None], float]:  # fmt: skip
-    """As `_path`, with what is known after it and the trust region; without a region where this would end the search.
-
-    A region shrinks where the model is poor, and what little is to be gained within it says nothing of a minimum.
-
-    Args:
-        least: The gain that a decrease of the merit is, and the one that ends a search [m].
-    """
-    gain_of, gain = least
-    for size in (radius, np.inf):
-        path, sharpened = _path(linear, calls, gradient, known, size, enough, max_products, eager)
-        known = known[0].followed_by(path.p, path.Hp, RECYCLED_PAIRS), sharpened
-        _, predicted, length = path.within(size)
-        if gain_of(predicted) >= gain or length < size:
-            break
-    return path, known, size
-
-
-def _path(
-    linear: Linear, calls: _Counter, gradient: Array, known: tuple[Recycled, Sharpened | None], radius: float,
-    enough: float, max_products: int, eager: bool,
-) -> tuple[Path, Sharpened | None]:  # fmt: skip
-    """Conjugate gradients; if they take long, again with a better preconditioner, which is the second value.
-
-    Args:
-        known: Directions of earlier systems, and the preconditioner so far.
-        eager: Whether the first preconditioner has failed already.
-    """
-    recycled, sharpened = known
-    patience = linear.patience(sharpened)
-    if eager and patience is not None and sharpened is None:
-        sharpened, patience = linear.sharpened(), None
-    for limit in (max_products if patience is None else min(patience, max_products), max_products):
-        inverse = recycled.inverse(linear.precondition(calls.fixed, sharpened))
-        path = conjugate_gradients(calls.product(linear), gradient, inverse, radius, FORCING_TERM, enough, limit)
-        if len(path.p) < limit or limit == max_products:
-            break
-        sharpened = linear.sharpened()
-    return path, sharpened
-
-
-def _limited_step(calls: _Counter, at: Any, limited: LimitedStep) -> tuple[Any, float] | None:
-    """The point after a step under limits, which is shortened until the simulation agrees with the model."""
-    t = 1.0
-    for _ in range(STEP_REDUCTIONS):
-        there, predicted = calls.at(at.problem, at.x + t * limited.step, at), limited.predicted(t)
-        if there is not None and predicted > 0.0 and at.merit - there.merit > ACCEPTED_RATIO * predicted:
-            return there, np.inf
-        t *= 0.3
-    return None
-
-
-def _step(calls: _Counter, at: Any, path: Path, radius: float) -> tuple[Any, float] | None:
+def _step(
+    evaluated: Callable[[LeastSquares, Array, Any], Any], at: Any, path: Path, radius: float
+) -> tuple[Any, float] | None:
     """The point after a step in the trust region, and the next radius; None if no step is accepted."""
     size = radius
     for _ in range(STEP_REDUCTIONS):
         step, predicted, length = path.within(size)
         if not predicted > 0.0:
             return None
-        there = calls.at(at.problem, at.x + step, at)
+        there = evaluated(at.problem, at.x + step, at)
         share = -np.inf if there is None else (at.merit - there.merit) / predicted
         if share > ACCEPTED_RATIO:
             if share < 0.25:
