@@ -93,14 +93,19 @@ def volume_note(quality: MeshQuality) -> tuple[str, ...]:
 
 
 def mass_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
-    """Messages about a stated mass that is not that of the solid and its material, or is elsewhere."""
+    """Message about a stated mass that is not that of the solid and its material; the density follows the mass."""
+    return density_note(body, mesh.quality.volume, _SAME_MASS)
+
+
+def spread_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
+    """Message about a stated centre of mass or inertia that is not that of the solid."""
     if body.mass is None or body.flexible is None:
         return ()
     from calmotion.mesh.parts import makeup_of
 
     makeup = makeup_of(mesh.points, mesh.tets, body.flexible.material)
     own = mass_of_tets(mesh.points, mesh.tets, body.flexible.material.density, body.mass.mass, makeup)
-    return (*density_note(body, mesh.quality.volume, _SAME_MASS), *balance_note(body, own))
+    return balance_note(body, own)
 
 
 def makeup_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:

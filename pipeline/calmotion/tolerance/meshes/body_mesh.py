@@ -30,7 +30,15 @@ from calmotion.mesh.tetrahedra import (
 from calmotion.mesh.tetrahedralize.filling import filled, refuse_loose_parts, refuse_too_many
 from calmotion.mesh.tetrahedralize.tetwild import DENSE, OutOfTime, ProcessorTime
 from calmotion.model import Body, Character, FEMesh, Frame, TetGeometry
-from calmotion.tolerance.meshes.accurate_mesh import accurate, judged, makeup_note, mass_note, shaped_to, volume_note
+from calmotion.tolerance.meshes.accurate_mesh import (
+    accurate,
+    judged,
+    makeup_note,
+    mass_note,
+    shaped_to,
+    spread_note,
+    volume_note,
+)
 from calmotion.tolerance.meshes.options import MeshOptions, Volume
 
 if TYPE_CHECKING:
@@ -153,7 +161,7 @@ def _meshed(
         mesh = accurate(index, body, geometry, element_size(geometry.shape), options, carrier, attachments)
     quality = mesh.quality
     source = geometry.solid.source if isinstance(geometry, Volume) else quality.source
-    notes = (*volume_note(quality), *mass_note(body, mesh), *makeup_note(body, mesh))
+    notes = (*volume_note(quality), *mass_note(body, mesh), *spread_note(body, mesh), *makeup_note(body, mesh))
     return replace(mesh, quality=replace(quality, repairs=(*quality.repairs, *notes), source=source))
 
 
@@ -170,7 +178,7 @@ def twin_mesh(mesh: FEMesh, isometry: Isometry, index: int, character: Character
     body = character.bodies[index]
     made = moved(mesh, isometry, index, character.bodies[mesh.body].path)
     own = geometry.solid.repairs if isinstance(geometry, Volume) else ()
-    repairs = (*made.quality.repairs, *own, *mass_note(body, made), *makeup_note(body, made))
+    repairs = (*made.quality.repairs, *own, *mass_note(body, made), *spread_note(body, made), *makeup_note(body, made))
     return replace(made, quality=replace(made.quality, repairs=repairs))
 
 
