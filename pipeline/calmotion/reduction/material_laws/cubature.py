@@ -29,6 +29,10 @@ LEAST_VOLUME = 0.2  # volume ratio below which the logarithm of the law is conti
 _CANDIDATES = 10_000  # candidate points, a random choice on large meshes
 
 
+class InaccurateCubature(ShotError):
+    """No set of points integrates the energy of a body accurately enough."""
+
+
 def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial) -> tuple[Array, int]:
     """The data of `Elasticity` of a Neo-Hookean body, and the number of its points.
 
@@ -38,7 +42,7 @@ def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial)
         material: Elastic constants.
 
     Raises:
-        ShotError: No set of points meets `ERROR`.
+        InaccurateCubature: No set of points meets `ERROR`.
     """
     r = len(basis.omega_squared)
     if r > _MOST_COORDINATES:
@@ -59,8 +63,8 @@ def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial)
     return np.concatenate([correction.ravel(), packed.ravel()]), len(chosen)
 
 
-def _inaccurate(material: ElasticMaterial, found: str) -> ShotError:
-    return ShotError(
+def _inaccurate(material: ElasticMaterial, found: str) -> InaccurateCubature:
+    return InaccurateCubature(
         "no cubature of the Neo-Hookean energy is accurate enough",
         path=material.path,
         attribute="calm:flexible:elasticity",

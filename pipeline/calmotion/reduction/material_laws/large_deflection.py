@@ -17,6 +17,7 @@ from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, 
 from calmotion.reduction.elements.patch_rotation import spring_rows, springs, stiffer
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.bending import Bending
+from calmotion.reduction.material_laws.cubature import neohookean_cubature
 from calmotion.reduction.reduced_body import Elasticity
 
 PAIRED_MODES = 16  # largest number of modes with derivatives
@@ -62,8 +63,6 @@ def large_deflection(
             model, support, extended, basis, OVERSHOOT * deflections, loads, material.youngs_modulus, allowed
         )
         return extended, law_of(subspace)
-    from calmotion.reduction.material_laws.cubature import neohookean_cubature
-
     data, points = neohookean_cubature(model, extended, material)
     return extended, Elasticity(law, 0.0, data, points, lame)
 

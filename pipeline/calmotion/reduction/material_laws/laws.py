@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from calmotion.errors import ShotError
 from calmotion.model.character import FlexibleSettings
 from calmotion.model.result import Simplification
 from calmotion.model.tolerance import REDUCTION
@@ -17,6 +16,7 @@ from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.bending import Bending
+from calmotion.reduction.material_laws.cubature import InaccurateCubature
 from calmotion.reduction.material_laws.deflection import Deflection, deflection_under
 from calmotion.reduction.material_laws.large_deflection import NEGLIGIBLE_ENERGY, large_deflection
 from calmotion.reduction.reduced_body import Elasticity
@@ -151,8 +151,8 @@ def reduced_by_law(
 
     try:
         longer, elasticity = by_law(law)
-    except ShotError:
-        if deflection is None or law is not LAWS[-1]:
+    except InaccurateCubature:
+        if deflection is None:
             raise
         law = LAWS[1]  # nobody asked for another
         longer, elasticity = by_law(law)
