@@ -31,8 +31,6 @@ PYTHON ?= $(shell for python in python3 python3.14 python3.13 python3.12 python3
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # What test-lowest and test-portable run: TESTS="tests/linear_algebra -k ordering" for less than all.
 TESTS ?= tests
-# Two processes test at a time; threads of linear algebra that wait for each other would make that several times slower.
-test: export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help demo wheel wheels test test-lowest release-check test-portable docs fuzz torture audit golden samples pictures blender blender-test blender-pictures clean
 .DELETE_ON_ERROR:
@@ -96,7 +94,6 @@ $(LOWEST_VENV)/.installed: pyproject.toml .ci/lowest_versions.py
 	$(LOWEST_VENV)/bin/python -m pip install --quiet --constraint $(LOWEST_VENV)/lowest.txt --editable '.[dev]'
 	@touch $@
 
-test-lowest: export OPENBLAS_NUM_THREADS := 1
 test-lowest: $(LOWEST_VENV)/.installed
 	$(LOWEST_VENV)/bin/python -m pytest -n 2 -q $(TESTS)
 

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+# Workers of pytest-xdist have this: in several processes, threads of linear algebra wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 pytest_plugins = ["arm_fixtures", "finite_element_fixtures", "flexible_tree_fixture"]
 REPOSITORY = Path(__file__).resolve().parents[1]
 
