@@ -53,7 +53,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
     if output.json:
         output.object({"findings": [asdict(one) for one in findings], "wrong": wrong})
     else:
-        title = f"{counted(wrong, 'thing')} wrong, {counted(notes, 'thing')} to note"
+        title = f"{counted(wrong, 'thing') if wrong else 'Nothing'} wrong, {counted(notes, 'thing')} to note"
         rows = [[one.state, one.name, one.found, one.remedy] for one in findings]
         print_table(console_on(output.stream), title, ["", "what", "found", "what to do"], rows, texts=4)
     return int(wrong > 0)
