@@ -190,7 +190,8 @@ def _column(
             if found is not None:
                 return found
             left = ",".join("-" if other == name else other for other in head)
-            remedy = f"Correct the row, or leave the column out with --set motion.read.joints={left}"
+            remedy = "Correct the row (write decimals with a point), or leave the column out with "
+            remedy += f"--set motion.read.joints={left}"
             raise _wrong_row(path, lines[k], len(head), remedy) from None
     return values
 

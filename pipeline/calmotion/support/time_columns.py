@@ -26,6 +26,7 @@ _BESIDE = set(
 )
 _COUNTERS = set("frame frames index idx step row sample seq sequence tick count no nr id unnamed field header".split())
 _PARTS = set("episode task chunk subtask".split())  # of a data set, which number a whole recording (LeRobot)
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 _CLOCK_TIME = re.compile(
     r"(?:(?P<day>\S+)(?:T| +))?(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2}(?:[.,]\d+)?)(?: ?(?P<zone>Z|[+-][\d:]+))?"
 )
@@ -60,13 +61,14 @@ def separator_of(head: str) -> str:
 
 
 def number_of(cell: str, separator: str) -> float:
-    """The number in a cell, which may have a decimal comma where no commas are between cells.
+    """The number in a cell, which may have a decimal comma: between commas it is quoted, and must not be a thousand.
 
     Raises:
         ValueError: It is none.
     """
     text = cell.strip()
-    return float(text.replace(",", ".") if separator != "," and text.count(",") == 1 and "." not in text else text)
+    decimal = text.count(",") == 1 and "." not in text and (separator != "," or not _THOUSANDS.fullmatch(text))
+    return float(text.replace(",", ".") if decimal else text)
 
 
 def instants(cells: Sequence[str]) -> Array | None:
