@@ -21,6 +21,7 @@ from calmotion.retargeting.robust.scenarios import random_scenarios as random_sc
 from calmotion.retargeting.robust.scenarios import uncertain_parameters as uncertain_parameters
 from calmotion.retargeting.run_checks import check_search as check_search
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy as damping_homotopy
+from calmotion.retargeting.solver.gauss_newton import Ends as Ends
 from calmotion.retargeting.solver.gauss_newton import Search as Search
 from calmotion.retargeting.solver.gauss_newton import minimize as minimize
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance as optimize_to_tolerance

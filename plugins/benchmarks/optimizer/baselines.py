@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import SHAPERS, RunSettings
-from calmotion.retargeting import RetargetProblem, damping_homotopy, minimize
+from calmotion.retargeting import Ends, RetargetProblem, damping_homotopy, minimize
 from calmotion.simulation import CompiledShot, Curves, Simulator, best_delay, delay, modes_of, prepare, shaped
 
 from ..common.reporting import bench_parser, on_shots
@@ -57,7 +57,8 @@ def compare(name: str, shot: CompiledShot) -> list[Row]:
         run = simulator.run(curves.angles, curves.rates)
         rows.append(_row(name, kind.replace("2", ", two modes"), late, problem, curves, run.target_positions))
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
-    found = minimize(problem, damping_homotopy(problem.at(zero), free, float(frequencies[0])), free, 5e-6).at
+    start = damping_homotopy(problem.at(zero), free, float(frequencies[0]))
+    found = minimize(problem, start, free, Ends(5e-6)).at
     rows.append(_row(name, "optimised", 0.0, problem, found.curves, found.run.target_positions))
     return rows
 

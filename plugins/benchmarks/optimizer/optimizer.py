@@ -17,6 +17,7 @@ from calmotion.model import RunSettings
 from calmotion.retargeting import (
     CLOSENESS,
     SMOOTHNESS,
+    Ends,
     Evaluation,
     OffsetBasis,
     OffsetSpace,
@@ -153,7 +154,7 @@ def _gauss_newton(
         trace.append((time.perf_counter() - begin, search.at.merit))
 
     start = damping_homotopy(problem.at(zero), free, lowest_frequency(prepared))
-    return minimize(problem, start, free, gain, iterations, products, on_iterate), trace
+    return minimize(problem, start, free, Ends(gain, iterations, products), on_iterate), trace
 
 
 class _Enough(Exception):
