@@ -162,11 +162,11 @@ def is_own(status: os.stat_result) -> bool:
 
 
 def _refuse_devices(target: Path) -> None:
-    """Refuse to replace what is no file, or is the system's: `/dev/stdout` is a link, to a file where the output goes
-    to one, and would be gone for all programs.
+    """Refuse to replace what is no file, or is the system's: the name of standard output is a link, to a file where the
+    output goes to one, and would be gone for all programs.
 
     Raises:
-        OSError: It is a named pipe, a socket or a device, or lies in /dev, /proc or /sys.
+        OSError: It is a named pipe, a socket or a device, or lies in a folder of the system.
     """
     refuse_special(target)
     folder = os.path.realpath(target.parent)
