@@ -77,6 +77,7 @@ def test_a_folder_that_cannot_be_written_is_an_error_with_a_remedy(tmp_path):
     assert caught.value.remedy
 
 
+@pytest.mark.posix
 def test_an_input_is_never_an_output(tmp_path):
     shot = tmp_path / "shot.usda"
     shot.write_text("#usda 1.0\n")

@@ -96,6 +96,7 @@ def test_layer_data_of_other_programs_is_ignored(data):
     assert stages.role_of(layer) == ""
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("leads_to", ["gone.usda", "shot.usda", "/nowhere/at/all.usda"])
 def test_a_link_to_nothing_is_named_as_such(tmp_path, leads_to):
     os.symlink(leads_to, tmp_path / "shot.usda")
