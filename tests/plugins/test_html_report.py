@@ -243,6 +243,10 @@ def test_a_browser_shows_a_page_without_complaints_or_requests(chromium, optimiz
     panels = chromium.value("document.querySelectorAll('figure').length")
     curves = chromium.value("[...document.querySelectorAll('figure')].filter(f => f.querySelector('path')).length")
     assert panels == curves == 9
+    chromium.value("player.frame(0)")
+    views = "[...document.querySelectorAll('.view span')]"
+    assert chromium.value(f"{views}.every(n => n.textContent)")
+    assert chromium.value(f"Math.max(...{views}.map(n => n.getBoundingClientRect().right))") <= width
     small = "[...document.querySelectorAll('p, td, figcaption, button')]"
     assert chromium.value(f"Math.min(...{small}.map(n => parseFloat(getComputedStyle(n).fontSize)))") >= 11.5
     dark_page = chromium.value("getComputedStyle(document.body).backgroundColor")
