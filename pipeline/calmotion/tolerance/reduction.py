@@ -15,6 +15,7 @@ from calmotion.model.character import with_settings
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.parallel import in_parallel
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.simulation.body_reduction import BodyReduction
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -48,7 +49,7 @@ def converged_reduction(
         ShotError: A body cannot be reduced, or the shot not be simulated.
     """
     refined = _Refinement(shot, options, retargeted, progress)
-    reduction = reduction.with_directions(refined.known().run.loads)
+    reduction = reduction.with_directions(refined.loads())
     refined.refine(reduction)
     # Meshes come second: most reductions are made on the first ones, which are some times smaller.
     if refined.limit_m <= refined.allowed:
@@ -102,6 +103,11 @@ class _Refinement:
         self.found = self.found or _simulated(self._options, self.shot)[0]
         return self.found
 
+    def loads(self) -> Sequence[LoadEnvelope]:
+        """Those on each body in the shot as animated, which is simulated for them."""
+        self.found = reference_run(self.shot, self._options, self._options.step or MAX_STEP, loads=True)
+        return self.found.run.loads
+
     def bodies(self, reduction: BodyReduction) -> list[ReducedBody]:
         """The bodies of a reduction to the tolerance that the shot has so far."""
         return self._reduced(reduction, self._tolerance, self._progress)
@@ -148,7 +154,7 @@ class _Refinement:
 
 
 def _simulated(options: RunSettings, *shots: CompiledShot) -> list[ReferenceRun]:
-    return in_parallel(lambda shot: reference_run(shot, options, options.step or MAX_STEP, loads=True), shots)
+    return in_parallel(lambda shot: reference_run(shot, options, options.step or MAX_STEP), shots)
 
 
 def _with_modes_by_tolerance(reduction: BodyReduction) -> BodyReduction | None:

@@ -237,7 +237,7 @@ class _Performance:
         own = result.after.motion.motor_efforts[result.after.motion.judged]
         if not np.any(np.isfinite(self.given.limits.effort)) or result.interrupted:
             return own
-        shot = self.shot.with_tracks(found_tracks(result, self.shot.animation))
+        shot = self.with_curves(result).shot
         half, quarter = (self._efforts_at(shot, share * result.step_s, result.pre_roll_s) for share in (0.5, 0.25))
         # a chosen step has positions right to the tolerance, and peaks of efforts to one or two hundredths
         extrapolated = quarter[::2] + (quarter[::2] - half) / (2.0 ** order_of(shot.character) - 1.0)
