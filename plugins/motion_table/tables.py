@@ -68,7 +68,7 @@ def read_motion(path: str, *, angles: str, times: str, rate: float, names: Seque
         if reason := too_large(path, _EXPANSION):
             raise OSError(0, f"it is too large for the memory: {reason}")
         is_csv = not path.lower().endswith(".npz")
-        columns, degrees = _csv(path, names, not rate > 0.0) if is_csv else _npz(path, names)
+        columns, units, angle_unit = _csv(path, names, not rate > 0.0) if is_csv else _npz(path, names)
     except (OSError, UnicodeDecodeError) as error:
         found = error.strerror if isinstance(error, OSError) else error
         remedy = "Name another file" if isinstance(error, OSError) else "Save the table as UTF-8"
@@ -91,8 +91,8 @@ def read_motion(path: str, *, angles: str, times: str, rate: float, names: Seque
     _refuse_bad(path, own, columns)
     seconds = exact_times(TIME_UNITS[unit] * (own.values - own.values[0]))
     _refuse_long(path, own.names[0], seconds)
-    scale = np.radians(1.0) if angles == "deg" or (angles == "auto" and degrees) else 1.0
-    return Motion(MotorTracks(path, seconds, {name: scale * v for name, v in columns.items()}), tuple(notes))
+    angle_unit = angle_unit if angles == "auto" else angles
+    return Motion(MotorTracks(path, seconds, columns, units, angle_unit), tuple(notes))
 
 
 def _times(columns: dict[str, Array]) -> TimeColumn | None:
@@ -106,8 +106,8 @@ def _times(columns: dict[str, Array]) -> TimeColumn | None:
     return found
 
 
-def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array], bool]:
-    """Columns by name, and whether angles are in degrees.
+def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array], dict[str, str], str]:
+    """Columns by name, the units of those that have one, and that of the other angles.
 
     Cells are separated by commas, semicolons, tabs or spaces; where it is not by commas, numbers may have a decimal
     comma.
@@ -165,11 +165,13 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
         head[head.index("")] = "-"
     _refuse_repeated(path, head)
     columns: dict[str, Array] = {}
+    units: dict[str, str] = {}
     for k, name in enumerate(head):
         if name != "-":
-            own, scale = named_unit(name)
-            columns[own] = scale * _column(path, lines, [row[k] for row in rows], name, head, between)
-    return columns, degrees
+            own, unit = named_unit(name)
+            columns[own] = _column(path, lines, [row[k] for row in rows], name, head, between)
+            units |= {own: unit} if unit else {}
+    return columns, units, "deg" if degrees else "rad"
 
 
 def _cells(line: str, between: str) -> list[str]:
@@ -206,7 +208,7 @@ def _wrong_row(path: str, line: tuple[int, str], count: int, remedy: str) -> Sho
     )
 
 
-def _npz(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
+def _npz(path: str, names: Sequence[str]) -> tuple[dict[str, Array], dict[str, str], str]:
     """The same of an NPZ file: an array for each joint, or `positions` with `joint_names`; `time_s` or `fps`."""
     arrays = _arrays(path)
     columns: dict[str, Array] = {}
@@ -232,7 +234,7 @@ def _npz(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
         columns = {name: _numbers(path, name, array, 1) for name, array in arrays.items()}
     if TIME not in columns and fps > 0.0 and columns:
         columns[TIME] = np.arange(len(next(iter(columns.values())))) / fps
-    return columns, "deg" in unit.lower()
+    return columns, {}, "deg" if "deg" in unit.lower() else "rad"
 
 
 def _refuse_repeated(path: str, names: Sequence[str]) -> None:

@@ -5,21 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-import numpy as np
 from calmotion.support import names_times
 
 TIME = "time_s"
 _BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(](?P<unit>[^\[\]()]+)[\])]")
-_SCALES = {
-    "rad": 1.0, "radian": 1.0, "radians": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3,
-    **dict.fromkeys(("deg", "degree", "degrees", "\u00b0"), float(np.radians(1.0))),
-}  # fmt: skip
+_SPELLINGS = {"rad": "rad radian radians", "deg": "deg degree degrees \u00b0", "m": "m", "cm": "cm", "mm": "mm"}
+_UNITS = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()}
 
 
 def are_units(cells: Sequence[str]) -> bool:
     """Whether a row below the names has the units of the columns."""
     units = [_unit(cell) for cell in cells]
-    return any(units) and all(not unit or unit in _SCALES or _is_of_times(unit) for unit in units)
+    return any(units) and all(not unit or unit in _UNITS or _is_of_times(unit) for unit in units)
 
 
 def _is_of_times(unit: str) -> bool:
@@ -37,8 +34,9 @@ def _unit(cell: str) -> str:
     return cell.strip().strip("[]()").lower()
 
 
-def named_unit(name: str) -> tuple[str, float]:
-    """A name without the unit in brackets behind it, and that unit in rad or m; a column of times keeps its own."""
+def named_unit(name: str) -> tuple[str, str]:
+    """A name without the unit of angles or lengths in brackets behind it, and that unit; a column of times keeps its
+    own."""
     match = _BRACKETS.fullmatch(name)
-    scale = None if match is None or names_times(name) else _SCALES.get(match["unit"].strip().lower())
-    return (name, 1.0) if match is None or scale is None else (match["name"].strip(), scale)
+    unit = None if match is None or names_times(name) else _UNITS.get(match["unit"].strip().lower())
+    return (name, "") if match is None or unit is None else (match["name"].strip(), unit)

@@ -18,7 +18,7 @@ from calmotion.errors import ShotError
 from calmotion.support import cache_folder, is_own, locked
 from calmotion.support import temporary_folder as folder_beside
 
-from .descriptions import URDF, Description
+from .description.descriptions import URDF, Description
 
 PACKAGES = ("urdf-usd-converter>=0.3.4,<0.4", "mujoco-usd-converter>=0.8,<0.9")
 VARIABLE = "CALMOTION_CONVERTERS"  # names an environment that has them

@@ -11,7 +11,7 @@ from calmotion.catalogs import Material
 from calmotion.model import MotorTracks
 from calmotion.usd import is_applied, is_rigid_body
 
-from .descriptions import MJCF, Description
+from .description.descriptions import MJCF, Description
 from .robot_motors import named
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from calmotion.version import __version__
 from calmotion.workflow import Given, Path, problems_of, read_settings, value_of
 
 from .converters import BrokenMeshes, compiled_values, convert, converter_python, temporary_folder
-from .descriptions import USD, Description, read_description, repaired
+from .description.descriptions import USD, Description, read_description, repaired
 from .masses import too_heavy
 from .options import FlexibleLinks, RobotOptions
 from .robot_layer import robot_layer

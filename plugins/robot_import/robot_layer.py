@@ -117,7 +117,9 @@ class _Author:
         if far:
             self.notes.append(f"rpy of joints goes beyond a turn; degrees taken for radians? {', '.join(far)}")
         self.notes += narrow_limits(self._stage, self._units, options.robot.soft_limits)
-        author_motors(self._stage, self._units, options.motion, self._rate, options.robot.efforts, options.motors)
+        self.notes += author_motors(
+            self._stage, self._units, options.motion, self._rate, options.robot.efforts, options.motors
+        )
         self.notes += author_springs(self._stage, self._units)
         self.notes += author_locks(self._stage, self._units, options.robot.locks)
         self.notes += passive_joints(self._stage, bool(options.motors or options.motion))

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from calmotion.errors import ShotError, raise_all
-from calmotion.model import MotorTracks
+from calmotion.errors import ShotError
+from calmotion.model import MotorTracks, Track
 from calmotion.support import nearest
 from calmotion.usd import (
     COUPLED,
@@ -17,6 +17,7 @@ from calmotion.usd import (
     GENERIC_JOINT,
     SEVERAL_FREEDOMS,
     TRANSLATIONS,
+    JointNames,
     StageUnits,
     actuated_joints,
     body_on,
@@ -26,6 +27,7 @@ from calmotion.usd import (
     is_applied,
     joint_prims,
     limits_of,
+    tracks_of_joints,
 )
 
 if TYPE_CHECKING:
@@ -121,7 +123,7 @@ def narrow_limits(stage: Usd.Stage, units: StageUnits, soft: Mapping[str, tuple[
 def author_motors(
     stage: Usd.Stage, units: StageUnits, motion: MotorTracks | None, frames_per_second: float,
     efforts: Mapping[str, float], patterns: Sequence[str],
-) -> None:  # fmt: skip
+) -> tuple[str, ...]:  # fmt: skip
     """Author drives of the joints that patterns name; without patterns of those that actuators or drives move, else of
     all of them; and of those in the motion. A joint that no motion moves keeps its target position, or gets that
     nearest to 0 within its limits.
@@ -134,14 +136,19 @@ def author_motors(
         efforts: Largest effort by name of a joint [N m or N].
         patterns: Of names of joints, with `*` and `?`; `all` names all of them.
 
+    Returns:
+        What a user should know of the columns of the motion.
+
     Raises:
         ShotError: A name that no joint has; a closed chain, all of whose joints would be motors; no joint at all that a
             motor can drive.
     """
     axes = [axis for prim in joint_prims(stage) for axis in axes_of(prim)]
-    moved = _moved(axes, motion)
-    chosen = _named(axes, patterns) if patterns else _by_default(stage, axes, moved)
-    driven = [axis for axis in axes if axis in chosen or axis.path in moved]
+    moved, notes = MotorTracks("", np.zeros(0), {}), tuple[str, ...]()
+    if motion is not None:
+        moved, notes = tracks_of_joints(motion, {axis.path: JointNames(axis.names, axis.linear) for axis in axes})
+    chosen = _named(axes, patterns) if patterns else _by_default(stage, axes, bool(moved.values))
+    driven = [axis for axis in axes if axis in chosen or axis.path in moved.values]
     if not driven:
         kinds = sorted({str(prim.GetTypeName()) for prim in joint_prims(stage)})
         swings = bool(set(kinds) - {"PhysicsFixedJoint"})
@@ -153,12 +160,13 @@ def author_motors(
             + ("; or leave it passive: animate the transform of its root, and simulate that shot" if swings else ""),
         )
     for axis in driven:
-        _author(axis, moved.get(axis.path), units, frames_per_second, efforts.get(named(axis.prim)))
+        values = moved.values.get(axis.path)
+        track = None if values is None else Track(moved.times, values)
+        _author(axis, track, units, frames_per_second, efforts.get(named(axis.prim)))
+    return notes
 
 
-def _author(
-    axis: Axis, track: MotorTracks | None, units: StageUnits, frames_per_second: float, effort: float | None
-) -> None:
+def _author(axis: Axis, track: Track | None, units: StageUnits, frames_per_second: float, effort: float | None) -> None:
     from pxr import UsdPhysics
 
     api = UsdPhysics.DriveAPI.Apply(axis.prim, axis.drive)
@@ -167,8 +175,7 @@ def _author(
     attribute = api.CreateTargetPositionAttr()
     if track is not None:
         scale = 1.0 / units.length(1.0) if axis.linear else np.degrees(1.0)
-        values = next(iter(track.values.values())) * scale
-        for code, value in zip(track.times * frames_per_second, values, strict=True):
+        for code, value in zip(track.times * frames_per_second, track.values * scale, strict=True):
             attribute.Set(float(value), float(round(code, 6)))
     elif not (attribute.HasAuthoredValue() or attribute.GetNumTimeSamples()):
         attribute.Set(_rest(axis))
@@ -184,7 +191,7 @@ def _rest(axis: Axis) -> float:
     return float(min(max(0.0, low), high)) if low <= high else 0.0
 
 
-def _by_default(stage: Usd.Stage, axes: Sequence[Axis], moved: Mapping[str, MotorTracks]) -> list[Axis]:
+def _by_default(stage: Usd.Stage, axes: Sequence[Axis], moved: bool) -> list[Axis]:
     """Those that actuators or drives move, and those that lead others; where there are none, all that follow no other
     joint and close no chain."""
     free = free_axes(axes)
@@ -290,39 +297,4 @@ def _named(axes: Sequence[Axis], patterns: Sequence[str]) -> list[Axis]:
                 remedy=f"{nearest(pattern.strip('*'), names)}Its joints are {', '.join(names) or 'all fixed'}",
             )
         found += fitting
-    return found
-
-
-def _moved(axes: Sequence[Axis], motion: MotorTracks | None) -> dict[str, MotorTracks]:
-    """The axes of the motion by path, each with its track alone."""
-    found: dict[str, MotorTracks] = {}
-    problems: list[ShotError] = []
-    for name, values in motion.values.items() if motion is not None else ():
-        fitting = [axis for axis in axes if name in axis.names]
-        assert motion is not None
-        if len(fitting) == 1 and fitting[0].path in found:
-            other = next(iter(found[fitting[0].path].values))
-            problems.append(
-                ShotError(
-                    "two columns move the same joint",
-                    path=motion.origin,
-                    found=f"{other} and {name}",
-                    remedy="Remove one of them",
-                )
-            )
-        elif len(fitting) != 1:
-            names = sorted({axis.name for axis in axes})
-            problems.append(
-                ShotError(
-                    "several joints have this name" if fitting else "no joint of the robot has this name",
-                    path=motion.origin,
-                    found=name,
-                    remedy=f"Name each by its path: {', '.join(axis.path for axis in fitting)}"
-                    if fitting
-                    else f"{nearest(name, names)}Its joints are {', '.join(names)}",
-                )
-            )
-        else:
-            found[fitting[0].path] = MotorTracks(motion.origin, motion.times, {name: values})
-    raise_all(problems)
     return found

@@ -176,4 +176,4 @@ def test_a_motor_that_no_joint_is_is_refused_with_the_file(calmotion, tmp_path):
     shot = shots.write_arm(tmp_path / "arm.usda")
     bvh(tmp_path / "wave.bvh")
     done = calmotion("simulate", shot, "--motion", tmp_path / "wave.bvh", "--set", "bvh.read.map=Arm.Zrotation=knee")
-    assert done.returncode == 1 and "no joint has this name" in done.stderr and "knee" in done.stderr
+    assert done.returncode == 1 and "no joint of the robot has this name" in done.stderr and "knee" in done.stderr

@@ -12,6 +12,7 @@ from calmotion.model import MotorTracks
 from calmotion.model.run import Source
 from calmotion.support import memory
 from calmotion.testing import host_with, run_operator
+from calmotion.usd import JointNames, tracks_of_joints
 
 TIMES = np.array([2.0, 2.5, 3.0])
 PAN, LIFT = np.array([0.0, 0.1, 0.3]), np.array([1.0, 0.5, 0.2])
@@ -74,6 +75,7 @@ def table(head="time_s,pan,lift", times=TIMES, scale=1.0):
         ("a.csv", table().replace(",", "\t"), {}),
         ("a.csv", table().replace(",", "  "), {}),
         ("a.csv", "time_s,pan [deg],lift (rad)\n0,0,1\n.5,5.729577951,.5\n1,17.188733854,.2\n", {}),
+        ("a.csv", "# units: angle deg\ntime_s,pan [deg],lift (rad)\n0,0,1\n.5,5.729577951,.5\n1,17.188733854,.2\n", {}),
         ("a.csv", "date,pan,lift\n2024-05-17T10:00:02Z,0,1\n2024-05-17T10:00:02.5Z,.1,.5\n"
          "2024-05-17T10:00:03Z,.3,.2\n", {}),
         ("a.csv", "time;pan;lift\n10:00:59,5;0;1\n10:01:00,0;0,1;0,5\n10:01:00,5;0,3;0,2\n", {}),
@@ -94,9 +96,10 @@ def test_forms_of_a_motion(read, tmp_path, name, content, settings):
         content = None
     found = read(name, content, **settings)
     np.testing.assert_allclose(found.times, TIMES - TIMES[0], atol=1e-9)
-    assert list(found.values) == ["pan", "lift"]
-    np.testing.assert_allclose(found.values["pan"], PAN, atol=1e-9)
-    np.testing.assert_allclose(found.values["lift"], LIFT, atol=1e-8)
+    of_joints, notes = tracks_of_joints(found, {f"/{name}": JointNames((name,)) for name in ("pan", "lift")})
+    assert list(of_joints.values) == ["/pan", "/lift"] and not notes
+    np.testing.assert_allclose(of_joints.values["/pan"], PAN, atol=1e-9)
+    np.testing.assert_allclose(of_joints.values["/lift"], LIFT, atol=1e-8)
 
 
 def test_settings_that_a_table_with_times_and_names_does_not_need_are_told(repository, tmp_path):

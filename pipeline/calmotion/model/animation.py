@@ -34,12 +34,16 @@ class MotorTracks:
     Attributes:
         origin: Where they come from, for messages.
         times: [s] after the first frame of the shot, strictly increasing, shape [k].
-        values: [rad or m] by the path of the motor's joint, or by its name where that is the only one, shape [k].
+        values: By the path of the motor's joint, or by its name where that is the only one, shape [k].
+        units: Their units, where they are said: `rad`, `deg`, `m`, `cm` or `mm`.
+        angle_unit: `rad` or `deg`, of the other angles; other lengths are in m.
     """
 
     origin: str
     times: Array
     values: Mapping[str, Array]
+    units: Mapping[str, str] = field(default_factory=dict)
+    angle_unit: str = "rad"
 
 
 @dataclass(frozen=True, eq=False)

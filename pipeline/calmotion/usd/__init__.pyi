@@ -31,6 +31,8 @@ from calmotion.usd.reading.motors.couplings import COUPLED as COUPLED
 from calmotion.usd.reading.motors.couplings import coupled as coupled
 from calmotion.usd.reading.motors.couplings import coupling_prims as coupling_prims
 from calmotion.usd.reading.motors.driven_motors import actuated_joints as actuated_joints
+from calmotion.usd.reading.motors.given_tracks import JointNames as JointNames
+from calmotion.usd.reading.motors.given_tracks import tracks_of_joints as tracks_of_joints
 from calmotion.usd.reading.shot import read_shot as read_shot
 from calmotion.usd.rigging import RigOptions as RigOptions
 from calmotion.usd.rigging import rig_shot as rig_shot

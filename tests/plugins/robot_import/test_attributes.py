@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 from calmotion.errors import ShotError
-from calmotion_plugins.robot_import.attributes import REFUSED, TREATMENTS, markdown, row_of, table
-from calmotion_plugins.robot_import.descriptions import read_description
+from calmotion_plugins.robot_import.description.attributes import REFUSED, TREATMENTS, markdown, row_of, table
+from calmotion_plugins.robot_import.description.descriptions import read_description
 
 KINDS = ("mjcf", "urdf")
 WRITES = "CALMOTION_WRITE_PAGES"  # set it, and the test of a page writes the page

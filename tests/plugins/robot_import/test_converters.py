@@ -13,7 +13,7 @@ import pytest
 from calmotion.errors import ShotError
 from calmotion_plugins.robot_import import converters
 from calmotion_plugins.robot_import.converters import BrokenMeshes, convert, converter_python
-from calmotion_plugins.robot_import.descriptions import Description
+from calmotion_plugins.robot_import.description.descriptions import Description
 
 if os.name == "nt":
     pytest.skip("scripts stand in for the converters", allow_module_level=True)

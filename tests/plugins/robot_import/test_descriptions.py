@@ -6,7 +6,7 @@ import os
 
 import pytest
 from calmotion.errors import ShotError
-from calmotion_plugins.robot_import.descriptions import read_description
+from calmotion_plugins.robot_import.description.descriptions import read_description
 
 BOX = '<geometry><box size="1 1 1"/></geometry>'
 MASS = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -43,6 +43,7 @@ def test_efforts_and_links_without_inertia_are_found(read):
     assert read(urdf(inertial=MASS.replace('value="1"', 'value="0.0"'))).massless == ("a", "b")
     assert found.massless == ("a",), "a frame"
     assert read('<mujoco model="m"><worldbody/></mujoco>').kind == "mjcf"
+    assert read(urdf(inertial=MASS + MASS)).massless == ("a",), "said twice in the same way"
 
 
 @pytest.mark.parametrize("name", ["package://my_robot/meshes/b.stl", "../meshes/b.stl", "file://../meshes/b.stl"])
@@ -67,7 +68,24 @@ def test_a_package_stands_beside_a_folder_above_or_is_named(read, tmp_path):
         read(text, {"others": str(tmp_path / "none")})
 
 
+@pytest.mark.parametrize("variable", ["", "ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"])
+def test_a_package_is_known_by_its_manifest_and_by_ros(read, tmp_path, monkeypatch, variable):
+    """An archive from GitHub unpacks to another folder, and a workspace may be elsewhere."""
+    place = {"": "arm-main", "ROS_PACKAGE_PATH": "ws/arm-main", "AMENT_PREFIX_PATH": "ws/share/arm"}[variable]
+    (tmp_path / place).mkdir(parents=True)
+    (tmp_path / place / "b.stl").touch()
+    (tmp_path / place / "package.xml").write_text("<package><name> arm </name></package>")
+    (tmp_path / "torn").mkdir()
+    (tmp_path / "torn" / "package.xml").write_text("<package><name>arm")
+    if variable:
+        monkeypatch.setenv(variable, f"{tmp_path / 'none'}{os.pathsep}{tmp_path / 'ws'}")
+    assert read(urdf(mesh("package://arm/b.stl"))).packages == {"arm": str(tmp_path / place)}
+
+
 REFUSED = {
+    "two inertias of one link": (urdf(inertial=MASS + MASS.replace('mass value="1"', 'mass value="3"')), "inertial"),
+    "two axes of one joint": (
+        urdf(joint=JOINT.replace("<limit", '<axis xyz="0 0 1"/><axis xyz="1 0 0"/><limit')), "axis"),
     "a mesh that is missing": (urdf(mesh("b.stl")), "b.stl of b"),
     "a xacro": (urdf().replace("<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"').replace(
         '<link name="a"/>', '<xacro:arm/><link name="a"/>'), "<xacro:arm>"),

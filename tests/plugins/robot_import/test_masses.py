@@ -9,7 +9,7 @@ from calmotion.errors import ShotError
 from calmotion.usd.reading.shot import read_shot
 from calmotion_plugins.robot_import import import_robot
 from calmotion_plugins.robot_import.converters import VARIABLE, environment_folder
-from calmotion_plugins.robot_import.descriptions import MJCF, Description
+from calmotion_plugins.robot_import.description.descriptions import MJCF, Description
 from calmotion_plugins.robot_import.options import RobotOptions
 from calmotion_plugins.robot_import.robot_layer import robot_layer
 from converted_arm import CONVERTED, FORE

@@ -11,8 +11,8 @@ import trimesh
 from calmotion.errors import ShotError
 from calmotion_plugins.robot_import import robot as importing
 from calmotion_plugins.robot_import.converters import BrokenMeshes
-from calmotion_plugins.robot_import.descriptions import read_description, repaired
-from calmotion_plugins.robot_import.repairs import clean_obj, parsed
+from calmotion_plugins.robot_import.description.descriptions import read_description, repaired
+from calmotion_plugins.robot_import.description.repairs import clean_obj, parsed
 from converted_arm import CONVERTED
 
 LINK = '<link name="{0}"><visual><geometry><mesh filename="{1}"/></geometry></visual>'

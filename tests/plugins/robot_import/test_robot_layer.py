@@ -10,7 +10,7 @@ from calmotion.catalogs.materials import MATERIALS
 from calmotion.errors import ShotError
 from calmotion.model import MotorTracks
 from calmotion.usd.reading.shot import read_shot
-from calmotion_plugins.robot_import.descriptions import URDF, Description
+from calmotion_plugins.robot_import.description.descriptions import URDF, Description
 from calmotion_plugins.robot_import.options import FlexibleLinks, RobotOptions
 from calmotion_plugins.robot_import.robot_layer import robot_layer
 from converted_arm import CONVERTED, ELBOW, FORE, MIMIC, PAN, UPPER

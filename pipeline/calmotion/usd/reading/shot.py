@@ -24,7 +24,7 @@ from calmotion.usd.reading.doubtful_motions import limit_doubts, motion_doubts
 from calmotion.usd.reading.joints.joint_prims import joint_prims
 from calmotion.usd.reading.joints.roots import moving_frames
 from calmotion.usd.reading.motors.driven_motors import BODIES, CONSTANT, DRIVE, GIVEN, Drive, to_si
-from calmotion.usd.reading.motors.given_tracks import given_joints, given_track, length_note
+from calmotion.usd.reading.motors.given_tracks import given_tracks, length_note
 from calmotion.usd.reading.motors.holds import held
 from calmotion.usd.reading.motors.motor_limits import free_tracks
 from calmotion.usd.reading.motors.posed_motors import joint_motions, pose_codes, posed_track
@@ -84,7 +84,7 @@ def read_shot(
             result = result if part is stage else masked(result, motions)
             of_motors = Reading(result, reading.units, clock.start)
             standing = hinge_stacks(reading, read.skeleton.drives)
-            current = motor_tracks(of_motors, read.skeleton.drives, shown, given, standing)
+            current = motor_tracks(of_motors, read.skeleton.drives, shown, read.given, standing)
             raise_all(of_motors.problems)
         provenance = provenance_of(path, stage, shown, earlier)
         of_results = notes_of_results(composed, path, earlier, provenance.layers)
@@ -111,6 +111,7 @@ class StageReading:
     character: Character
     tracks: tuple[Track, ...]
     moving: tuple[MovingFrame, ...]
+    given: MotorTracks | None
 
 
 def read_stage(
@@ -133,9 +134,10 @@ def read_stage(
             clock = dataclasses.replace(clock, end=end)
         reading = Reading(stage, units, clock.start, whole=whole)
         reading.notes += animated
-        if given is not None and (note := length_note(given, clock.frame_times())):
-            reading.notes.append(note)
-        skeleton = read_skeleton(reading, clock, still, given_joints(stage, given), measured)
+        if given is not None:
+            given, told = given_tracks(stage, given)
+            reading.notes += filter(None, (*told, length_note(given, clock.frame_times())))
+        skeleton = read_skeleton(reading, clock, still, () if given is None else tuple(given.values), measured)
         for warning in other_units(stage, map(stage.GetPrimAtPath, skeleton.poses)):
             reading.warn(warning)
         tracks = motor_tracks(reading, skeleton.drives, clock, given)
@@ -145,7 +147,8 @@ def read_stage(
         notes = (*character.notes, *limit_doubts(character), *motion_doubts(character, tracks))
         if not character.motors and (chosen := physics_elsewhere(whole or stage)):
             notes += (f"another variant has more physics. {chosen}",)
-        return StageReading(reading, clock, skeleton, dataclasses.replace(character, notes=notes), tracks, moving)
+        character = dataclasses.replace(character, notes=notes)
+        return StageReading(reading, clock, skeleton, character, tracks, moving, given)
 
 
 def shot_clock(stage: Usd.Stage, given: MotorTracks | None) -> Clock:
@@ -202,7 +205,7 @@ def motor_tracks(
             if drive.source == DRIVE or (standing is not None and attribute and len(sample_codes(attribute))):
                 tracks[path] = read_track(attribute, clock, reading, unit)
             elif drive.source == GIVEN and given is not None:
-                tracks[path] = given_track(given, drive.joint)
+                tracks[path] = Track(given.times, given.values[path])
             elif drive.source == CONSTANT and drive.constant is not None:
                 ends = np.unique([clock.start, clock.end])
                 tracks[path] = Track(clock.seconds(ends), np.full(len(ends), drive.constant))

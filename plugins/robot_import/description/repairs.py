@@ -14,7 +14,8 @@ import xml.etree.ElementTree as xml
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-PACKAGE, MODEL = "package://", "model://"  # of ROS and of Gazebo
+from .packages import MODEL, PACKAGE
+
 JointFrame = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]  # [m], [rad], a direction
 _FOREIGN = "urn:undeclared:"
 _PREFIX = re.compile(r"(?:</?|\s)([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*(?=[\s/>=])")
@@ -66,12 +67,6 @@ def faults(root: xml.Element, prefixes: Sequence[str]) -> tuple[str, ...]:
             "robot's first body"
         )
     return tuple(found)
-
-
-def in_package(name: str) -> tuple[str, str]:
-    """The ROS package that the name of a mesh begins with, and the path in it."""
-    package, _, rest = name.removeprefix(PACKAGE).removeprefix(MODEL).lstrip("/").partition("/")
-    return package, rest
 
 
 def root_joints(root: xml.Element) -> list[xml.Element]:

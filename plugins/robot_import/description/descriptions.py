@@ -21,12 +21,10 @@ from .mjcf import (
     refuse_other_compilers,
     several_joints,
 )
+from .packages import MODEL, PACKAGE, in_package, mesh_file, package_folder
 from .repairs import (
-    MODEL,
-    PACKAGE,
     JointFrame,
     faults,
-    in_package,
     joint_frames,
     leader,
     parsed,
@@ -37,6 +35,7 @@ from .repairs import (
 
 URDF, MJCF, USD = "urdf", "mjcf", "usd"
 _JOINTS = ("revolute", "continuous", "prismatic", "fixed")
+_ONCE = ("inertial", "parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "safety_controller")
 _SHOWN = 4  # missing files in a message
 
 
@@ -126,6 +125,7 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
             found="<robot> without <link>",
             remedy="Name the file that describes the whole robot; from a .xacro, `xacro FILE > robot.urdf` makes it",
         )
+    _refuse_repeated(root, path)
     _refuse_other_joints(root, path)
     _refuse_several_roots(root, path)
     _refuse_circular_followers(root, path)
@@ -170,6 +170,24 @@ def _macro(node: xml.Element) -> str | None:
     if "xacro" in str(node.tag):
         return f"<xacro:{str(node.tag).rpartition('}')[2].rpartition(':')[2]}>"
     return next((f'{name}="{value}"' for name, value in node.items() if "${" in value or "$(" in value), None)
+
+
+def _refuse_repeated(root: xml.Element, path: str) -> None:
+    """Refuse what a link or a joint says twice in different ways: readers of URDF differ in which one counts."""
+    problems = []
+    for owner in (*root.findall("link"), *root.findall("joint")):
+        for tag in dict.fromkeys(str(part.tag) for part in owner):
+            given = (
+                {xml.canonicalize(xml.tostring(part), strip_text=True) for part in owner.findall(tag)}
+                if tag in _ONCE
+                else set()
+            )
+            if len(given) > 1:
+                found = f"{len(given)} of {owner.get('name')}"
+                problems.append(
+                    ShotError(f"a {owner.tag} has several", path=path, attribute=tag, found=found, remedy="Leave one")
+                )
+    raise_all(problems)
 
 
 def _refuse_other_joints(root: xml.Element, path: str) -> None:
@@ -279,7 +297,7 @@ def _packages(root: xml.Element, path: str, given: Mapping[str, str]) -> dict[st
     named = {in_package(name)[0] for _, name in _meshes(root) if name.startswith((PACKAGE, MODEL))}
     problems, found = [], {}
     for name in sorted(named):
-        folder = given.get(name) or _above(name, path)
+        folder = given.get(name) or package_folder(name, path)
         if folder is None or not os.path.isdir(folder):
             near = nearest(name, given)
             problems.append(
@@ -295,24 +313,6 @@ def _packages(root: xml.Element, path: str, given: Mapping[str, str]) -> dict[st
             found[name] = os.path.abspath(folder)
     raise_all(problems)
     return found
-
-
-def _above(name: str, path: str) -> str | None:
-    """A folder of that name that contains the file, or stands beside a folder that does."""
-    for folder in Path(path).resolve().parents:
-        if folder.name == name:
-            return str(folder)
-        if (folder / name).is_dir():
-            return str(folder / name)
-    return None
-
-
-def mesh_file(name: str, path: str, packages: Mapping[str, str]) -> str:
-    """The file that a mesh of a URDF names."""
-    if name.startswith((PACKAGE, MODEL)):
-        package, rest = in_package(name)
-        return os.path.join(packages[package], rest)
-    return os.path.join(os.path.dirname(os.path.abspath(path)), name.removeprefix("file://"))
 
 
 def _refuse_missing_meshes(root: xml.Element, path: str, packages: Mapping[str, str]) -> None:
