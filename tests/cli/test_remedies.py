@@ -118,25 +118,57 @@ def test_settings_read_the_tables_for_which_they_are_told(calmotion, tmp_path, n
     assert "31 frames" in again.stdout
 
 
-# What is refused, and the options that its remedy names in their place; $1 is what it prints.
+SHOT, LAYER = "shot.usda", "calm.usda"
+OPTIMIZE = ("optimize", SHOT, "-o", LAYER, "--quiet")
+SIMULATE = ("simulate", SHOT, "--quiet")
+EXPORT = ("export", SHOT, "--to", "csv", "-o", "commands.csv")
+# A command, options that are refused, a part of the remedy, and the options as it says; $1 is what its group holds.
 REFUSED = {
-    "a scheme of no search": (("--integrator", "rk4"), "Remove the option", ()),
+    "a scheme of no search": (OPTIMIZE, ("--integrator", "rk4"), "Remove the option", ()),
     "too much time": (
-        ("--set", "accuracy.analyse.max_hours=1e-7"), r"--set (accuracy\S+=\d+)", ("--set", "$1"),
+        OPTIMIZE, ("--set", "accuracy.analyse.max_hours=1e-7"), r"--set (accuracy\S+=\d+)", ("--set", "$1"),
     ),
     "a setting of no operator": (
-        ("--set", "element_size=5mm"), r"--set (fe\.mesh\.element_size=5mm)", ("--set", "$1"),
+        OPTIMIZE, ("--set", "element_size=5mm"), r"--set (fe\.mesh\.element_size=5mm)", ("--set", "$1"),
     ),
+    "no setting": (OPTIMIZE, ("--set", "fe"), r"--set (\S+=5mm)", ("--set", "$1")),
+    "a setting out of range": (
+        OPTIMIZE, ("--retime", "slowest=0.5"), r"nearest allowed one is (\d)", ("--retime", "slowest=$1"),
+    ),
+    "a goal of a robust search": (OPTIMIZE, ("--goal", "1mm", "--robust"), "Remove --goal", ("--goal", "1mm")),
+    "pins without retiming": (OPTIMIZE, ("--pin", "beats.csv"), "Add (--retime)", ("--retime", "--pin", "beats.csv")),
+    "a length without a unit": (OPTIMIZE, ("--tolerance", "1"), "write 1m or (1mm)", ("--tolerance", "$1")),
+    "a page of another name": (OPTIMIZE, ("--html", "page.txt"), r"Name a (\.html) file", ("--html", "page$1")),
+    "a video of another kind": (
+        OPTIMIZE, ("--video", "a.gif", "--set", "video.write.width=320", "--set", "video.write.rate=5"),
+        r"Name a (\.webp)", ("--video", "a$1", "--set", "video.write.width=320", "--set", "video.write.rate=5"),
+    ),
+    "one output twice": (OPTIMIZE, ("--csv", LAYER), "Choose another", ("--csv", "errors.csv")),
+    "a result over the shot": (OPTIMIZE, ("--csv", SHOT), "Choose another", ("--csv", "errors.csv")),
+    "an option misspelled": (OPTIMIZE, ("--strickt",), "Did you mean (--strict)", ("$1",)),
+    "a motion of no kind": (OPTIMIZE, ("--motion", "take.txt"), r"Name a (\.csv)", ("--motion", "take$1")),
+    "a layer of another name": (
+        ("optimize", SHOT, "--quiet"), ("-o", "calm.txt"), r"extension (\.usda)", ("-o", "calm$1"),
+    ),
+    "a shaper that is not there": (SIMULATE, ("--shaper", "xyz"), "supports only .*(lowpass)", ("--shaper", "$1")),
+    "a format that is not there": (EXPORT, ("--to", "nothing"), "Use one of .*(keyframes)", ("--to", "$1")),
+    "a controller of other robots": (EXPORT, ("--to", "ur"), "Use ros2 or (csv)", ("--to", "$1")),
+    "a material that is not there": (("materials",), ("wood",), "Use ([a-z]+),", ("$1",)),
+    "a motor that is not there": (("motors",), ("wood",), "`calmotion (motors)` lists", ()),
+    "a farm that is not there": (("batch", SHOT, "-o", "out"), ("--on", "moon"), "Use (local)", ("--on", "$1")),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_refused_runs_as_its_remedy_says(calmotion, tmp_path, name):
-    refused, remedy, instead = REFUSED[name]
-    (tmp_path / "shot.usda").write_text(ONE_HINGE)
-    words = ("optimize", tmp_path / "shot.usda", "-o", tmp_path / "calm.usda", "--quiet")
-    first = calmotion(*words, *refused)
-    named = re.search(remedy, " ".join(first.stderr.split()))
-    assert first.returncode in (1, 2) and named, first.stderr
-    again = calmotion(*words, *(named[1] if word == "$1" else word for word in instead))
-    assert again.returncode == 0, again.stdout
+def test_what_is_refused_runs_as_its_remedy_says(calmotion, tmp_path, monkeypatch, name):
+    command, refused, remedy, instead = REFUSED[name]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / SHOT).write_text(ONE_HINGE)
+    (tmp_path / "beats.csv").write_text("0\n5\n")
+    (tmp_path / "take.csv").write_text("time_s,Hinge\n0,0\n0.5,0.1\n")
+    first = calmotion(*command, *refused)
+    said = " ".join((first.stdout + first.stderr).split())
+    named = re.search(remedy, said)
+    assert first.returncode in (1, 2) and named, said
+    again = calmotion(*command, *(word.replace("$1", named[1]) if "$1" in word else word for word in instead))
+    assert again.returncode == 0, again.stdout + again.stderr
