@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import queue
+import socket
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -63,15 +64,22 @@ def sample_of(line: str) -> Sample:
         SettingError: It is no such line.
     """
     try:
-        found = json.loads(line)
-        return float(found["t"]), {str(path): float(value) for path, value in found["joints"].items()}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        found = json.loads(line.lstrip("\ufeff"))
+        joints = {str(path): _number(value) for path, value in found["joints"].items()}
+        return _number(found["t"]), joints
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise SettingError(
             "a line of the stream is no sample",
             path="--in",
             found=line.strip()[:80],
             remedy='Send lines such as {"t": 0.1, "joints": {"/Arm/Elbow": 0.3}}, in s and rad (m of sliders).',
         ) from error
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError
+    return float(value)
 
 
 class Lines(Source):
@@ -113,60 +121,84 @@ class Lines(Source):
 
 
 class Samples(Source):
-    """Samples that are known, each of which arrives at the time of its stamp after the first call."""
+    """Samples that are known; they arrive at once, and are used at the times of their stamps."""
 
     def __init__(self, samples: Iterable[Sample]):
-        self._samples = iter(samples)
-        self._next = next(self._samples, None)
-        self._begin: float | None = None
+        self._samples: Iterator[Sample] = iter(samples)
 
     def samples(self) -> Iterator[Sample]:
         """Those that have not arrived."""
-        while self._next is not None:
-            found, self._next = self._next, next(self._samples, None)
-            yield found
+        return self._samples
 
     def arrived(self) -> list[Sample] | None:
-        """Those whose time has come."""
-        if self._next is None:
-            return None
-        now = time.perf_counter()
-        self._begin = self._begin if self._begin is not None else now - self._next[0]
-        found: list[Sample] = []
-        while self._next is not None and self._next[0] <= now - self._begin:
-            found.append(self._next)
-            self._next = next(self._samples, None)
-        return found
+        """All of them, and then None."""
+        return list(self._samples) or None
 
 
 class OscSource(Source):
-    """Messages `/calm/in/<joint path>` with one float each, stamped when they arrive."""
+    """Messages `/calm/in/<joint path>` with one float each, stamped when they arrive; time tags are not used.
+
+    Raises:
+        SettingError: The port cannot be opened.
+    """
 
     def __init__(self, host: str, port: int):
-        from pythonosc.dispatcher import Dispatcher
-        from pythonosc.osc_server import ThreadingOSCUDPServer
+        self._queue: queue.SimpleQueue[Sample] = queue.SimpleQueue()
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind((host, port))
+        except OSError as error:
+            self._socket.close()
+            raise SettingError(
+                "this port cannot be opened",
+                path="--in",
+                found=f"osc://{host}:{port}: {error.strerror}",
+                remedy="Choose another port, or end the program that has it.",
+            ) from error
+        self._socket.settimeout(0.2)
+        self._open = True
+        threading.Thread(target=self._listen, daemon=True).start()
 
-        self._lock, self._values = threading.Lock(), dict[str, float]()
-        dispatcher = Dispatcher()
-        dispatcher.map(f"{IN}/*", self._given)
-        self._server = ThreadingOSCUDPServer((host, port), dispatcher)
-        threading.Thread(target=self._server.serve_forever, daemon=True).start()
+    def _listen(self) -> None:
+        from pythonosc.osc_packet import OscPacket
 
-    def _given(self, address: str, *values: Any) -> None:
-        if values and isinstance(values[0], int | float):
-            with self._lock:
-                self._values[address[len(IN) :]] = float(values[0])
+        while self._open:
+            try:
+                packet = OscPacket(self._socket.recv(65536))
+            except TimeoutError:
+                continue
+            except OSError:
+                return
+            except Exception as error:  # whatever the parser makes of bytes that are no message
+                self._refuse_message(f"{type(error).__name__}: {error}"[:80])
+                continue
+            for timed in packet.messages:
+                self._given(timed.message.address, timed.message.params)
+
+    def _given(self, address: str, values: list[Any]) -> None:
+        try:
+            if not address.startswith(f"{IN}/") or len(values) != 1:
+                raise ValueError
+            self._queue.put((time.monotonic(), {address[len(IN) :]: _number(values[0])}))
+        except ValueError:
+            self._refuse_message(f"{address} {' '.join(map(str, values))}"[:80])
+
+    def _refuse_message(self, found: str) -> None:
+        remedy = f"Send messages such as {IN}/Arm/Elbow with one float, in rad (m of sliders)."
+        self._refuse(SettingError("a message of OSC is no sample", path="--in", found=found, remedy=remedy))
 
     def arrived(self) -> list[Sample]:
-        """At most one sample, with all faders that moved."""
-        with self._lock:
-            values, self._values = self._values, {}
-        return [(time.monotonic(), values)] if values else []
+        """At most one sample, with the last values of all faders that moved."""
+        stamp, values = 0.0, dict[str, float]()
+        while not self._queue.empty():
+            stamp, moved = self._queue.get()
+            values |= moved
+        return [(stamp, values)] if values else []
 
     def close(self) -> None:
         """Close the port."""
-        self._server.shutdown()
-        self._server.server_close()
+        self._open = False
+        self._socket.close()
 
 
 class LineSink(Sink):
@@ -225,4 +257,11 @@ def osc_place(text: str, option: str) -> tuple[str, int] | None:
             found=text,
             remedy='Install it: pip install "python-osc>=1.9,<2".',
         ) from error
-    return place.hostname or "127.0.0.1", port
+    host = place.hostname or "127.0.0.1"
+    try:
+        found = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)
+    except OSError as error:
+        raise SettingError(
+            "no machine of this name is known", path=option, found=host, remedy="Name its address, such as 127.0.0.1."
+        ) from error
+    return str(found[0][4][0]), port

@@ -11,28 +11,36 @@ from calmotion.model import Animation
 
 from .lines import Sample, Sink, Source
 from .session import Live
+from .stream import Stream
 
 REST_S = 2.0  # after the end of a stream, until the robot rests
+LONGEST_PAUSE_S = 60.0  # by the stamps of a file
 SPIN_S = 2e-3  # before a tick, in which waiting does not sleep
 
 
-def play_stamps(live: Live, samples: Iterable[Sample], sink: Sink) -> None:
-    """Each tick with the samples whose stamps have come, as fast as they can be read: no clock changes the result."""
-    start, ticks, waiting = None, 0, iter(samples)
-    upcoming = next(waiting, None)
-    while upcoming is not None:
-        start = upcoming[0] if start is None else start
-        now = start + ticks * live.tick_s
-        while upcoming is not None and not upcoming[0] > now + 1e-3 * live.tick_s:
-            _give(live, *upcoming)
-            upcoming = next(waiting, None)
-        _tick(live, sink, now)
-        ticks += 1
-    live.end()
-    for _ in range(_ticks_to_rest(live)):
-        if start is not None:
-            _tick(live, sink, start + ticks * live.tick_s)
-            ticks += 1
+def play_stamps(live: Live, samples: Iterable[Sample], sink: Sink, seconds: float | None = None) -> None:
+    """Each tick with the samples whose stamps have come, as fast as they can be read: no clock changes the result.
+
+    A pause is played; a stamp that leaps back, or further than a pause, begins the clock anew.
+    """
+    most = np.inf if seconds is None else round(seconds / live.tick_s)
+    begin, ticks, last = None, 0, None
+    for stamp, joints in samples:
+        if ticks >= most:
+            break
+        if np.isfinite(stamp):
+            if begin is None or last is None or not -Stream.RESTART_S <= stamp - last <= LONGEST_PAUSE_S:
+                begin = stamp - ticks * live.tick_s
+            last = stamp
+            while ticks < most and stamp > begin + (ticks + 1e-3) * live.tick_s:
+                _tick(live, sink, begin + ticks * live.tick_s)
+                ticks += 1
+        _give(live, stamp, joints)
+    if begin is None:
+        return
+    for tick in range(ticks, ticks + 1 + _ticks_to_rest(live)):
+        _tick(live, sink, begin + tick * live.tick_s)
+        live.end()
 
 
 def play_clock(live: Live, source: Source, sink: Sink, seconds: float | None = None) -> None:
@@ -43,12 +51,12 @@ def play_clock(live: Live, source: Source, sink: Sink, seconds: float | None = N
             arrived = source.arrived() if left is None else []
             for sample in arrived or ():
                 _give(live, *sample)
-            _tick(live, sink, ticks * live.tick_s)
-            ticks += 1
             if arrived is None:
                 live.end()
             over = arrived is None or (seconds is not None and ticks * live.tick_s >= seconds)
             left = (_ticks_to_rest(live) if over else None) if left is None else left - 1
+            _tick(live, sink, ticks * live.tick_s)
+            ticks += 1
             _wait(begin + ticks * live.tick_s)
     finally:
         source.close()
@@ -76,7 +84,7 @@ def samples_of_animation(live: Live, animation: Animation) -> Iterator[Sample]:
 
 def _give(live: Live, time_s: float, joints: dict[str, float]) -> None:
     """A sample; joints that the robot does not have are left out, and counted."""
-    known = {path: value for path, value in joints.items() if path in live.joints}
+    known = {path: value for path, value in joints.items() if path in live.names}
     live.unknown.update(joints.keys() - known.keys())
     live.give(time_s, known)
 
@@ -87,7 +95,8 @@ def _tick(live: Live, sink: Sink, now: float) -> None:
 
 
 def _ticks_to_rest(live: Live) -> int:
-    return round((live.latency_s + live.settings.lookahead + REST_S) * live.settings.rate)
+    late = live.ahead_s + live.latency_s + 2.0 * live.settings.lookahead
+    return round((late + REST_S) * live.settings.rate)
 
 
 def _wait(until: float) -> None:

@@ -59,6 +59,7 @@ class Live:
 
     Attributes:
         joints: Paths of the motors' joints, the order of arrays.
+        names: Number in `joints` of each path, and of each last part of one that no other path has (`Elbow`, `/Elbow`).
         start: The pose of the first frame [rad or m], shape [M].
         tick_s: Time between two commands [s].
         character, model, world: The robot, as the engine has it; moving roots stand as in the first frame.
@@ -75,6 +76,9 @@ class Live:
         character = shot.character
         _refuse_unfit(shot, settings)
         self.joints = tuple(motor.path for motor in character.motors)
+        last = [path.rpartition("/")[2] for path in self.joints]
+        short = {name: k for k, name in enumerate(last) if last.count(name) == 1}
+        self.names = short | {f"/{name}": k for name, k in short.items()} | {p: k for k, p in enumerate(self.joints)}
         self.tick_s = 1.0 / settings.rate
         self._window_ticks = 1 + round(settings.lookahead * settings.rate)
         self.character, self.model = character, shot.model
@@ -107,6 +111,11 @@ class Live:
         return tuple(self.joints[k] for k in np.flatnonzero(self._acted >= 0))
 
     @property
+    def ahead_s(self) -> float:
+        """For how long there are samples that are not played yet [s]."""
+        return self._stream.ahead_s
+
+    @property
     def late(self) -> int:
         """Ticks without a sample in time, so far."""
         return self._stream.events["late"]
@@ -115,7 +124,7 @@ class Live:
         """Rest at a pose, and forget the stream.
 
         Args:
-            pose: Of all motors [rad or m], in the order of `joints` or by their paths.
+            pose: Of all motors [rad or m], in the order of `joints` or by `names`.
 
         Raises:
             SettingError: A joint that does not exist, or a pose of another size.
@@ -146,7 +155,7 @@ class Live:
 
         Args:
             time_s: Time of the sample by the sender's clock [s].
-            angles: Of the motors [rad or m]: an array in the order of `joints`, or a mapping from paths, in which
+            angles: Of the motors [rad or m]: an array in the order of `joints`, or a mapping from `names`, in which
                 joints that are left out stay; None where nothing has arrived.
 
         Returns:
@@ -165,9 +174,8 @@ class Live:
     def give(self, time_s: float, angles: Array | Mapping[str, float]) -> None:
         """A sample has arrived; see `step`. Several may arrive before a tick."""
         values = self._values(angles)
-        if np.all(np.isfinite(values)):
+        if self._stream.give(time_s, values):
             self._sample = values
-        self._stream.give(time_s, values)
 
     def end(self) -> None:
         """No sample will come any more; further ticks lead to rest."""
@@ -202,6 +210,8 @@ class Live:
         spent = np.array(self._spent) if self._spent else np.zeros(1)
         return {
             "ticks": self._ticks,
+            "samples": self._stream.count,
+            "sender_rate": self._stream.sender_rate,
             "latency_s": self.latency_s,
             "events": dict(self._stream.events),
             "unknown_joints": dict(self.unknown),
@@ -231,13 +241,13 @@ class Live:
         values = self._sample.copy()
         if isinstance(angles, Mapping):
             for path, value in angles.items():
-                if path not in self.joints:
+                if path not in self.names:
                     raise SettingError(
                         "the robot has no motor of this name",
                         path=path,
                         remedy=f"{nearest(path, self.joints)}Its motors are {', '.join(self.joints)}.",
                     )
-                values[self.joints.index(path)] = value
+                values[self.names[path]] = value
         else:
             given = np.asarray(angles, dtype=float)
             if given.shape != values.shape:
@@ -322,6 +332,9 @@ def _notes(shot: CompiledShot, forces: VelocityForces) -> tuple[str, ...]:
         found.append("centrifugal forces are left out: joints move freely or close chains")
     if any(np.isfinite(motor.max_torque) for motor in shot.character.motors):
         found.append("efforts are not limited: an error remains where the stream needs more than a motor has")
+    free = [motor.path.rpartition("/")[2] for motor in shot.character.motors if not np.isfinite(motor.max_velocity)]
+    if free:
+        found.append(f"a jump is played within a tick by motors without a limit of speed: {', '.join(free)}")
     delays = {motor.delay for motor in shot.character.motors if motor.model != PRESCRIBED}
     if len(delays) > 1:
         found.append("motors with different delays are taken as if all had the longest")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -11,13 +12,13 @@ from calmotion.multibody import Model, Workspace
 from calmotion.simulation import (
     CompiledShot,
     Prepared,
-    best_delay,
     rigid_motion,
     run_forward,
     sample_curves,
     static_motion,
 )
 from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize_scalar
 
 from .session import Live, LiveSettings
 
@@ -39,14 +40,15 @@ class Trial:
         angles, rates = self.curves.angles, self.curves.rates
         rigid = rigid_motion(prepared.model, angles, rates, self._grid.h, self._world, False)
         always = np.ones(len(self._grid.times), bool)
-        self._intended = static_motion(prepared.model, rigid, angles, always, self._world).target_positions
+        intended = static_motion(prepared.model, rigid, angles, always, self._world).target_positions
+        self._intended = CubicSpline(self._grid.times, intended)
 
     def left(self, angles: Array, rates: Array, delay: float | None) -> tuple[float, Array]:
         """What commands leave.
 
         Args:
             angles, rates: At the instants of the grid, shape [T, M].
-            delay: Of the commands [s]; None: the one with which they leave least.
+            delay: Of the commands [s]; None: the one with which the mean square is least.
 
         Returns:
             The delay [s], and distances of the targets from the delayed intended motion with the sag of each pose [m],
@@ -54,11 +56,15 @@ class Trial:
         """
         grid = self._grid
         workspace = Workspace.for_system(self._model.system)
-        found = run_forward(self._model, workspace, angles, rates, grid.h, self._world).target_positions
+        found = run_forward(self._model, workspace, angles, rates, grid.h, self._world).target_positions[grid.judged]
+
+        def distances(late: float) -> Array:
+            wanted = self._intended(np.maximum(grid.times[grid.judged] - late, grid.times[0]))
+            return np.asarray(np.linalg.norm(found - wanted, axis=2))
+
         if delay is None:
-            return best_delay(found, self._intended, grid.judged, grid.h)
-        late = np.maximum(np.arange(len(found)) - round(delay / grid.h), 0)
-        return delay, np.linalg.norm(found - self._intended[late], axis=2)[grid.judged]
+            delay = _lowest(lambda late: float(np.sum(distances(late) ** 2)))
+        return delay, distances(delay)
 
     def streamed(self, shot: CompiledShot, settings: LiveSettings) -> tuple[Array, Array, dict[str, Any]]:
         """The motion as a stream: commands and rates at the instants of the grid, shape [T, M], and the report."""
@@ -71,3 +77,10 @@ class Trial:
             report = live.report()
         played = CubicSpline(ticks, found)
         return played(times), played(times, 1), report
+
+
+def _lowest(error: Callable[[float], float]) -> float:
+    """The delay of least error [s]: the best of some, and then the lowest point next to it."""
+    apart, longest = 5e-3, 0.6
+    best = min(np.arange(0.0, longest, apart).tolist(), key=error)
+    return float(minimize_scalar(error, bounds=(max(best - apart, 0.0), best + apart), method="bounded").x)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from ..lines import Sink, Source
     from ..session import Live
 
+SLOWEST = 1.0  # samples a second of a sender whose stamps may be right
+
 EXAMPLES = (
     ("calmotion live robot.usda --table", "which look-ahead buys what?"),
     ("calmotion live robot.usda --rate 250 --lookahead 120", "JSON lines in and out"),
@@ -41,7 +43,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--sender-rate",
         metavar="HZ",
-        type=quantity("Hz"),
+        type=quantity("Hz", positive=True),
         help="samples a second of a sender that is slower than --rate; its motion is played two samples later",
     )
     command.add_argument(
@@ -94,9 +96,12 @@ def _milliseconds(text: str) -> float:
 
 
 def _share(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
     if not 0.0 <= value <= 0.5:
-        raise argparse.ArgumentTypeError(f"{text} is not a share from 0 to 0.5")
+        raise argparse.ArgumentTypeError(f"{text} is not a share from 0 to 0.5, such as 0.1")
     return value
 
 
@@ -114,6 +119,13 @@ def run(args: argparse.Namespace, output: Output) -> int:
     if args.json and not sends:
         raise SettingError(
             "standard output holds the commands", path="--json", remedy="Send them elsewhere: --out osc://HOST:PORT."
+        )
+    if listens and (args.replay or args.clock == "stamps"):
+        other = "--replay" if args.replay else "--clock"
+        raise SettingError(
+            "a stream of OSC comes by the clock of this machine, and is the only one",
+            path=other,
+            remedy=f"Leave {other} out, or --in.",
         )
     stamps = args.clock == "stamps" or (args.clock is None and listens is None and (args.replay or _is_file()))
     shot = opened_shot(args)
@@ -193,7 +205,7 @@ def _play(
     else:
         source = Lines(sys.stdin, waits=not stamps)
     if stamps:
-        play_stamps(robot, source.samples(), sink)
+        play_stamps(robot, source.samples(), sink, args.seconds)
     else:
         play_clock(robot, source, sink, args.seconds)
     return source
@@ -209,13 +221,24 @@ def _is_file() -> bool:
 
 def _tell(robot: Live, source: Source) -> None:
     """What happened, in a few words on standard error."""
+    from ..stream import BEYOND, RESTARTED
+
     report = robot.report()
+    rate = report["sender_rate"]
     events = ", ".join(f"{count} {name}" for name, count in sorted(report["events"].items()))
-    notice(f"{report['ticks']} ticks; samples: {events or 'all in time'}")
+    notice(f"{report['ticks']} ticks; {report['samples']} samples{': ' if events else ''}{events}")
     if source.fault:
-        notice(f"{source.faults} messages were left out; the first: {source.fault}")
+        were = "message was" if source.faults == 1 else "messages were"
+        notice(f"{source.faults} {were} left out; the first: {source.fault}")
+    restarts, asked = report["events"].get(RESTARTED, 0), robot.settings.sender_rate
+    if (rate and rate < SLOWEST) or restarts > 0.5 * report["samples"] > 1:
+        notice("the stamps of samples are far apart; stamps are in seconds")
+    elif rate and (rate < 0.8 * (asked or robot.settings.rate) or (asked and rate > 1.25 * asked)):
+        notice(f"the sender gave {rate:.3g} samples a second; --sender-rate {rate:.3g} follows them smoothly")
+    if BEYOND in report["events"]:
+        notice("samples beyond the limits of the joints were taken as at the limits; angles are in radians")
     for path, count in report["unknown_joints"].items():
-        notice(f"{path} came {count} times, and the robot has no such motor")
+        notice(f"samples with {path}: {count}; the robot has no such motor, it has {', '.join(robot.joints)}")
     for path, count in report["limited"].items():
         notice(f"{path} was at a limit for {count} ticks")
     spent = report["tick_s"]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import socket
+import subprocess
 import time
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from calmotion.host import SettingError
 from one_hinge import ONE_HINGE
 from recordings import read_recording
 
@@ -43,8 +45,48 @@ def test_lines_of_a_file_become_commands_as_fast_as_they_are_read(calmotion_proc
     found = [row["joints"][joint] for row in rows]
     np.testing.assert_allclose(found[late:500], [s["joints"][joint] for s in samples[: 500 - late]], atol=1e-9)
     assert rows[-1]["late"] == 0 and abs(found[-1] - found[-100]) < 1e-9
-    assert "3 messages were left out" in done.stderr and "/No/Joint came 500 times" in done.stderr
+    assert "3 messages were left out" in done.stderr and "/No/Joint: 500" in done.stderr
     assert "80 ms behind" in done.stderr
+
+
+def lines(count, rate, start=0.0, name=JOINT, speed=0.1):
+    """A stream of one joint that turns evenly."""
+    rows = [{"t": start + k / rate, "joints": {name: speed * k / rate}} for k in range(count)]
+    return "".join(json.dumps(row) + "\n" for row in rows)
+
+
+@pytest.mark.parametrize(
+    "text, options, said, end",
+    [
+        ("\ufeff" + lines(300, 250, name="SHORT") * 2, (), "600 samples: 1 restarted", 0.1 * 299 / 250),
+        (lines(100, 50), (), "--sender-rate 50 follows them smoothly", 0.1 * 99 / 50),
+        (lines(20, 0.25, speed=1e-4), ("--seconds", "40"), "stamps are in seconds", 1e-4 * 40),
+        ('{"t": 0, "joints": {"J": "1"}}\n{"t": true, "joints": {}}\n\udcff\n', (), "3 messages were left out", None),
+        (lines(300, 250).replace("0.004,", "1e999,"), (), "1 not finite", 0.1 * 299 / 250),
+    ],
+    ids="restart slow ms text infinite".split(),
+)
+def test_what_is_odd_about_a_stream_is_told(calmotion_process, shot, joint, tmp_path, text, options, said, end):
+    text = text.replace(JOINT, joint).replace("SHORT", joint.rpartition("/")[2])
+    (tmp_path / "in.jsonl").write_bytes(text.encode("utf-8", "surrogateescape"))
+    with (tmp_path / "in.jsonl").open() as file:
+        done = calmotion_process("live", shot, "--lookahead", "40", "--quiet", *options, stdin=file)
+    assert done.returncode == 0 and said in done.stderr, done.stderr
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    if end is not None:
+        assert rows[-1]["joints"][joint] == pytest.approx(end, abs=1e-9)
+
+
+def test_a_file_through_a_pipe_is_played_by_its_stamps(calmotion_process, shot, joint, tmp_path):
+    (tmp_path / "in.jsonl").write_text(lines(250, 250, name=joint))
+    with subprocess.Popen(["cat", tmp_path / "in.jsonl"], stdout=subprocess.PIPE) as cat:
+        done = calmotion_process("live", shot, "--lookahead", "40", "--quiet", stdin=cat.stdout)
+    assert "250 samples" in done.stderr and "without a limit of speed: Hinge" in done.stderr, done.stderr
+    found = np.array([json.loads(line)["joints"][joint] for line in done.stdout.splitlines()])
+    # the thread that reads may begin some ticks after the player
+    moving = found[np.argmax(found > 0.01) :][:150]
+    np.testing.assert_allclose(np.diff(moving), 0.1 / 250, atol=1e-6)
+    assert found[-1] == pytest.approx(0.1 * 249 / 250, abs=1e-9)
 
 
 def test_the_animation_of_a_shot_is_played_as_a_stream(calmotion, shot):
@@ -83,6 +125,9 @@ def test_a_table_tells_what_look_aheads_are_worth(calmotion, shot, command):
         (("--in", "udp://x"), "no place of a stream"),
         (("--rate", "5"), "no rate of commands"),
         (("--json",), "standard output holds the commands"),
+        (("--in", "osc://127.0.0.1:9000", "--clock", "stamps"), "by the clock of this machine"),
+        (("--in", "osc://no.such.machine.invalid:9000"), "no machine of this name"),
+        (("--uncertainty", "x"), "is not a share"),
     ],
 )
 def test_options_that_do_not_fit_are_refused(calmotion, shot, options, said):
@@ -100,15 +145,21 @@ def test_faders_over_osc_arrive_and_leave_on_this_machine():
     place = osc_place(f"osc://127.0.0.1:{port}", "--in")
     assert place == ("127.0.0.1", port) and osc_place("-", "--in") is None
     source, sink = OscSource(*place), OscSink(*place)
+    arrived = {}
     try:
+        with pytest.raises(SettingError, match="port cannot be opened"):
+            OscSource(*place)
         # what is sent as commands would be, to the address of samples
-        sink._client.send_message(f"/calm/in{JOINT}", 0.25)
+        for values in (True, "x", [0.1, 0.2], 0.1, 0.2, 0.25):
+            sink._client.send_message(f"/calm/in{JOINT}", values)
+        sink._client._sock.sendto(b"no message", place)
         sink.send(0.0, {JOINT: 0.5}, SimpleNamespace(late=0, limited=()))
         for _ in range(200):
-            if arrived := source.arrived():
+            arrived |= dict(pair for _, joints in source.arrived() for pair in joints.items())
+            if source.faults == 5:
                 break
             time.sleep(0.01)
-        assert arrived[0][1] == {JOINT: 0.25}
+        assert arrived == {JOINT: 0.25} and source.faults == 5 and "with one float" in source.fault
     finally:
         source.close()
 
