@@ -150,7 +150,7 @@ REFUSED = {
     "a layer of another name": (
         ("optimize", SHOT, "--quiet"), ("-o", "calm.txt"), r"extension (\.usda)", ("-o", "calm$1"),
     ),
-    "a shaper that is not there": (SIMULATE, ("--shaper", "xyz"), "supports only .*(lowpass)", ("--shaper", "$1")),
+    "a shaper that is not there": (SIMULATE, ("--shaper", "xyz"), "Remove the option", ()),
     "a format that is not there": (EXPORT, ("--to", "nothing"), "Use one of .*(keyframes)", ("--to", "$1")),
     "a controller of other robots": (EXPORT, ("--to", "ur"), "Use ros2 or (csv)", ("--to", "$1")),
     "a material that is not there": (("materials",), ("wood",), "Use ([a-z]+),", ("$1",)),
