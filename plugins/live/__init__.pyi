@@ -11,7 +11,7 @@ from .lookahead import Worth as Worth
 from .lookahead import worth_of_lookahead as worth_of_lookahead
 from .opening import live as live
 from .session import Live as Live
-from .session import LiveSettings as LiveSettings
+from .settings import LiveSettings as LiveSettings
 from .stream import Stream as Stream
 from .trial import Trial as Trial
 

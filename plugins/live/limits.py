@@ -8,7 +8,8 @@ import numpy as np
 from calmotion.arrays import Array, IntArray
 from calmotion.model import Character
 
-NAMES = ("position", "velocity", "acceleration")
+NAMES = ("position", "velocity", "acceleration", "effort")
+EFFORT = NAMES.index("effort")  # which is told, not kept
 
 
 def braking_speed(distance: Array, acceleration: Array, tick: float) -> Array:

@@ -9,7 +9,7 @@ from calmotion.arrays import Array
 from calmotion.model import RunSettings
 from calmotion.simulation import CompiledShot, modes_of, prepare
 
-from .session import LiveSettings
+from .settings import LiveSettings
 from .trial import Trial
 
 

@@ -11,7 +11,8 @@ from calmotion.simulation import CompiledShot
 from calmotion.tolerance import compiled_in
 from calmotion.workflow import Hooks, Shot, compiled_run
 
-from .session import Live, LiveSettings
+from .session import Live
+from .settings import LiveSettings
 
 
 def live(

@@ -24,17 +24,19 @@ class Window:
         """Rest at a pose."""
         count, self.positions = len(position), np.tile(position, (self._ticks + 2, 1))
         self.rates, self.accelerations = np.zeros((2, self._ticks, count))
-        self.forces = np.tile(self._forces.at(position, np.zeros(count)), (self._ticks, 1))
+        moving, rest = self._forces.both(position, np.zeros(count))
+        self.forces, self.with_weight = np.tile(moving - rest, (self._ticks, 1)), np.tile(moving, (self._ticks, 1))
 
     def push(self, position: Array) -> None:
         """The intended position of the newest tick, shape [M]; the oldest tick leaves."""
-        for rows in (self.positions, self.rates, self.accelerations, self.forces):
+        for rows in (self.positions, self.rates, self.accelerations, self.forces, self.with_weight):
             rows[:-1] = rows[1:]
         self.positions[-1] = position
         before, at, after = self.positions[-3:]
         self.rates[-1] = (after - before) / (2.0 * self._tick)
         self.accelerations[-1] = (after - 2.0 * at + before) / self._tick**2
-        self.forces[-1] = self._forces.at(at, self.rates[-1])
+        self.with_weight[-1], rest = self._forces.both(at, self.rates[-1])
+        self.forces[-1] = self.with_weight[-1] - rest
 
     @property
     def played(self) -> Array:
@@ -54,6 +56,10 @@ class Regulator:
         coupling: Of all motors with those that may deviate, shape [M, m].
         deviating: The latter, shape [m].
         limits: Of all motors.
+
+    Attributes:
+        command: Of the tick, shape [M].
+        efforts: Of the motors in the tick, as the linear model has them, shape [M].
     """
 
     def __init__(self, coupling: Array, deviating: IntArray, limits: MotorLimits):
@@ -64,6 +70,7 @@ class Regulator:
         """Rest at a pose."""
         self._gains, self._x = gains, np.zeros(len(gains.transition))
         self.command, self._speed = np.array(position, float), np.zeros(len(position))
+        self.efforts = np.zeros(len(position))
 
     def use(self, gains: Gains) -> None:
         """Go on in the modes of another pose."""
@@ -86,7 +93,17 @@ class Regulator:
         asked = intended + self._coupling @ (self._x[m : 2 * m] + wanted)
         self._speed, acted = self._limits.kept(self.command, self._speed, asked)
         change = (self._speed - intended)[self._deviating] - self._x[m : 2 * m]
+        before = self._x
         self._x = gains.transition @ self._x + gains.by_change @ change + gains.by_impulse @ impulses[0]
+        rates = self._rates(window.rates[0], gains, self._x)
+        accelerations = self._rates(window.accelerations[0], gains, (self._x - before) / h)
+        self.efforts = gains.pose.efforts(rates, accelerations, window.with_weight[0])
         self._x[:m] = (self.command + h * self._speed - window.next)[self._deviating]
         self.command = window.next + self._coupling @ self._x[:m]
         return self.command, acted
+
+    def _rates(self, intended: Array, gains: Gains, x: Array) -> Array:
+        """Of all motors and of the amplitudes of the robot of the model in a state, shape [M + n]."""
+        m = len(self._deviating)
+        modal = x[2 * m :].reshape(2, gains.robots, -1)[1, gains.robots // 2]
+        return np.concatenate([intended + self._coupling @ x[m : 2 * m], modal])

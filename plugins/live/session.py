@@ -5,50 +5,24 @@ from __future__ import annotations
 import time
 from collections import Counter, deque
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
 from calmotion.host import SettingError, nearest
-from calmotion.model import PRESCRIBED, RunSettings, contact_joints, tolerance_of
+from calmotion.model import PRESCRIBED, RunSettings, tolerance_of
 from calmotion.multibody import SimulationFailure, VelocityForces, pose_model
 from calmotion.simulation import CompiledShot, coupling_of, leaders, prepare
 
 from .gains import Gains, Weighting, gains_at
-from .limits import MotorLimits
+from .limits import EFFORT, MotorLimits
 from .regulator import Regulator, Window
 from .renewal import Renewal
+from .settings import LiveSettings, notes_of, refuse_unfit
 from .stream import Stream
 
 Angles = TypeVar("Angles", Array, Mapping[str, float], None)
-
-
-@dataclass(frozen=True)
-class LiveSettings:
-    """How a stream is played.
-
-    Attributes:
-        rate: Commands a second [Hz].
-        lookahead: How late the robot may answer [s].
-        sender_rate: Samples a second of the sender [Hz]; None: one for each command.
-        uncertainty: Share by which the frequencies of the robot are not known.
-        tolerance: Error at the targets that is worth an effort [m]; None: the shot's.
-        background: Whether a thread renews the gains; else `step` does, at fixed ticks: slower, but repeatable.
-    """
-
-    ACCELERATION = 100.0  # of a motor without a limit, which is worth the tolerance [rad/s^2 or m/s^2]
-    PENALTY = 1.0  # of a deviating acceleration at its limit, in tolerances
-    HIGHEST = 1 / 3  # frequency of a mode that commands can act on, of the rate
-    RENEWAL_S = 0.04  # between two renewals without a thread
-
-    rate: float = 250.0
-    lookahead: float = 0.12
-    sender_rate: float | None = None
-    uncertainty: float = 0.0
-    tolerance: float | None = None
-    background: bool = True
 
 
 class Live:
@@ -74,7 +48,7 @@ class Live:
     def __init__(self, shot: CompiledShot, settings: LiveSettings | None = None):
         self.settings = settings = settings or LiveSettings()
         character = shot.character
-        _refuse_unfit(shot, settings)
+        refuse_unfit(shot, settings)
         self.joints = tuple(motor.path for motor in character.motors)
         last = [path.rpartition("/")[2] for path in self.joints]
         short = {name: k for k, name in enumerate(last) if last.count(name) == 1}
@@ -95,7 +69,9 @@ class Live:
         self._regulator = Regulator(self._coupling, self._deviating, self._limits)
         self._renewal = Renewal(self._gains, settings.background)
         self._delay = max((motor.delay for motor in character.motors if motor.model != PRESCRIBED), default=0.0)
-        self.notes = _notes(shot, forces)
+        most = np.array([motor.max_torque for motor in character.motors])
+        self._most = most if forces.known else np.full(len(most), np.inf)
+        self.notes = notes_of(shot, forces)
         self.start = np.array([float(np.interp(0.0, track.times, track.values)) for track in shot.animation.current])
         self.reset(self.start)
         self._refuse_slow()
@@ -107,7 +83,7 @@ class Live:
 
     @property
     def limited(self) -> tuple[str, ...]:
-        """Joints at whose limits the last commands were kept."""
+        """Joints at whose limits the last commands were kept, or whose motors have less effort than they need."""
         return tuple(self.joints[k] for k in np.flatnonzero(self._acted >= 0))
 
     @property
@@ -148,6 +124,7 @@ class Live:
         self._counts: Counter[int] = Counter()
         self.unknown: Counter[str] = Counter()
         self._ticks, self._since, self._largest = 0, 0, 0.0
+        self._needed = np.zeros(len(self.joints))
         self._spent: deque[float] = deque(maxlen=20_000)
 
     def step(self, time_s: float, angles: Angles) -> Angles | Array:
@@ -189,6 +166,9 @@ class Live:
         if gains is not None:
             self._regulator.use(gains)
         commands, self._acted = self._regulator.advance(self._window)
+        needed = np.abs(self._regulator.efforts) / self._most
+        self._needed = np.maximum(self._needed, needed)
+        self._acted[needed > 1.0] = EFFORT
         self._counts.update(np.flatnonzero(self._acted >= 0).tolist())
         self._ticks += 1
         self._since += 1
@@ -216,6 +196,7 @@ class Live:
             "events": dict(self._stream.events),
             "unknown_joints": dict(self.unknown),
             "limited": {self.joints[k]: count for k, count in sorted(self._counts.items())},
+            "too_weak": {self.joints[k]: float(self._needed[k]) for k in np.flatnonzero(self._needed > 1.0)},
             "largest_deviation": self._largest,
             "renewals": self._renewal.done,
             "renewals_failed": self._renewal.failed,
@@ -298,44 +279,3 @@ class Live:
                 found=f"{self.settings.rate:g} Hz",
                 remedy=f"Use at most {0.5 / needed:.0f} Hz; a shorter look-ahead or fewer flexible links are faster.",
             )
-
-
-def _refuse_unfit(shot: CompiledShot, settings: LiveSettings) -> None:
-    character, contacts = shot.character, contact_joints(shot.character)
-    if contacts:
-        raise ShotError(
-            "a robot whose feet come and go cannot be calmed live: where they stand later is not known",
-            path=character.joints[contacts[0]].path,
-            remedy="Fix the feet to the ground, or use calmotion optimize on the whole motion.",
-        )
-    if not 10.0 <= settings.rate <= 2000.0:
-        raise SettingError(
-            "the rate is no rate of commands",
-            path="--rate",
-            found=f"{settings.rate:g} Hz",
-            remedy="Use 10 to 2000 Hz; most controllers take 50 to 500.",
-        )
-    if not 0.0 <= settings.lookahead <= 5.0:
-        raise SettingError(
-            "the look-ahead is not within 0 and 5 s",
-            path="--lookahead",
-            found=f"{settings.lookahead:g} s",
-            remedy="Use a third of the longest period of the robot, such as 120ms; see calmotion inspect --modes.",
-        )
-
-
-def _notes(shot: CompiledShot, forces: VelocityForces) -> tuple[str, ...]:
-    found = []
-    if shot.animation.moving:
-        found.append("the moving root stays where it is in the first frame")
-    if not forces.known:
-        found.append("centrifugal forces are left out: joints move freely or close chains")
-    if any(np.isfinite(motor.max_torque) for motor in shot.character.motors):
-        found.append("efforts are not limited: an error remains where the stream needs more than a motor has")
-    free = [motor.path.rpartition("/")[2] for motor in shot.character.motors if not np.isfinite(motor.max_velocity)]
-    if free:
-        found.append(f"a jump is played within a tick by motors without a limit of speed: {', '.join(free)}")
-    delays = {motor.delay for motor in shot.character.motors if motor.model != PRESCRIBED}
-    if len(delays) > 1:
-        found.append("motors with different delays are taken as if all had the longest")
-    return tuple(found)

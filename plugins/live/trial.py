@@ -20,7 +20,8 @@ from calmotion.simulation import (
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
-from .session import Live, LiveSettings
+from .session import Live
+from .settings import LiveSettings
 
 
 class Trial:

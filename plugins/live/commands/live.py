@@ -111,7 +111,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
     from ..lines import LineSink, OscSink, osc_place
     from ..opening import live
-    from ..session import LiveSettings
+    from ..settings import LiveSettings
 
     if args.table:
         return worth_of_lookahead(args, output)
@@ -168,7 +168,7 @@ def worth_of_lookahead(args: argparse.Namespace, output: Output) -> int:
 
     from ..lookahead import cells, worth_of_lookahead
     from ..opening import compiled
-    from ..session import LiveSettings
+    from ..settings import LiveSettings
 
     asked = LiveSettings(rate=getattr(args, "rate", 250.0), uncertainty=getattr(args, "uncertainty", 0.0))
     shot = opened_shot(args)
@@ -241,5 +241,7 @@ def _tell(robot: Live, source: Source) -> None:
         notice(f"samples with {path}: {count}; the robot has no such motor, it has {', '.join(robot.joints)}")
     for path, count in report["limited"].items():
         notice(f"{path} was at a limit for {count} ticks")
+    for path, share in report["too_weak"].items():
+        notice(f"{path} needed up to {share:.2f} times the effort that its motor has")
     spent = report["tick_s"]
     notice(f"a tick took {1e3 * spent['median']:.2f} ms, 99% of them less than {1e3 * spent['p99']:.2f} ms")

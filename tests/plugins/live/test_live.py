@@ -19,6 +19,7 @@ from calmotion.simulation import (
     run_forward,
     shaped,
 )
+from calmotion.simulation.forward import PerformedCurves
 from calmotion.testing import small_shot
 from calmotion_plugins.live import Live, LiveSettings, worth_of_lookahead
 from scipy.interpolate import CubicSpline
@@ -114,6 +115,21 @@ def test_the_table_of_look_aheads_tells_what_a_simulation_finds(stream):
     assert latency == row.latency_s
     found = left(shot, CubicSpline(ticks, commands), intended, times, latency)
     assert row.rms_m == pytest.approx(found, rel=0.1) and found < 0.2 * rows[0].rms_m
+
+
+@pytest.mark.parametrize("motor", [{}, GIVES])
+def test_efforts_that_a_motor_does_not_have_are_told(stream, motor):
+    motion, _, ticks, times = stream
+    shot = robot(motor, max_torque=10.0)
+    commands, _, report = streamed(shot, motion, 6.0, lookahead=0.08)
+    curve, model = CubicSpline(ticks, commands), shot.model
+    h = times[1] - times[0]
+    run = run_forward(model, Workspace.for_system(model.system), curve(times), curve(times, 1), h)
+    largest = np.abs(PerformedCurves(model, Curves((curve(times),)), run).efforts).max(axis=0)
+    told = [report["too_weak"].get(motor.path, 0.0) for motor in shot.character.motors]
+    assert largest[0] > 10.0 > largest[1], "one motor is too weak"
+    assert told == [pytest.approx(largest[0] / 10.0, rel=0.05), 0.0]
+    assert list(report["limited"]) == [shot.character.motors[0].path]
 
 
 def test_after_the_stream_rests_the_commands_are_its_own(stream):

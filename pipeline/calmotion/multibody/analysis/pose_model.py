@@ -34,6 +34,9 @@ class PoseModel:
         targets_by_mode: Shape [K, 6, n].
         shapes: Modes of mass one in all N coordinates of the components, shape [N, n].
         momenta: Mass matrix times shapes, shape [N, n].
+        by_input: Motion of the equilibrium with the inputs, shape [N, M].
+        inertia: Mass matrix in the inputs [kg m^2], shape [M, M].
+        resistance: Efforts by the rates of the inputs and of the amplitudes, as of viscous friction, shape [M, M + n].
     """
 
     omega: Array
@@ -44,10 +47,23 @@ class PoseModel:
     targets_by_mode: Array
     shapes: Array
     momenta: Array
+    by_input: Array
+    inertia: Array
+    resistance: Array
 
     def amplitudes_of(self, other: PoseModel) -> Array:
         """The matrix from amplitudes in another pose to those of the same motion in this one, shape [n, n of other]."""
         return np.asarray(self.momenta.T @ other.shapes)
+
+    def efforts(self, rates: Array, accelerations: Array, forces: Array) -> Array:
+        """Of the motors [N m or N], shape [M].
+
+        Args:
+            rates, accelerations: Of the inputs and, behind them, of the amplitudes, shape [M + n].
+            forces: `VelocityForces.with_weight`, shape [N].
+        """
+        by_acceleration = np.concatenate([self.inertia, -self.by_acceleration.T], axis=1)
+        return np.asarray(by_acceleration @ accelerations + self.resistance @ rates + forces @ self.by_input)
 
 
 def pose_model(model: Model, values: Array, world: Array | None = None, highest: float = np.inf) -> PoseModel:
@@ -86,6 +102,9 @@ def pose_model(model: Model, values: Array, world: Array | None = None, highest:
         targets_by_mode=J @ shapes,
         shapes=shapes,
         momenta=found.mass @ shapes,
+        by_input=follows,
+        inertia=follows.T @ found.mass @ follows,
+        resistance=follows.T @ np.concatenate([found.damping @ follows + on_rate, found.damping @ shapes], axis=1),
     )
 
 

@@ -43,15 +43,15 @@ class VelocityForces:
         Args:
             values, rates: Of the motors' inputs [rad or m], shape [M] each.
         """
-        moving, rest = self._both(values, rates)
+        moving, rest = self.both(values, rates)
         return moving - rest
 
     def with_weight(self, values: Array, rates: Array) -> Array:
         """The forces of `at` and, against it, the weight of the undeformed robot, shape [N]."""
-        return self._both(values, rates)[0]
+        return self.both(values, rates)[0]
 
-    def _both(self, values: Array, rates: Array) -> tuple[Array, Array]:
-        """The residuals of the moving robot, and at rest."""
+    def both(self, values: Array, rates: Array) -> tuple[Array, Array]:
+        """`with_weight` of the moving robot, and at rest: their difference is `at`."""
         if not self.known:
             return (np.zeros(int(self._sizes.sum())),) * 2
         model, h = self._model, self.DISTANCE_S

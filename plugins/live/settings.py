@@ -1,0 +1,85 @@
+"""How a stream is played, and what that leaves out for a robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from calmotion.errors import ShotError
+from calmotion.host import SettingError
+from calmotion.model import PRESCRIBED, contact_joints
+from calmotion.multibody import VelocityForces
+from calmotion.simulation import CompiledShot
+
+
+@dataclass(frozen=True)
+class LiveSettings:
+    """How a stream is played.
+
+    Attributes:
+        rate: Commands a second [Hz].
+        lookahead: How late the robot may answer [s].
+        sender_rate: Samples a second of the sender [Hz]; None: one for each command.
+        uncertainty: Share by which the frequencies of the robot are not known.
+        tolerance: Error at the targets that is worth an effort [m]; None: the shot's.
+        background: Whether a thread renews the gains; else `step` does, at fixed ticks: slower, but repeatable.
+    """
+
+    ACCELERATION = 100.0  # of a motor without a limit, which is worth the tolerance [rad/s^2 or m/s^2]
+    PENALTY = 1.0  # of a deviating acceleration at its limit, in tolerances
+    HIGHEST = 1 / 3  # frequency of a mode that commands can act on, of the rate
+    RENEWAL_S = 0.04  # between two renewals without a thread
+
+    rate: float = 250.0
+    lookahead: float = 0.12
+    sender_rate: float | None = None
+    uncertainty: float = 0.0
+    tolerance: float | None = None
+    background: bool = True
+
+
+def refuse_unfit(shot: CompiledShot, settings: LiveSettings) -> None:
+    """Refuse what cannot be streamed to.
+
+    Raises:
+        ShotError, SettingError: As of `Live`.
+    """
+    character, contacts = shot.character, contact_joints(shot.character)
+    if contacts:
+        raise ShotError(
+            "a robot whose feet come and go cannot be calmed live: where they stand later is not known",
+            path=character.joints[contacts[0]].path,
+            remedy="Fix the feet to the ground, or use calmotion optimize on the whole motion.",
+        )
+    if not 10.0 <= settings.rate <= 2000.0:
+        raise SettingError(
+            "the rate is no rate of commands",
+            path="--rate",
+            found=f"{settings.rate:g} Hz",
+            remedy="Use 10 to 2000 Hz; most controllers take 50 to 500.",
+        )
+    if not 0.0 <= settings.lookahead <= 5.0:
+        raise SettingError(
+            "the look-ahead is not within 0 and 5 s",
+            path="--lookahead",
+            found=f"{settings.lookahead:g} s",
+            remedy="Use a third of the longest period of the robot, such as 120ms; see calmotion inspect --modes.",
+        )
+
+
+def notes_of(shot: CompiledShot, forces: VelocityForces) -> tuple[str, ...]:
+    """What is left out for a robot."""
+    found = []
+    if shot.animation.moving:
+        found.append("the moving root stays where it is in the first frame")
+    if not forces.known:
+        found.append("centrifugal forces are left out: joints move freely or close chains")
+        if any(np.isfinite(motor.max_torque) for motor in shot.character.motors):
+            found.append("efforts are not known either, so that nothing tells where a motor has too little")
+    free = [motor.path.rpartition("/")[2] for motor in shot.character.motors if not np.isfinite(motor.max_velocity)]
+    if free:
+        found.append(f"a jump is played within a tick by motors without a limit of speed: {', '.join(free)}")
+    delays = {motor.delay for motor in shot.character.motors if motor.model != PRESCRIBED}
+    if len(delays) > 1:
+        found.append("motors with different delays are taken as if all had the longest")
+    return tuple(found)
