@@ -47,7 +47,7 @@ def plots_of(calibration: Calibration) -> Iterator[tuple[str, str, Figure]]:
         some = calibration.curves[first : first + CHANNELS_ON_A_PAGE]
         name = "measured" if len(calibration.curves) <= CHANNELS_ON_A_PAGE else f"measured_{page}"
         yield name, "Measured and simulated", plot_signals(some)
-    yield "residual_spectra", "Spectra of what is not explained", plot_residual_spectra(calibration.curves)
+    yield "residual_spectra", "Spectra of the remaining difference", plot_residual_spectra(calibration.curves)
     yield "intervals", "Parameters", plot_intervals(calibration)
 
 

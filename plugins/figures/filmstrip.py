@@ -21,8 +21,7 @@ from calmotion.views import (
     draw_over_ghost,
     fit_camera,
     floor_below,
-    moving_cloud,
-    near_scenery,
+    framed,
     new_figure,
     prepare,
     sample_motion,
@@ -66,9 +65,8 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
     reference = sample_motion(result.reference, times)
     motions = [sample_motion(run.motion, times) for run, _, _ in runs]
     every = (result.reference, *(run.motion for run, _, _ in runs))
-    clouds = [moving_cloud(character, result.skins, motion) for motion in (reference, *motions)]
-    cloud = np.concatenate([*clouds, *(trail_of(motion, time).reshape(-1, 3) for motion in every for time in times)])
-    cloud = np.concatenate([cloud, near_scenery(character, cloud)])
+    trails = np.concatenate([trail_of(motion, time).reshape(-1, 3) for motion in every for time in times])
+    cloud = framed(view, character, result.skins, (reference, *motions), trails)
     probe = fit_camera(view, cloud, PANEL, PANEL, 0.0).project(cloud)[:, :2]
     aspect = float(np.clip(np.ptp(probe[:, 1]) / max(np.ptp(probe[:, 0]), 1e-9), 0.35, 1.8))
     camera = fit_camera(view, cloud, SMOOTH * PANEL, round(SMOOTH * PANEL * aspect))

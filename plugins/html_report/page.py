@@ -50,7 +50,7 @@ def page_of(content: PageContent, plots: Sequence[tuple[str, Figure]], scene: di
     """The text of a page."""
     first, *others = content.sections or (Section("", ()),)
     said = [part for part in first.parts if isinstance(part, str)]
-    tables = Section("Errors" if scene else first.title, tuple(p for p in first.parts if isinstance(p, TextTable)))
+    tables = Section("Result in numbers", tuple(p for p in first.parts if isinstance(p, TextTable)))
     sections = [section for section in (tables, *others) if section.parts]
     charts, arrays = charts_of(plots), {}
     for name, data in (("scene", scene), ("charts", charts)):
@@ -62,7 +62,7 @@ def page_of(content: PageContent, plots: Sequence[tuple[str, Figure]], scene: di
     parts = {
         "title": escape(content.title),
         "version": escape(str(content.provenance.get("versions", {}).get("calmotion", ""))),
-        "verdict": "".join(f"<p>{escape(sentence)}</p>" for sentence in said),
+        "verdict": "".join(map(_paragraph, said)),
         "sections": "".join(_section(section) for section in sections),
         "provenance": _provenance(content.provenance),
         "data": json.dumps(data, allow_nan=False, separators=(",", ":")).replace("</", "<\\/"),
@@ -101,13 +101,22 @@ def three() -> str:
 
 
 def _section(section: Section) -> str:
-    parts = "".join(_table(part) if isinstance(part, TextTable) else f"<p>{escape(part)}</p>" for part in section.parts)
+    parts = "".join(_table(part) if isinstance(part, TextTable) else _paragraph(part) for part in section.parts)
     return f"<section><h2>{escape(section.title)}</h2>{parts}</section>"
+
+
+def _paragraph(text: str) -> str:
+    """A line of a report as a sentence; below the heading of the simplifications, their mark says nothing."""
+    text = text.removeprefix("simplified: ")
+    first = text.split(" ", 1)[0].rstrip(",:")
+    text = text[:1].upper() + text[1:] if first.isalpha() and first.islower() else text
+    return f"<p>{_divisible(text if text.endswith(('.', '!', '?')) else text + '.')}</p>"
 
 
 def _table(table: TextTable) -> str:
     columns = [[row[n] for row in table.rows] for n in range(len(table.columns))]
     kinds = ["text" if n < table.texts or _has_words(cells) else "number" for n, cells in enumerate(columns)]
+    kinds = ["hash" if column == "SHA-256" else kind for kind, column in zip(kinds, table.columns, strict=True)]
     head = "".join(f'<th class="{kind}">{escape(cell)}</th>' for kind, cell in zip(kinds, table.columns, strict=True))
     divided = [zip(kinds, map(_divisible, row), strict=True) for row in table.rows]
     rows = "".join("<tr>" + "".join(f'<td class="{k}">{cell}</td>' for k, cell in row) + "</tr>" for row in divided)
@@ -117,8 +126,8 @@ def _table(table: TextTable) -> str:
 
 
 def _divisible(text: str) -> str:
-    """Text whose paths a narrow cell breaks after slashes, not within names."""
-    return escape(text).replace("/", "/<wbr>")
+    """Text whose paths and names a narrow screen breaks after slashes, dots and underscores, not within words."""
+    return re.sub(r"(?<=[^\d\s])([/._])(?=\w)", r"\g<0><wbr>", escape(text))
 
 
 def _has_words(cells: Sequence[str]) -> bool:

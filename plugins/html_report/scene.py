@@ -12,9 +12,8 @@ from calmotion.support import distinct_names
 from calmotion.views import (
     choose_viewpoint,
     floor_below,
+    framed,
     modes_of,
-    moving_cloud,
-    near_scenery,
     prepare,
     sample_motion,
     split_at_creases,
@@ -97,8 +96,7 @@ def _described(
 def _view(character: Character, result: Result, reference: Motion, runs: list[Motion]) -> dict[str, Any]:
     """From where the scene is seen, the sphere that has to be in the picture, and the floor."""
     view = choose_viewpoint(character, result.skins, runs[0])
-    cloud = np.concatenate([moving_cloud(character, result.skins, motion) for motion in runs])
-    cloud = np.concatenate([cloud, near_scenery(character, cloud)])
+    cloud = framed(view, character, result.skins, runs)
     center = 0.5 * (cloud.min(axis=0) + cloud.max(axis=0))
     return {
         "center": center.tolist(),

@@ -50,7 +50,9 @@ class ReadTable(Operator):
         tracks = motion.tracks
         for note in motion.notes:
             context.report("info", note)
-        context.report("info", f"{path}: {len(tracks.values)} joints, {tracks.times[-1]:.4g} s")
+        context.report(
+            "info", f"{path}: {len(tracks.values)} joint{'s' * (len(tracks.values) > 1)}, {tracks.times[-1]:.4g} s"
+        )
         last = len(tracks.times) - 1
         if values.rate > 0.0 and abs(tracks.times[-1] * values.rate - last) > 0.01 * last:
             context.report("info", f"{path}: the table has times, so that motion.read.rate is not used")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import rerun.blueprint as rrb
 from calmotion.model import Animation, Character, Motor, Result, Simulation, measure_of
-from calmotion.views import choose_viewpoint, eye_that_sees, moving_cloud, near_scenery, sample_motion
+from calmotion.views import choose_viewpoint, eye_that_sees, framed, sample_motion
 
 from .colors import BACKGROUND, Style
 
@@ -76,9 +76,7 @@ def choose_eye(character: Character, animation: Animation, result: Result) -> rr
     runs = [result.reference, *(run.motion for run in (result.before, result.after) if run is not None)]
     motions = [sample_motion(motion, times) for motion in runs]
     view = choose_viewpoint(character, result.skins, motions[1])
-    cloud = np.concatenate([moving_cloud(character, result.skins, motion) for motion in motions])
-    cloud = np.concatenate([cloud, near_scenery(character, cloud)])
-    eye, look = eye_that_sees(view, cloud, HALF_ANGLE, ASPECT)
+    eye, look = eye_that_sees(view, framed(view, character, result.skins, motions), HALF_ANGLE, ASPECT)
     return rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=eye, look_target=look, eye_up=view.up)
 
 

@@ -144,7 +144,7 @@ class OptimizeShot(Operator):
             None,
             minimum=0.0,
             maximum=1.0,
-            description="A smaller predicted gain ends the search: a part of the tolerance, by root mean squares; "
+            description="The search ends where its next step should gain less than this part of the tolerance (rms); "
             "auto: a tenth",
         ),
         Property(
@@ -197,7 +197,7 @@ class OptimizeShot(Operator):
             float,
             0.0,
             minimum=0.0,
-            description="Weight of the motion of targets across the backlash, over that of their errors; 0: none",
+            description="Weight of the motion across the backlash relative to that of the error; 0: none",
         ),
         Property("retime", bool, False, description="Slow the animation down where limits of motors ask for it"),
         Property(

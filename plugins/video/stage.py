@@ -18,9 +18,8 @@ from calmotion.views import (
     draw_over_ghost,
     fit_camera,
     floor_below,
+    framed,
     ghost_of,
-    moving_cloud,
-    near_scenery,
     prepare,
     sample_motion,
     see,
@@ -97,9 +96,7 @@ def set_stage(
     reference = sample_motion(result.reference, times)
     runs = [sample_motion(run.motion, times) for run in (result.before, result.after) if run is not None]
     view = choose_viewpoint(character, result.skins, runs[0])
-    cloud = np.concatenate([moving_cloud(character, result.skins, motion, ROWS) for motion in (reference, *runs)])
-    floor = floor_below(model, reference)
-    cloud = np.concatenate([cloud, near_scenery(character, cloud)])
+    cloud = framed(view, character, result.skins, (reference, *runs))
     probe = fit_camera(view, cloud, width, width, 0.0).project(cloud)[:, :2]
     aspect = float(np.clip(1.08 * np.ptp(probe[:, 1]) / max(np.ptp(probe[:, 0]), 1e-9), *shape))
     camera = fit_camera(view, cloud, SMOOTH * width, SMOOTH * round(width * aspect), 0.06)
@@ -110,7 +107,7 @@ def set_stage(
         meant = sample_motion(result.reference, result.before.motion.times[rows]).target_positions[:, worst.target]
         largest = float(np.linalg.norm(moved - camera.project(meant)[:, :2], axis=1).max())
         zoom = float(np.clip(SHAKE * min(camera.size) / max(largest, 1e-9), 1.0, LARGEST_ZOOM))
-    return Stage(model, result.reference, camera, zoom, worst.target, floor)
+    return Stage(model, result.reference, camera, zoom, worst.target, floor_below(model, reference))
 
 
 def draw_panels(

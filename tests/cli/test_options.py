@@ -60,6 +60,25 @@ def test_what_is_no_length_is_not_said_to_lack_a_unit(text, told, capsys):
 
 
 @pytest.mark.parametrize(
+    ("option", "text", "told"),
+    [
+        ("--step", "-2ms", "-2ms is negative; write 2ms"),
+        ("--tolerance", "-1", "-1 is negative; write 1m or 1mm"),
+        ("--pre-roll", "-.5", "-.5 is negative; write .5"),
+        ("--samples-per-second", "-50Hz", "-50Hz is negative; write 50Hz"),
+        ("--step", "0ms", "0ms is not above zero"),
+        ("--step", "inf", "inf is not finite"),
+        ("--step", "--json", "its value is missing. Write --step TIME"),
+        ("--figures", "-d", "its value is missing. Write --figures DIR, or --figures=DIR if it begins with a dash"),
+        ("--motors", "--json", "its value is missing. Write --motors authored|ideal"),
+    ],
+)
+def test_a_value_that_does_not_fit_is_named_with_its_option_and_the_remedy(option, text, told, capsys):
+    assert main(["simulate", "a.usda", option, text]) == 2
+    assert f"argument {option}: {told}" in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
     ("arguments", "told"),
     [
         (["watch", "a.usda", "--runs", "0"], "0 is not a number of runs"),

@@ -82,10 +82,10 @@ def test_a_page_is_whole_small_and_asks_for_nothing(optimized):
     assert [group["title"] for group in data["charts"]] == [
         "Errors over time", "Spectra of the errors", "Motors", "The search"
     ]  # fmt: skip
-    for part in ("The largest error falls from 30 mm to 2 mm", "/Robot/&lt;Tip&gt;", "modes above 40 Hz &amp; more",
+    for part in ("The largest error falls from 30 mm to 2 mm", "/Robot/&lt;Tip&gt;", "Modes above 40 Hz &amp; more.",
                  "calmotion optimize shot.usda", "ab" * 32, "prefers-color-scheme: dark"):  # fmt: skip
         assert part in text.replace("<wbr>", "")
-    assert text.index("The largest error falls") < text.index('id="player"') < text.index("modes above 40 Hz")
+    assert text.index("The largest error falls") < text.index('id="player"') < text.index("Modes above 40 Hz")
 
 
 def test_the_motions_in_a_page_are_those_of_the_result(optimized):

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import synthetic
-from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, hull_corners, moving_cloud, near_scenery
+from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, framed, hull_corners, moving_cloud
 
 
 def test_the_sphere_contains_every_target_but_not_the_hidden_guide():
@@ -58,21 +58,27 @@ def test_of_a_flat_surface_all_points_are_taken():
     assert hull_corners(flat).tolist() == [0, 1, 2, 3, 4]
 
 
-def test_scenery_near_the_character_belongs_into_the_picture_and_a_stage_does_not():
-    character = synthetic.character()
-    surface = next(surface for body in character.bodies for surface in body.surfaces if surface.drawn)
-    cloud = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+@pytest.mark.parametrize(
+    ("low", "high", "shown"),
+    [
+        ((0.2, 0.2, 0.0), (0.3, 0.3, 0.2), True),  # a lamp beside the robot
+        ((0.2, 0.2, 0.6), (0.3, 0.3, 1.0), False),  # far above it
+        ((-0.1, -0.1, 0.0), (0.7, 0.7, 0.02), True),  # a table, of which the picture would cut the edge
+        ((-0.1, -0.1, -0.22), (0.7, 0.7, -0.2), False),  # a floor of that size
+        ((-3.0, -3.0, -0.3), (3.0, 3.0, -0.25), False),  # a stage
+    ],
+)
+def test_what_stands_still_is_in_the_picture_where_it_is_near_or_would_be_cut(low, high, shown):
+    character, result = synthetic.character(), synthetic.result()
+    base = character.bodies[0].surfaces[0]
+    piece = dataclasses.replace(base, points=synthetic.box(low, high)[0])
+    view = choose_viewpoint(character, result.skins, result.reference)
 
-    def box(low, high):
-        points = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
-        return dataclasses.replace(surface, points=points)
+    def corners(scenery):
+        points = framed(view, dataclasses.replace(character, scenery=scenery), result.skins, (result.reference,))
+        return {tuple(corner) for corner in points}
 
-    head, stage = box((0.4, 0.4, 1.0), (0.6, 0.6, 1.2)), box((-3.0, -3.0, -0.1), (3.0, 3.0, 0.0))
-    lamp = box((0.4, 0.4, 1.3), (0.6, 0.6, 1.6))  # no longer fits beside the head
-    hidden = dataclasses.replace(box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1)), visible=False)
-    near = near_scenery(dataclasses.replace(character, scenery=(stage, lamp, head, hidden)), cloud)
-    np.testing.assert_array_equal(np.sort(near, axis=0), np.sort(head.points, axis=0))
-    table = box((0.2, -0.5, 0.0), (0.8, 1.2, 0.3))  # the picture would cut it, and has the greater part of it
-    near = near_scenery(dataclasses.replace(character, scenery=(stage, table)), cloud)
-    np.testing.assert_array_equal(np.sort(near, axis=0), np.sort(table.points, axis=0))
-    assert near_scenery(dataclasses.replace(character, scenery=()), cloud).shape == (0, 3)
+    alone = corners(())
+    assert {tuple(corner) for corner in base.points} <= alone, "what carries the robot"
+    assert corners((piece,)) - alone == ({tuple(corner) for corner in piece.points} if shown else set())
+    assert corners((dataclasses.replace(piece, visible=False),)) == alone

@@ -101,7 +101,10 @@ def run_options(command: argparse.ArgumentParser) -> None:
         "of the predicted motion (simulated)",
     )
     outputs.add_argument(
-        "--samples-per-second", metavar="HZ", help="write more samples than the frames, for linear interpolation"
+        "--samples-per-second",
+        metavar="HZ",
+        type=quantity("Hz", positive=True),
+        help="write more samples than the frames, for linear interpolation",
     )
     outputs.add_argument(
         "--splines",
@@ -256,14 +259,14 @@ def quantity(unit: str, needs_unit: bool = False, positive: bool = False) -> Cal
             bare = needs_unit and has_no_unit(text)
         except SettingError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
-        least = "above zero" if positive else "not negative"
-        outside = f"{text} is out of range; it must be finite and {least}"
-        if value == float("inf"):
-            raise argparse.ArgumentTypeError(outside)
+        plain = text.strip().removeprefix("-")
+        wanted = f"{plain}{unit} or {plain}m{unit}" if bare else plain
+        if value < 0.0:
+            raise argparse.ArgumentTypeError(f"{text} is negative; write {wanted}")
+        if value == float("inf") or (positive and not value and not bare):
+            raise argparse.ArgumentTypeError(f"{text} is not {'finite' if value else 'above zero'}")
         if bare:
-            raise argparse.ArgumentTypeError(f"{text} has no unit; write {text}{unit} or {text}m{unit}")
-        if not 0.0 <= value or (positive and not value):
-            raise argparse.ArgumentTypeError(outside)
+            raise argparse.ArgumentTypeError(f"{text} has no unit; write {wanted}")
         return value
 
     return read

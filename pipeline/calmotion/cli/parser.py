@@ -6,6 +6,7 @@ A wrong option or command is answered with the nearest right one.
 from __future__ import annotations
 
 import argparse
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -31,6 +32,8 @@ START = (
 SHARED = "reports, plugins and settings"
 WIDTH = 79
 _EXAMPLES = "examples:\n"
+# A value, not an option: so that -2ms is refused by what reads a quantity. The expression is that of Python 3.14.
+_NEGATIVE = re.compile(r"-\.?\d")
 
 
 def overview(commands: Mapping[str, str]) -> str:
@@ -86,19 +89,21 @@ def add_examples(command: argparse.ArgumentParser, examples: Sequence[tuple[str,
         command.formatter_class = _WithExamples
         command.epilog = _EXAMPLES + "\n".join(example_lines(examples))
     if command.usage is None and not any(isinstance(a, argparse._SubParsersAction) for a in command._actions):
-        command.usage = " ".join(["%(prog)s", *(needed(action) for action in command._actions if is_needed(action))])
+        command.usage = " ".join(["%(prog)s", *(needed(action) for action in command._actions if is_shown(action))])
         command.usage += " [options]"
 
 
-def is_needed(action: argparse.Action) -> bool:
-    """Whether a command does not run without an argument."""
-    return action.required and action.help != argparse.SUPPRESS
+def is_shown(action: argparse.Action) -> bool:
+    """Whether the usage of a command has an argument: one that it needs, or a place that may stay empty."""
+    return (action.required or not action.option_strings) and action.help != argparse.SUPPRESS
 
 
 def needed(action: argparse.Action) -> str:
     """An argument as it is typed."""
-    value = action.metavar if isinstance(action.metavar, str) else action.dest.upper()
-    return f"{action.option_strings[0]} {value}" if action.option_strings else value
+    value = action.metavar if isinstance(action.metavar, str) else "|".join(action.choices or [action.dest.upper()])
+    if not action.option_strings:
+        return value if action.required else f"[{value}]"
+    return f"{action.option_strings[0]} {value}"
 
 
 def property_text(idname: str, declared: Property) -> str:
@@ -139,6 +144,10 @@ class Parser(argparse.ArgumentParser):
     overview = ""
     operators: Sequence[str] = ()
 
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._negative_number_matcher = _NEGATIVE
+
     def format_help(self) -> str:
         """The help."""
         before, examples, after = (self.overview or super().format_help()).partition(_EXAMPLES)
@@ -168,6 +177,15 @@ class Parser(argparse.ArgumentParser):
         if rest and not self.overview:
             self.error(f"no argument takes {' '.join(rest)}; a name with spaces is written in quotation marks")
         return found, rest
+
+    def _match_argument(self, action: argparse.Action, arg_strings_pattern: str) -> int:
+        try:
+            return super()._match_argument(action, arg_strings_pattern)
+        except argparse.ArgumentError:
+            name, value = action.option_strings[-1], needed(action).partition(" ")[2]
+            dash = "" if action.choices else f", or {name}={value} if it begins with a dash"
+            remedy = f"its value is missing. Write {name} {value}{dash}"
+            raise argparse.ArgumentError(action, remedy) from None
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         try:

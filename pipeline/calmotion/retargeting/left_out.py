@@ -138,7 +138,7 @@ def search_rows(
     rows = [_knots_row(problem, character, options)]
     rows += [
         Simplification(
-            character.motors[k].path + ": not optimised", "it moves no target; the error is its possible gain", gain
+            character.motors[k].path + ": not optimised", "it could reduce errors by no more than the estimate", gain
         )
         for k, gain in zip(idle, [idle_gain_m, *[None] * len(idle)], strict=False)
     ]

@@ -40,5 +40,4 @@ from calmotion.views.style import tidy as tidy
 from calmotion.views.style import titles as titles
 from calmotion.views.viewpoint import choose_viewpoint as choose_viewpoint
 from calmotion.views.viewpoint import eye_that_sees as eye_that_sees
-from calmotion.views.viewpoint import moving_cloud as moving_cloud
-from calmotion.views.viewpoint import near_scenery as near_scenery
+from calmotion.views.viewpoint import framed as framed

@@ -143,17 +143,12 @@ def scene(model: Model, motion: Motion, row: int) -> tuple[Array, Array, IntArra
 
 def fit_camera(view: Viewpoint, cloud: Array, width: int, height: int, margin: float = 0.04) -> Camera:
     """The camera from the direction of a viewpoint whose picture just contains world points of shape [n, 3]."""
-    forward = -view.toward_eye
-    right = np.cross(forward, view.up)
-    right = right / np.linalg.norm(right)
-    axes = np.stack([right, np.cross(forward, right), forward])
-    eye = view.center + 5.0 * view.radius * view.toward_eye
-    flat = Camera(eye, axes, 1.0, np.zeros(2), (width, height)).project(cloud)[:, :2]
+    flat = view.picture(cloud)
     low, high = flat.min(axis=0), flat.max(axis=0)
     room = (1.0 - 2.0 * margin) * np.array([width, height])
     scale = float(np.min(room / np.maximum(high - low, 1e-9)))
     center = 0.5 * np.array([width, height]) - 0.5 * scale * (low + high)
-    return Camera(eye, axes, scale, center, (width, height))
+    return Camera(view.eye, view.axes, scale, center, (width, height))
 
 
 def floor_below(model: Model, motion: Motion) -> float | None:

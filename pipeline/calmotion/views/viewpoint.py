@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.arrays import Array, IntArray
+from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.model.character import Character
 from calmotion.model.result import Motion, Skin
 from calmotion.views.playback import deformed_points, modes_of, rotation_matrices, world_points
@@ -14,8 +15,10 @@ from calmotion.views.playback import deformed_points, modes_of, rotation_matrice
 SIDE = np.radians(38.0)
 ELEVATION = np.radians(17.0)
 STILL = 1e-3  # of a body that does not move: range of its place [m] and of its quaternion
-ROOM = 1.2  # largest growth of a picture for the scenery
-ROOM_FOR_CUT = 1.5  # for a piece of which the picture has at least half without it
+ROOM = 1.25  # largest growth of a picture for what stands still
+ROOM_FOR_SURFACE = 1.05  # for one surface of a base that is not in the picture as a whole
+ROOM_FOR_CUT = 1.5  # for scenery of which the picture has the share CUT or more without it
+CUT = 1.0 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,24 @@ class Viewpoint:
     radius: float
     toward_eye: Array
     up: Array
+
+    @property
+    def eye(self) -> Array:
+        """Far enough from the center that all of the sphere is in front of it [m], shape [3]."""
+        return self.center + 5.0 * self.radius * self.toward_eye
+
+    @property
+    def axes(self) -> Array:
+        """To the right, downward and forward in the picture, shape [3, 3], a row each."""
+        forward = -self.toward_eye
+        right = np.cross(forward, self.up)
+        right = right / np.linalg.norm(right)
+        return np.stack([right, np.cross(forward, right), forward])
+
+    def picture(self, points: Array) -> Array:
+        """Where the eye sees world points [m], shape [n, 3], to the right and downward, over their distance; [n, 2]."""
+        local = (points - self.eye) @ self.axes.T
+        return np.asarray(local[:, :2] / np.maximum(local[:, 2:], 1e-9))
 
 
 def choose_viewpoint(character: Character, skins: tuple[Skin | None, ...], motion: Motion) -> Viewpoint:
@@ -73,7 +94,31 @@ def choose_viewpoint(character: Character, skins: tuple[Skin | None, ...], motio
     return Viewpoint(0.5 * (low + high), radius, np.cos(ELEVATION) * level + np.sin(ELEVATION) * up, up)
 
 
-def moving_cloud(character: Character, skins: tuple[Skin | None, ...], motion: Motion, rows: int = 40) -> Array:
+def framed(
+    view: Viewpoint,
+    character: Character,
+    skins: tuple[Skin | None, ...],
+    motions: Sequence[Motion],
+    trails: Array | None = None,
+) -> Array:
+    """What a picture of motions has to contain: all that moves, and what stands still and belongs to it.
+
+    Args:
+        view: From where it is seen.
+        character: With its scenery.
+        skins: One for each body.
+        motions: The motions to show.
+        trails: Further points [m], shape [n, 3].
+
+    Returns:
+        World points [m], shape [k, 3].
+    """
+    clouds = [moving_cloud(character, skins, motion) for motion in motions]
+    cloud = np.concatenate(clouds if trails is None else [*clouds, trails])
+    return np.concatenate([cloud, still_pieces(view, character, motions[0], cloud)])
+
+
+def moving_cloud(character: Character, skins: tuple[Skin | None, ...], motion: Motion) -> Array:
     """Targets, and the corners of the convex hulls of the drawn surfaces of bodies that move, at instants of a motion,
     shape [n, 3]; of all bodies, where none moves.
 
@@ -82,8 +127,8 @@ def moving_cloud(character: Character, skins: tuple[Skin | None, ...], motion: M
     clouds = [motion.target_positions.reshape(-1, 3)]
     instants = np.unique(np.linspace(0, len(motion.times) - 1, 12).astype(int))
     matrices = rotation_matrices(motion.rotations[instants])
-    moved = np.ptp(motion.positions, axis=0).max(axis=1) + np.ptp(motion.rotations, axis=0).max(axis=1)
-    seen = moved > STILL if np.any(moved > STILL) else np.ones(len(moved), bool)
+    moved = moving_bodies(motion)
+    seen = moved if np.any(moved) else np.ones(len(moved), bool)
     for index, body in enumerate(character.bodies):
         for s, surface in enumerate(body.surfaces):
             if surface.drawn and seen[index]:
@@ -95,39 +140,74 @@ def moving_cloud(character: Character, skins: tuple[Skin | None, ...], motion: M
     return np.concatenate(clouds)
 
 
-def near_scenery(character: Character, cloud: Array) -> Array:
-    """Corners of the hulls of the still surfaces that belong into a picture: a robot's head and feet, what it hits.
+def moving_bodies(motion: Motion) -> BoolArray:
+    """Which bodies do more than stand still, shape [b]."""
+    moved = np.ptp(motion.positions, axis=0).max(axis=1) + np.ptp(motion.rotations, axis=0).max(axis=1)
+    return np.asarray(moved > STILL)
 
-    Not those, such as a stage, for which the picture would have to be much larger than for the character. It is made
-    larger for those that it would cut through, such as a table of which it has the greater part.
+
+def still_pieces(view: Viewpoint, character: Character, motion: Motion, cloud: Array) -> Array:
+    """Corners of the hulls of what stands still and belongs into a picture: a robot's base, its head, what it hits.
+
+    A base is taken as a whole; where it is too large, as the legs of a figure, each of its surfaces that hardly makes
+    the picture larger. Not a stage, for which the picture would have to be much larger than for the character; the
+    picture is made larger for what it would cut in two, such as a table, but for the floor.
 
     Args:
+        view: From where the picture is seen.
         character: With its scenery.
+        motion: For the places of the bodies that stand still.
         cloud: What the picture has to contain [m], shape [n, 3].
 
     Returns:
         [m], shape [k, 3]; empty where there are none.
     """
-    low, high = cloud.min(axis=0), cloud.max(axis=0)
+    low, high = _edges(cloud)
     diagonal = float(np.linalg.norm(high - low))
+    left, right = _edges(view.picture(cloud))
 
-    def grown(piece: Array) -> tuple[float, Array, Array]:
+    def grown(piece: Array) -> float:
         lower, upper = np.minimum(low, piece.min(axis=0)), np.maximum(high, piece.max(axis=0))
-        return float(np.linalg.norm(upper - lower)) / diagonal, lower, upper
+        return float(np.linalg.norm(upper - lower)) / diagonal
 
-    def share_inside(piece: Array) -> float:
-        lower, upper = piece.min(axis=0), piece.max(axis=0)
-        inside = np.minimum(high, upper) - np.maximum(low, lower)
-        return float(np.prod(np.clip(inside, 0.0, None) / np.maximum(upper - lower, 1e-12)))
-
-    pieces = [surface.points[hull_corners(surface.points)] for surface in character.scenery if surface.drawn]
+    bases, surfaces = _still_surfaces(character, motion)
+    ground = min(float((piece @ view.up).min()) for piece in [cloud, *bases])
+    beside = [(piece, ROOM_FOR_SURFACE, ROOM_FOR_SURFACE) for piece in surfaces]
+    for surface in character.scenery:
+        if surface.drawn:
+            piece = surface.points[hull_corners(surface.points)]
+            floor = float((piece @ view.up).max()) <= ground + 1e-6
+            beside.append((piece, ROOM, ROOM if floor else ROOM_FOR_CUT))
+    rooms = [(piece, ROOM, ROOM) for piece in bases] + sorted(beside, key=lambda row: grown(row[0]))
     kept = [np.zeros((0, 3))]
-    for piece in sorted(pieces, key=lambda piece: grown(piece)[0]):
-        growth, lower, upper = grown(piece)
-        if growth <= (ROOM_FOR_CUT if share_inside(piece) >= 0.5 else ROOM):
-            low, high = lower, upper
+    for piece, room, room_for_cut in rooms:
+        lower, upper = _edges(view.picture(piece))
+        inside = np.clip(np.minimum(right, upper) - np.maximum(left, lower), 0.0, None)
+        cut = np.prod(inside / np.maximum(upper - lower, 1e-12)) >= CUT
+        if grown(piece) <= (room_for_cut if cut else room):
+            low, high = np.minimum(low, piece.min(axis=0)), np.maximum(high, piece.max(axis=0))
+            left, right = np.minimum(left, lower), np.maximum(right, upper)
             kept.append(piece)
     return np.concatenate(kept)
+
+
+def _edges(points: Array) -> tuple[Array, Array]:
+    """Lowest and highest coordinates of points."""
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _still_surfaces(character: Character, motion: Motion) -> tuple[list[Array], list[Array]]:
+    """Corners of the hulls of bodies that stand still beside others that move, and of each of their surfaces [m]."""
+    moved, matrices = moving_bodies(motion), rotation_matrices(motion.rotations[:1])[0]
+    bases, surfaces = [], []
+    for index, body in enumerate(character.bodies):
+        if not moved[index] and np.any(moved):
+            points = [surface.points[hull_corners(surface.points)] for surface in body.surfaces if surface.drawn]
+            points = [piece @ matrices[index].T + motion.positions[0, index] for piece in points]
+            surfaces += points
+            if points:
+                bases.append(np.concatenate(points))
+    return bases, surfaces
 
 
 def hull_corners(points: Array) -> IntArray:
@@ -152,10 +232,7 @@ def eye_that_sees(view: Viewpoint, cloud: Array, half_angle: float, aspect: floa
     Returns:
         The eye and a point in the middle of the picture, at the middle distance of the points [m], shape [3] each.
     """
-    forward = -view.toward_eye
-    right = np.cross(forward, view.up)
-    right = right / np.linalg.norm(right)
-    axes = np.stack([right, np.cross(right, forward), forward])
+    axes = view.axes
     local = cloud @ axes.T
     depth = local[:, 2]
     slopes = np.tan(half_angle) * np.array([aspect, 1.0])

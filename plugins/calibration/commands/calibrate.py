@@ -210,11 +210,13 @@ def _print_answer(report: dict[str, Any], console: Console) -> None:
     for row in report["channels"]:
         held_out = row["validation_rms"]
         before, after, noise = (quantity_in(row[name], row["unit"], 3) for name in ("rms_before", "rms", "noise"))
-        checked = "" if held_out is None else f", {quantity_in(held_out, row['unit'], 3)} in samples not fitted"
+        checked = (
+            "" if held_out is None else f", {quantity_in(held_out, row['unit'], 3)} in samples that were not fitted"
+        )
         say(
             console,
-            f"{row['name']}: the difference of recording and robot {_went(row)} from {before} to {after}{checked} "
-            f"(root mean square; noise {noise}).",
+            f"{row['name']}: the difference between recording and simulation {_went(row)} from {before} to {after}"
+            f"{checked} (root mean square; noise {noise}).",
         )
     _print_parameters(console, "Parameters of the robot", of_robot)
     for row in report["parameters"]:

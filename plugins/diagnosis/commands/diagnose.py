@@ -52,7 +52,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "recordings; without it the motion of the shot",
     )
     command.add_argument(
-        "--figures", metavar="DIR", help="draw motion and error, their spectra, and error over speed and torque here"
+        "--figures",
+        metavar="DIR",
+        help="draw motion, error and spectra, and the error over speed and torque, into this folder",
     )
     html_option(command)
 

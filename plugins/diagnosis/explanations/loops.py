@@ -43,8 +43,8 @@ class ServoGains(LoopExplanation):
     cause = "servo_gains"
     label = "the servo loop"
     tells = (
-        "a small step of one joint with half of its position gain: the ringing of a loop slows down by 30%, that of "
-        "a link does not"
+        "a small step of one joint with half of its position gain, which slows the ringing of a loop down by 30%, "
+        "but not that of a link"
     )
     RINGS = 0.5  # ratio of critical below which a loop's ringing is seen
 

@@ -31,7 +31,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     shot_arguments(command)
     command.add_argument(
-        "--rate", metavar="HZ", type=quantity("Hz"), default=250.0, help="commands a second (default: 250)"
+        "--rate",
+        metavar="HZ",
+        type=quantity("Hz", positive=True),
+        default=250.0,
+        help="commands a second (default: 250)",
     )
     command.add_argument(
         "--lookahead",
@@ -76,23 +80,22 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--clock",
         choices=("wall", "stamps"),
-        help="clock of the ticks. wall: that of the machine (default of a pipe and of OSC); stamps: the time stamps of "
-        "the samples, as fast as they can be read (default of a file and of --replay)",
+        help="clock that times the commands. wall: that of the machine (default of a pipe and of OSC); stamps: the "
+        "time stamps of the samples, as fast as they can be read (default of a file and of --replay)",
     )
     command.add_argument(
         "--table",
         action="store_true",
-        help="play nothing; print the error that look-aheads from 20 ms to the longest period leave",
+        help="print the errors for look-aheads from 20 ms to the robot's longest period, and play nothing",
     )
     command.add_argument("--seconds", metavar="S", type=quantity("s", positive=True), help="stop after this time")
 
 
 def _milliseconds(text: str) -> float:
     """A time without a unit is in milliseconds."""
-    try:
-        return float(text) * 1e-3
-    except ValueError:
-        return quantity("s")(text)
+    from calmotion.host import has_no_unit
+
+    return quantity("s")(f"{text}ms" if has_no_unit(text) else text)
 
 
 def _share(text: str) -> float:

@@ -14,6 +14,7 @@ from calmotion.cli import (
     html_option,
     length,
     page_of_report,
+    print_table,
     report_options,
     say,
 )
@@ -52,7 +53,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--workers",
         metavar="N",
         type=worker_count,
-        help="most jobs at once (default: one for each processor; elsewhere all)",
+        help="largest number of jobs at once (default: one for each processor; on a cluster all)",
     )
     forwarded_options(command)
 
@@ -93,24 +94,23 @@ def run(args: argparse.Namespace, output: Output) -> int:
 def _print_answer(report: dict[str, Any], console: Console) -> None:
     counts = ", ".join(f"{count} {SAID.get(name, name)}" for name, count in report["outcomes"].items())
     say(console, f"{counted(len(report['jobs']), 'shot')} in {report['wall_s']:.1f} s: {counts}")
+    rows = []
     for job in report["jobs"]:
-        line = f"  {job['name']}: {SAID.get(job['outcome'], job['outcome'])}"
-        before, after = job.get("max_error_before_m", job.get("max_error_m")), job.get("max_error_after_m")
-        if before is not None:
-            line += f", largest error {length(before)}" + ("" if after is None else f" becomes {length(after)}")
-        if job["tolerance_kept"] is False:
-            line += ", tolerance missed"
-        if job["attempts"] > 1:
-            line += f", {job['attempts']} attempts"
-        say(console, line)
-        if job["problem"]:
-            problem = job["problem"]
+        result = SAID.get(job["outcome"], job["outcome"])
+        result += ", tolerance missed" if job["tolerance_kept"] is False else ""
+        result += f", {job['attempts']} attempts" if job["attempts"] > 1 else ""
+        errors = job.get("max_error_before_m", job.get("max_error_m")), job.get("max_error_after_m")
+        rows.append([job["name"], result, *("" if error is None else length(error) for error in errors)])
+    width = 4 if any(row[3] for row in rows) else 3
+    heads = ["shot", "result", "largest error", "optimised"][:width]
+    print_table(console, "Shots", heads, [row[:width] for row in rows], texts=2)
+    for job in report["jobs"]:
+        if problem := job["problem"]:
             place = ".".join(filter(None, (problem.get("path"), problem.get("attribute"))))
             found = f" ({problem['found']})" if problem.get("found") else ""
-            say(console, f"    {place + ': ' if place else ''}{problem['problem']}{found}")
-            if problem.get("remedy"):
-                say(console, f"    {problem['remedy']}")
-            say(console, f"    log: {job['log']}")
+            remedy = f" {problem['remedy'].rstrip('.')}." if problem.get("remedy") else ""
+            what = f"{place + ': ' if place else ''}{problem['problem']}{found}"
+            say(console, f"{job['name']}: {what}.{remedy} Log: {job['log']}")
 
 
 SECTIONS = {"Result": _print_answer}

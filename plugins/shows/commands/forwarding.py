@@ -48,7 +48,7 @@ def forwarded_options(command: argparse.ArgumentParser, tempo: bool = True) -> N
         help="a shot fails if its simulation misses the tolerance, or its curves leave a larger error",
     )
     group.add_argument("--robust", nargs="?", const="worst", choices=("worst", "mean"), help="robust curves")
-    group.add_argument("--scenarios", metavar="N", help="robots of --robust")
+    group.add_argument("--scenarios", metavar="N", help="number of robots of --robust")
     group.add_argument(
         "--avoid-reversals", metavar="WEIGHT", nargs="?", const="10", help="avoid reversals of gears with backlash"
     )
@@ -64,7 +64,9 @@ def forwarded_options(command: argparse.ArgumentParser, tempo: bool = True) -> N
             "--retime", metavar="slowest=2,fastest=1", nargs="?", const="", help="slower where motors cannot follow"
         )
     group.add_argument("--bake", nargs="?", const="motors", choices=("motors", "simulated"), help="body transforms")
-    group.add_argument("--samples-per-second", metavar="HZ", help="more samples than the frames")
+    group.add_argument(
+        "--samples-per-second", metavar="HZ", type=quantity("Hz", positive=True), help="more samples than the frames"
+    )
     group.add_argument("--splines", action="store_true", help="curves as splines")
     group.add_argument("--run", metavar="OPERATOR", action="append", default=[], help="operator of a plugin to run")
     group.add_argument("--settings", metavar="FILE", help="TOML file with a table for each operator")

@@ -30,7 +30,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     report_options(command)
     command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
     command.add_argument("--on", metavar="WHERE", default="local", help="as of `calmotion batch`")
-    command.add_argument("--workers", metavar="N", type=worker_count, help="most jobs at once")
+    command.add_argument("--workers", metavar="N", type=worker_count, help="largest number of jobs at once")
     forwarded_options(command, tempo=False)  # transitions begin and end where clips do
 
 

@@ -36,7 +36,7 @@ def printed(values):
 def test_the_error_budget_is_a_table_and_the_verdict_a_sentence():
     text = printed(report())
     assert "time step   0.5 mm     0.3 mm" in text and "mesh        0.4 mm    unknown" in text
-    assert "as accurate as requested: these errors are within 0.3 mm (tolerance 1 mm)." in " ".join(text.split())
+    assert "The simulation keeps the tolerance of 1 mm: these errors are accurate to 0.3 mm." in " ".join(text.split())
     verified = {"verified_step_s": 5e-4, "verified_modes": 44, "verified_mesh_error_m": 5e-5}
     measured = printed(report(verified_error_m=2e-4, **verified))
     said = "measured simulation error 0.2 mm, against a run with steps of 0.5 ms and 44 elastic coordinates"
@@ -61,7 +61,7 @@ def test_the_delay_of_a_shaper_is_told_with_the_error_without_it(delay, said):
         (1e-3, "goal reached", "The goal is reached: the largest error is at most 2 mm."),
         (5e-3, "converged", "The goal of 2 mm is out of reach with these motors, limits and weights: 5 mm at /Cup."),
         (5e-3, "iteration limit", "The goal of 2 mm is not reached: 5 mm at /Cup."),
-        (2.1e-3, "converged", "exceeds the distance to the goal: use --tolerance 0.2mm."),
+        (2.1e-3, "converged", "is too coarse to decide about the goal: use --tolerance 0.2mm."),
     ],
 )
 def test_a_goal_is_reached_or_the_targets_that_miss_it_are_named(after, stopped, said):
@@ -71,7 +71,7 @@ def test_a_goal_is_reached_or_the_targets_that_miss_it_are_named(after, stopped,
     values = report(goal_m=2e-3, goal_kept=kept, stopped=stopped, objective_after=0.0, targets=targets)
     values["main_target"] = "/Cup"
     text = " ".join(printed(values).split())
-    assert said in text and ("exceeds the distance" in text) == (after == 2.1e-3)
+    assert said in text and ("too coarse" in text) == (after == 2.1e-3)
 
 
 @pytest.mark.parametrize("source", REMEDIES)
@@ -154,7 +154,7 @@ def test_each_target_has_its_own_error_before_and_after_and_the_main_one_is_firs
         "The largest error falls from 60 mm to 1 mm (at /Cup).",
         "At /Elbow, it falls from 10 mm to 5 mm.",
     ]
-    assert "errors after the optimisation are within 0.3 mm" in text, "those before may be off by more"
+    assert "errors after the optimisation are accurate to 0.3 mm" in text, "those before may be off by more"
     assert "to 5 mm (at /Elbow)" in printed(two_targets(main="/Elbow")).splitlines()[0]
     worse = printed(two_targets(0.07) | {"improved": False}).splitlines()
     assert worse[:2] == [
@@ -176,14 +176,14 @@ def test_how_far_motors_move_and_why_errors_remain_are_told():
     stream = io.StringIO()
     print_remaining(console_on(stream), two_targets() | {"motors": motors, "remaining_errors": remaining})
     lines = stream.getvalue().splitlines()
-    assert lines[0].startswith("Angles of motors change by at most: J7 4.01°, J6") and "2 more by less" in lines[0]
+    assert lines[0].startswith("Largest changes of motor angles: J7 4.01°, J6") and "2 more by less" in lines[0]
     assert lines[1].startswith(
-        "What remains, 5.5 mm at /Elbow, 1.4 mm at /Cup: 5 motors cannot follow the targets in all 9 "
+        "Why 5.5 mm at /Elbow, 1.4 mm at /Cup remain: 5 motors cannot follow the targets in all 9 "
     )
     assert lines[2].startswith(
-        "What remains, 2 mm at /Nose: limits of motors hold it (see the table of limits); gravity"
+        "Why 2 mm at /Nose remain: motors are at their limits (see the table of limits); gravity"
     )
-    assert lines[3].endswith("already at rest; 1 motor cannot follow the target in all 3 directions.")
+    assert lines[3].endswith("even at rest; 1 motor cannot follow the target in all 3 directions.")
 
 
 def test_curves_on_random_robots_are_a_table():

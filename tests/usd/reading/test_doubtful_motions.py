@@ -49,7 +49,7 @@ def test_degrees_that_were_taken_for_radians_are_told_with_their_factor(arm, val
 
 
 @pytest.mark.parametrize(
-    ("factor", "name"), [(1000.0, "0.001 times that would be within: millimetres"), (100.0, "0.01 times")]
+    ("factor", "name"), [(1000.0, "0.001 times that would be within (millimetres"), (100.0, "0.01 times")]
 )
 def test_lengths_in_smaller_units_are_told_with_their_factor(arm, factor, name):
     (note,) = doubts(arm, factor * 0.2 * SWING, (0.0, 0.25), linear=True)

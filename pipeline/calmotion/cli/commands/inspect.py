@@ -32,7 +32,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--meshes",
         action="store_true",
-        help="mesh the flexible bodies, in minutes; else their frequencies are rough, from beams and sections",
+        help="mesh the flexible bodies, which may take minutes; without it, frequencies are estimated from beams",
     )
     command.add_argument(
         "--modes",
@@ -53,7 +53,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--live",
         action="store_true",
-        help="print the error that each look-ahead leaves when the motion is streamed; as calmotion live --table",
+        help="print the error of a streamed motion for each look-ahead, as calmotion live --table does",
     )
     command.add_argument("--verbose", action="store_true", help="also print all simplifications and their reasons")
     simulation_options(command, "bdf2, newmark, generalized-alpha or rk4 (default: automatic)")

@@ -39,7 +39,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         const=10.0,
         type=quantity("", positive=True),
         help="avoid reversals of torque in gears with backlash (calm:motor:backlash) where they move the targets: "
-        "weight of the motion across the backlash over that of the error (default: 10)",
+        "weight of the motion across the backlash relative to that of the error (default: 10)",
     )
     retime_options(command)
     group = command.add_argument_group(

@@ -54,11 +54,11 @@ def _print_contents(console: Console, report: dict[str, Any], verbose: bool) -> 
     say(console, f"{report['shot']}: {report['character']}, {frames}, {report['duration_s']:.4g} s")
     _print_answer(console, report)
     gravity = ", ".join(f"{component:.4g}" for component in report["gravity_m_s2"])
+    gravity = f"gravity ({gravity}) m/s²" if any(report["gravity_m_s2"]) else "no gravity"
     say(
         console,
         f"units: {units['meters_per_unit']:g} m, {units['kilograms_per_unit']:g} kg, {units['up_axis']} up, "
-        f"{units['time_codes_per_second']:g} time codes and {units['frames_per_second']:g} frames a second; "
-        f"gravity ({gravity}) m/s²",
+        f"{units['time_codes_per_second']:g} time codes and {units['frames_per_second']:g} frames a second; {gravity}",
     )
     for layer in report["earlier_layers"]:
         say(console, f"contains an optimised layer: {layer}")
@@ -135,12 +135,12 @@ def _print_sources(console: Console, report: dict[str, Any]) -> None:
     if SECTIONS in sources:
         say(
             console,
-            "Frequencies marked `about` are from beams and sections: right within a factor of two for 9 of 10 links. "
-            "So is what follows from them. --meshes finds them to about 1%, in minutes.",
+            "Frequencies marked `about`, and all that follows from them, are estimated from beams and sections: right "
+            "within a factor of two for 9 of 10 links. --meshes computes them to about 1%, which may take minutes.",
         )
     earlier = sources.count(EARLIER_MESH)
     if earlier:
-        say(console, f"{earlier} of the flexible bodies have their mesh from an earlier run")
+        say(console, f"flexible bodies with a mesh from an earlier run: {earlier}")
 
 
 def _expected(row: dict[str, Any]) -> str:
@@ -175,9 +175,9 @@ def _print_gains(console: Console, report: dict[str, Any]) -> None:
         remedy = f" This shot has ideal motors: set calm:motor:model to {model} to simulate the gains." if ideal else ""
         say(
             console,
-            f"With these gains the largest error as animated is about {length(lag['max_error_m'])} at {lag['path']} "
-            f"(ideal motors: {length(lag['ideal_max_error_m'])}), and the sag at rest {length(rest['sag_m'])} at "
-            f"{rest['path']} (ideal motors: {length(rest['ideal_sag_m'])}).{remedy}",
+            f"With these gains, the largest error as animated is about {length(lag['max_error_m'])} at {lag['path']} "
+            f"(with ideal motors {length(lag['ideal_max_error_m'])}). At rest, {rest['path']} sags by "
+            f"{length(rest['sag_m'])} (with ideal motors {length(rest['ideal_sag_m'])}).{remedy}",
         )
 
 
@@ -190,7 +190,7 @@ def _alike(rows: Iterable[list[str]]) -> list[list[str]]:
 
 
 _DAMPING = {
-    ON_JOINT: "the joint's own speed, so that a command must lead the motion",
+    ON_JOINT: "the speed of the joint itself, so that commands have to run ahead of the motion",
     ON_ERROR: "the difference of the command's speed and the joint's",
 }
 

@@ -73,9 +73,9 @@ def print_retiming(console: Console, retime: dict[str, Any] | None) -> None:
         say(console, "The tempo stays as it is: the animation keeps the limits of the motors.")
         return
     longer = f"{added:.2f} s more" if added >= 0.005 else "no more time"
-    bounds = f"{retime['lower_bound_s']:.2f} s at least if no part may be faster"
     say(console, f"The performance takes {longer} than the animation.")
-    say(console, f"Rigid links would need {bounds}, and {retime['uniform_added_s']:.2f} s at one tempo for the whole.")
+    say(console, f"With rigid links, it would take at least {retime['lower_bound_s']:.2f} s more if no part is faster.")
+    say(console, f"At one tempo for the whole shot, it would take {retime['uniform_added_s']:.2f} s more.")
     rows = []
     for part in parts:
         reasons = [f"{reason['quantity']} of {reason['path']}" for reason in part["because"]]

@@ -64,7 +64,7 @@ def print_lost_motion(console: Console, lost: dict[str, Any] | None, suffix: str
     )
     unfollowed = ", ".join(motor["path"] for motor in lost["motors"] if not motor["followed"])
     if unfollowed:
-        say(console, f"without the backlash of {unfollowed}, which the closed chains of a rigid robot cannot follow")
+        say(console, f"this leaves out the backlash of {unfollowed}, which closed chains of rigid links cannot follow")
 
 
 def print_joint_gap(console: Console, gap: float) -> None:
@@ -240,8 +240,8 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
     if held and held["max_error_m"] > FRICTION * report["tolerance_m"]:
         say(
             console,
-            f"at rest, friction of motors may leave {held['path']} up to {about(held['max_error_m'])} away from its "
-            "place; the errors above do not include this, and no command removes it",
+            f"friction of motors may hold {held['path']} up to {about(held['max_error_m'])} away from its place at "
+            "rest; the errors above do not include this, and no motor curve removes it",
         )
     print_limits(console, report["limits"], bool(suffix))
     sags = {target["path"]: target[f"sag{suffix}_m"] or 0.0 for target in report["targets"]}
@@ -294,7 +294,7 @@ def print_work(console: Console, report: dict[str, Any]) -> None:
         print_table(console, "Stages", ["operator", "processor time", "peak memory so far"], stages)
     for row in report["reactions"]:
         force, moment = f"{row['max_force_n']:.4g} N", f"{row['max_moment_n_m']:.4g} N m"
-        say(console, f"the world holds {row['body']} with up to {force} and {moment}")
+        say(console, f"largest load on the mount of {row['body']}: {force} and {moment}")
 
 
 def _print_answer(report: dict[str, Any], console: Console) -> None:

@@ -25,12 +25,12 @@ REMEDIES = {
 NOTHING_SHAKES = "nothing shakes: all bodies are rigid and all motors ideal"
 HEADLINES, MOTORS = 3, 6  # targets, and motors, that have a place in a sentence
 CAUSES = {
-    "limits": "limits of motors hold it (see the table of limits)",
+    "limits": "motors are at their limits (see the table of limits)",
     "search": "the search ended early (see below)",
-    "sag": "gravity alone causes half of it, already at rest",
+    "sag": "gravity alone causes half of it, even at rest",
     "motors": "{motors} cannot follow {targets}",
     "weight": "other targets have larger weights",
-    "reach": "these motors cannot take away more, and the search has converged",
+    "reach": "these motors cannot reduce it further, and the search has converged",
 }
 
 
@@ -93,7 +93,8 @@ def _print_goal(console: Console, report: dict[str, Any]) -> None:
     apart = abs(worst - goal)  # the verdict is that of the target which is farthest off
     if error is not None and error > apart:
         finer = f"--tolerance {1e3 * max(apart, 0.1 * goal):.1g}mm"
-        say(console, f"The error of the simulation, {about(error)}, exceeds the distance to the goal: use {finer}.")
+        said = f"The simulation, with an error of {about(error)}, is too coarse to decide about the goal"
+        say(console, f"{said}: use {finer}.")
 
 
 def _say_of(console: Console, row: dict[str, Any], rows: list[dict[str, Any]], what: str, is_so: str) -> None:
@@ -108,7 +109,7 @@ def _print_accuracy(console: Console, report: dict[str, Any]) -> None:
     if report["tolerance_kept"]:
         error = about(report["simulation_error_m"])
         which = "errors after the optimisation" if is_optimized(report) else "these errors"
-        say(console, f"The simulation is as accurate as requested: {which} are within {error} (tolerance {tolerance}).")
+        say(console, f"The simulation keeps the tolerance of {tolerance}: {which} are accurate to {error}.")
     elif report["simulation_error_m"] is None:
         say(console, f"The accuracy of the simulation was not estimated (tolerance {tolerance}).")
     else:
@@ -123,16 +124,16 @@ def print_remaining(console: Console, report: dict[str, Any]) -> None:
     if not is_optimized(report):
         return
     names = distinct_names([row["path"] for row in report["motors"]])
-    angles, lengths = ("Angles", "max_offset_rad", math.degrees(1.0), "°"), ("Lengths", "max_offset_m", 1e3, " mm")
+    angles, lengths = ("angles", "max_offset_rad", math.degrees(1.0), "°"), ("lengths", "max_offset_m", 1e3, " mm")
     for kind, key, scale, unit in (angles, lengths):
         changed = sorted((r for r in report["motors"] if r["changed"] and key in r), key=lambda row: -row[key])
         told = [f"{names[row['path']]} {scale * row[key]:.3g}{unit}" for row in changed[:MOTORS]]
         told += [f"{len(changed) - MOTORS} more by less"] if len(changed) > MOTORS else []
         if told:
-            say(console, f"{kind} of motors change by at most: {', '.join(told)}.")
+            say(console, f"Largest changes of motor {kind}: {', '.join(told)}.")
     groups: dict[str, list[str]] = {}
     for row in sorted(report["remaining_errors"], key=lambda row: -row["max_error_m"]):
-        targets = "the targets in all {directions} directions, so that their weights decide (CalmTargetAPI)"
+        targets = "the targets in all {directions} directions, and the weights (CalmTargetAPI) decide between them"
         if row["directions"] <= 3:  # a position or a rotation: nothing is weighed against it
             targets = "the target in all 3 directions"
         words = {"motors": counted(row["motors"], "motor"), "targets": targets.format(**row)}
@@ -140,7 +141,7 @@ def print_remaining(console: Console, report: dict[str, Any]) -> None:
         groups.setdefault(causes, []).append(f"{length(row['max_error_m'])} at {row['path']}")
     for causes, errors in groups.items():
         more = f" and {counted(len(errors) - HEADLINES, 'more target')}" if len(errors) > HEADLINES else ""
-        say(console, f"What remains, {', '.join(errors[:HEADLINES])}{more}: {causes}.")
+        say(console, f"Why {', '.join(errors[:HEADLINES])}{more} remain: {causes}.")
 
 
 def is_still(report: dict[str, Any]) -> bool:

@@ -41,7 +41,7 @@ def motion_doubts(character: Character, tracks: Sequence[Track]) -> tuple[str, .
         if not name:
             notes.append(f"{texts[0]}{more}: in no usual unit would that be within; is it a track of another joint?")
             continue
-        notes.append(f"{texts[0]}{more}; {factor:.4g} times that would be within: {name}? {_remedy(name)}")
+        notes.append(f"{texts[0]}{more}; {factor:.4g} times that would be within ({name}?). {_remedy(name)}")
     still = _almost_still(led)
     return (*notes, *still, *(_in_radians(character, led) if not still else ()))
 

@@ -174,7 +174,7 @@ def _doubts_of_density(links: Sequence[_Link], units: StageUnits) -> Iterator[Sh
     grams = f", or masses times {mass:g} (kilogramsPerUnit = {mass * units.kilograms:g})" if mass else ""
     size = " x ".join(f"{length:.3g}" for length in first.size)
     yield ShotError(
-        f"a link that is {problem}{_others(found)}",
+        f"this link is {problem}{_others(found)}",
         path=first.path,
         attribute="physics:mass",
         found=f"{first.mass:.3g} kg in {size} m, {first.density:.3g} kg/m^3",
@@ -188,7 +188,10 @@ def _doubts_of_inertia(links: Sequence[_Link]) -> Iterator[ShotError]:
     within a decade."""
     beyond = [link for link in links if link.gyration > _GYRATION * link.farthest]
     below = [link for link in links if link.gyration < _LEAST_GYRATION * link.box_gyration]
-    for found, problem in ((beyond, "an inertia of a larger link"), (below, "an inertia of a smaller link")):
+    for found, problem in (
+        (beyond, "this inertia is that of a larger link"),
+        (below, "this inertia is that of a smaller link"),
+    ):
         if not found:
             continue
         worst = max(found, key=lambda link: abs(np.log(link.gyration / link.box_gyration)))
@@ -206,7 +209,7 @@ def _doubts_of_inertia(links: Sequence[_Link]) -> Iterator[ShotError]:
 
 
 def _others(links: Sequence[_Link]) -> str:
-    return f", as {len(links) - 1} more" if len(links) > 1 else ""
+    return f", like {len(links) - 1} more" if len(links) > 1 else ""
 
 
 def _density(links: Sequence[_Link]) -> float:

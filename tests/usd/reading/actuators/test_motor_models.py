@@ -183,7 +183,7 @@ def test_inspect_says_what_the_velocity_gains_act_on(tmp_path, calmotion):
 
     shot = write_arm(tmp_path / "arm.usda", both)
     told = " ".join(calmotion("inspect", shot).stdout.split())
-    assert "The velocity gain of 1 motor acts on the joint's own speed" in told and "dampingOn: joint" in told
+    assert "The velocity gain of 1 motor acts on the speed of the joint itself" in told and "dampingOn: joint" in told
     assert "The velocity gain of 1 motor acts on the difference" in told and "dampingOn: error" in told
     motors = json.loads(calmotion("inspect", shot, "--json").stdout)["motors"]
     assert {motor["path"]: motor["damping_on"] for motor in motors} == {SHOULDER: "error", ELBOW: "joint"}

@@ -63,7 +63,10 @@ class AffineActuator:
         words = []
         scale = -self.slope / self.gain if self.gain else 1.0
         if abs(scale - 1.0) > _SAME or self.offset:
-            words.append(f"its command is {self.ratio * scale:g} times the joint's value {-self.offset / self.gain:+g}")
+            times, more = self.ratio * scale, -self.offset / self.gain
+            factor = "" if abs(times - 1.0) < _SAME else f"{times:g} times "
+            added = f" {'+' if more > 0.0 else '-'} {abs(more):g}" if more else ""
+            words.append(f"its command is {factor}the joint's value{added}")
         if self.varies:
             words.append("its gain depends on the pose, which is not read")
         return ", and ".join(words)
