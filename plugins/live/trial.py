@@ -45,19 +45,28 @@ class Trial:
         self._intended = CubicSpline(self._grid.times, intended)
 
     def left(self, angles: Array, rates: Array, delay: float | None) -> tuple[float, Array]:
-        """What commands leave.
+        """What commands leave; see `compared`.
 
         Args:
             angles, rates: At the instants of the grid, shape [T, M].
-            delay: Of the commands [s]; None: the one with which the mean square is least.
+        """
+        workspace = Workspace.for_system(self._model.system)
+        found = run_forward(self._model, workspace, angles, rates, self._grid.h, self._world)
+        return self.compared(found.target_positions, delay)
+
+    def compared(self, positions: Array, delay: float | None) -> tuple[float, Array]:
+        """How far a motion of the targets is from the intended one.
+
+        Args:
+            positions: At the instants of the grid [m], shape [T, K, 3].
+            delay: Of the motion [s]; None: the one with which the mean square is least.
 
         Returns:
-            The delay [s], and distances of the targets from the delayed intended motion with the sag of each pose [m],
-            shape [judged T, K].
+            The delay [s], and distances from the delayed intended motion with the sag of each pose [m], shape
+            [judged T, K].
         """
         grid = self._grid
-        workspace = Workspace.for_system(self._model.system)
-        found = run_forward(self._model, workspace, angles, rates, grid.h, self._world).target_positions[grid.judged]
+        found = positions[grid.judged]
 
         def distances(late: float) -> Array:
             wanted = self._intended(np.maximum(grid.times[grid.judged] - late, grid.times[0]))

@@ -1,29 +1,37 @@
 """A stream that is calmed while it is played, in comparison with input shapers.
 
-`calmotion bench live [SHOT ...]` plays the motion of each shot as a stream at 250 Hz with several look-aheads (shares
-of the longest period), and simulates the whole robot with the commands. Errors are root mean squares over all targets
-against the intended motion with the sag of each pose, delayed by the look-ahead; those of shapers with the delay that
-suits each best. `frequencies` scales those of the robot that is simulated: what is calmed knows the robot as it should
-be. Ticks are timed on this machine as it is.
+`calmotion bench live [SHOT ...]` plays the motion of each shot, or with `--random` moves between random poses, as a
+stream at 250 Hz with several look-aheads (shares of the longest period), and simulates the whole robot with the
+commands. Errors are root mean squares over all targets against the intended motion with the sag of each pose, delayed
+by the look-ahead; those of shapers with the delay that suits each best. `frequencies` scales those of the robot that
+is simulated: what is calmed knows the robot as it should be. With `--mujoco` the robot has rigid bodies, and MuJoCo
+plays the commands. Ticks are timed in processor time of their own thread, since others may use the machine; another
+thread renews the gains.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.model import RunSettings
-from calmotion.simulation import CompiledShot, Curves, modes_of, prepare, shaped
-from calmotion_plugins.live import LiveSettings, Trial
+from calmotion.model import RunSettings, Track
+from calmotion.simulation import CompiledShot, Curves, compile_shot, modes_of, prepare, shaped
+from calmotion_plugins.live import Live, LiveSettings, Trial
+from scipy.interpolate import CubicSpline
 
-from ..common.reporting import bench_parser, on_shots
-from ..common.shots import SAMPLES
+from ..common.reporting import bench_parser, finish, keep, say
+from ..common.shots import SAMPLES, load
+from .commands import giving_shot
+from .lumped_robot import MUJOCO_STEP, simulate_lumped
 
 RATE = 250.0  # of the stream [Hz]
 SHARES = (0.1, 0.2, 0.4, 0.8)  # of the longest period, as look-ahead
 FREQUENCIES = (0.9, 1.0, 1.1)
+Left = tuple[float, Array]  # a delay, and distances of targets
 KINDS = ("zv", "zvd", "zv2", "zvd2")
 
 
@@ -36,7 +44,8 @@ class Row:
         frequencies: Of the simulated robot, over those of the model.
         delay_s: [s].
         rms_mm, largest_mm: Error at the targets [mm].
-        tick_ms, tick_99_ms: Time of a tick: half and 99% of them are faster [ms]; zero of shapers.
+        tick_ms, tick_99_ms: Processor time of a tick: half and 99% of them are faster [ms]; zero of shapers.
+        limited_percent: Share of ticks in which the motor that is most often at a limit is.
     """
 
     shot: str
@@ -47,35 +56,111 @@ class Row:
     largest_mm: float
     tick_ms: float = 0.0
     tick_99_ms: float = 0.0
+    limited_percent: float = 0.0
 
 
-def compare(name: str, shot: CompiledShot, frequencies: tuple[float, ...] = FREQUENCIES) -> Iterator[Row]:
+def compare(
+    name: str, shot: CompiledShot, frequencies: tuple[float, ...] = FREQUENCIES, mujoco: bool = False
+) -> Iterator[Row]:
     """All methods on one robot."""
     prepared = prepare(shot, RunSettings())
     grid, modes = prepared.grid, modes_of(prepared)
     trial = Trial(prepared)
     curves, longest = trial.curves, 1.0 / modes[0][0]
-    streams = [trial.streamed(shot, LiveSettings(rate=RATE, lookahead=share * longest)) for share in SHARES]
+    streams = []
+    for share in SHARES:
+        settings = LiveSettings(rate=RATE, lookahead=share * longest)
+        streams.append(
+            (*trial.streamed(shot, settings), _ticks(shot, settings, CubicSpline(grid.times, curves.angles)))
+        )
     for factor in frequencies:
         robot = Trial(prepared, factor)
-        yield _row(name, "as animated", factor, robot.left(curves.angles, curves.rates, 0.0))
+
+        def left(angles: Array, rates: Array, delay: float | None, robot: Trial = robot) -> Left:
+            if mujoco:
+                played = simulate_lumped(shot.character, grid.times, angles, 5.0 * MUJOCO_STEP)
+                found: Left = robot.compared(played.target_positions, delay)
+            else:
+                found = robot.left(angles, rates, delay)
+            return found
+
+        yield _row(name, "as animated", factor, left(curves.angles, curves.rates, 0.0))
         for kind in KINDS:
             made: Curves = shaped(curves, grid, kind, *modes)
-            yield _row(name, kind, factor, robot.left(made.angles, made.rates, None))
-        for share, (angles, rates, report) in zip(SHARES, streams, strict=True):
-            found, ticks = robot.left(angles, rates, report["latency_s"]), report["tick_s"]
-            yield _row(name, f"live, {share:g} of the period", factor, found, ticks["median"], ticks["p99"])
+            yield _row(name, kind, factor, left(made.angles, made.rates, None))
+        for share, (angles, rates, report, ticks) in zip(SHARES, streams, strict=True):
+            found, limited = left(angles, rates, report["latency_s"]), report["limited"].values()
+            share_limited = 100.0 * max(limited, default=0) / report["ticks"]
+            half, most = 1e3 * np.quantile(ticks, [0.5, 0.99])
+            row = _row(name, f"live, {share:g} of the period", factor, found)
+            yield replace(row, tick_ms=half, tick_99_ms=most, limited_percent=share_limited)
 
 
-def _row(
-    shot: str, method: str, frequencies: float, left: tuple[float, Array], median: float = 0.0, p99: float = 0.0
-) -> Row:
+def with_random_moves(shot: CompiledShot, seconds: float, seed: int = 0) -> CompiledShot:
+    """The robot on moves of half a second and more between poses within 0.4 rad (0.1 m) of the first one.
+
+    Speeds and accelerations stay within 80% of the limits of the motors.
+
+    Args:
+        seconds: Of the whole, with a second of rest at its end.
+    """
+    random, motors, joints = np.random.default_rng(seed), shot.character.motors, shot.character.joints
+    times = np.arange(round(seconds * RATE) + 1) / RATE
+    start = np.array([float(np.interp(0.0, track.times, track.values)) for track in shot.animation.current])
+    reach = np.array([0.1 if joints[motor.joint].kind == "prismatic" else 0.4 for motor in motors])
+    lower = np.maximum(start - reach, [joints[motor.joint].lower for motor in motors])
+    upper = np.minimum(start + reach, [joints[motor.joint].upper for motor in motors])
+    fastest = np.array([0.8 * motor.max_velocity for motor in motors])
+    hardest = np.array([0.8 * motor.max_acceleration for motor in motors])
+    values, at, pose = np.tile(start, (len(times), 1)), 0.2, start
+    while at < seconds - 2.0:
+        length = random.uniform(0.5, 1.0)
+        # of the fifth order: at most 15/8 of the mean speed, and 10/sqrt(3) of way over time squared
+        most = np.minimum(fastest * length * 8.0 / 15.0, hardest * length**2 * np.sqrt(3.0) / 10.0)
+        to = pose + np.clip(random.uniform(lower, upper) - pose, -most, most)
+        s = np.clip((times - at) / length, 0.0, 1.0)[:, None]
+        values += (to - pose) * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+        at, pose = at + length + random.uniform(0.0, 0.3), to
+    for k, motor in enumerate(motors):
+        if motor.follows is not None:
+            values[:, k] = motor.follows.offset + motor.follows.ratio * values[:, motor.follows.leader]
+    tracks, frames = tuple(Track(times, column) for column in values.T), times[:: round(RATE / 25.0)]
+    animation = replace(shot.animation, frame_times=frames, tracks=tracks, current=tracks)
+    return compile_shot(shot.character, animation, shot.bodies)
+
+
+def _ticks(shot: CompiledShot, settings: LiveSettings, motion: Callable[[float], Array], most: int = 5000) -> Array:
+    """Processor time of the thread of the ticks, shape [N] [s]; another one renews the gains."""
+    end = float(shot.animation.frame_times[-1])
+    count, found = min(round(end * settings.rate), most), []
+    with Live(shot, settings) as live:
+        for k in range(count):
+            sample = motion(k * live.tick_s)
+            begin = time.thread_time()
+            live.step(k * live.tick_s, sample)
+            found.append(time.thread_time() - begin)
+    return np.array(found)
+
+
+def _row(shot: str, method: str, frequencies: float, left: Left) -> Row:
     late, distances = left
     rms = 1e3 * float(np.sqrt(np.mean(distances**2)))
-    return Row(shot, method, frequencies, late, rms, 1e3 * float(distances.max()), 1e3 * median, 1e3 * p99)
+    return Row(shot, method, frequencies, late, rms, 1e3 * float(distances.max()))
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    options = bench_parser("live", __doc__, SAMPLES).parse_args(arguments)
-    return on_shots(options, "Streams and shapers", Row, compare)
+    parser = bench_parser("live", __doc__, SAMPLES)
+    parser.add_argument("--random", metavar="S", type=float, help="moves between random poses for so many seconds")
+    parser.add_argument("--mujoco", action="store_true", help="rigid bodies on motors that give, played by MuJoCo")
+    options = parser.parse_args(arguments)
+    rows: list[Row] = []
+    for path in options.shots:
+        shot = giving_shot(path, None) if options.mujoco else load(path)
+        if options.random:
+            shot = with_random_moves(shot, options.random)
+        rows += compare(Path(path).stem, shot, (1.0,) if options.mujoco else FREQUENCIES, options.mujoco)
+        say(f"{path} is done")
+        keep(options, Row, rows)
+    finish(options, "Streams and shapers", rows)
+    return 0

@@ -132,3 +132,53 @@ def test_gains_for_several_robots_leave_less_on_one_that_is_slower():
             robot = slower.transition @ robot + slower.by_change @ change + slower.by_impulse @ own[k]
         left.append(rms(np.array(found)))
     assert left[1] < 0.7 * left[0]
+
+
+def test_half_the_longest_period_leaves_at_most_twice_what_the_whole_future_does():
+    """Two hinges and two modes."""
+    pose, intended = two_hinges(), moves(12.0, 2)
+    half = round(np.pi / pose.omega[0] / TICK)
+    rest, left = np.eye(2), []
+    for window in (len(intended), half, half // 4):
+        left.append(rms(played(gains_at(pose, rest, weighting(window, 2)), intended, window)))
+    assert left[0] <= left[1] <= 2.0 * left[0] < left[2]
+
+
+def left_on_another(factor, spread=(1.0,), lookahead=0.17, seed=0):
+    """What live commands and ZVD leave on a hinge of another frequency than they know [m]."""
+    intended, window = moves(20.0, 1, seed), round(lookahead / TICK)
+    gains = gains_at(hinge(), np.eye(1), weighting(window, 1, frequencies=spread))
+    robot = gains_at(hinge(3.0 * factor), np.eye(1), weighting(window, 1))
+    accelerations = np.diff(intended, 2, axis=0, prepend=intended[:1], append=intended[-1:]) / TICK**2
+    known = gains.impulses(accelerations, np.zeros((len(intended), 1)), np.zeros((len(intended), 1)), TICK)
+    x, commands = np.zeros(len(gains.transition)), []
+    for k in range(len(known)):
+        ahead = known[k : k + window]
+        change = -gains.feedback @ x - np.einsum("kmi,ki->m", gains.preview[: len(ahead)], ahead)
+        x = gains.transition @ x + gains.by_change @ change + gains.by_impulse @ known[k]
+        commands.append(intended[min(k + 1, len(intended) - 1)] + x[:1])
+
+    def tip(of):
+        """Of the robot that follows commands, shape [T]."""
+        changes, at, found = np.diff(of, 2, axis=0, prepend=of[:1], append=of[-1:]) / TICK, np.zeros(4), []
+        for k, change in enumerate(changes):
+            found.append(of[k, 0] + at[2])
+            at = robot.transition @ at + robot.by_change @ change
+        return np.array(found)
+
+    live = tip(np.concatenate([intended[:1], commands[:-1]])) - intended[:, 0]
+    times, half = TICK * np.arange(len(intended)), 0.5 / (3.0 * np.sqrt(1.0 - 0.01**2))
+    K = np.exp(-np.pi * 0.01 / np.sqrt(1.0 - 0.01**2))
+    shaped = sum(
+        share * np.interp(times - late, times, intended[:, 0])
+        for share, late in zip(np.array([1.0, 2.0 * K, K * K]) / (1.0 + K) ** 2, (0.0, half, 2.0 * half), strict=True)
+    )
+    zvd = tip(shaped[:, None])
+    zvd_left = min(np.std(zvd - np.interp(times - late, times, intended[:, 0])) for late in np.arange(0.1, 0.25, 2e-3))
+    return float(np.sqrt(np.mean(live**2))), float(zvd_left)
+
+
+@pytest.mark.parametrize("factor", [0.98, 1.02])
+def test_a_frequency_within_two_percent_leaves_a_third_of_what_zvd_does(factor):
+    live, zvd = left_on_another(factor, (0.98, 1.0, 1.02))
+    assert live <= zvd / 3.0, (live, zvd)

@@ -72,9 +72,10 @@ def test_a_low_pass_filter_takes_the_mode_out_of_the_motion_without_delay(parts)
 
 
 def test_what_cannot_be_shaped_is_refused(parts):
-    for kind, frequencies in (("zvx", FREQUENCIES), ("zv", np.zeros(0))):
+    damped = np.full(len(FREQUENCIES), 1.5)
+    for kind, modes in (("zvx", (FREQUENCIES, RATIOS)), ("zv", (np.zeros(0),) * 2), ("zv", (FREQUENCIES, damped))):
         with pytest.raises(ShotError) as error:
-            shaped(*parts, kind, frequencies, RATIOS)
+            shaped(*parts, kind, *modes)
         assert error.value.remedy and error.value.found == kind
 
 
@@ -98,3 +99,10 @@ def test_the_best_delay_is_the_one_by_which_a_motion_is_late(late):
     found, left = best_delay(motion(np.maximum(times - late, times[0])), motion(times), times >= 0.0, h)
     assert found == pytest.approx(late, abs=0.003) and left.shape == (1001, 1)
     assert left.max() < 0.01
+
+
+def test_modes_that_do_not_vibrate_are_not_shaped_for():
+    """The lowest that does is taken, also where heavier damped ones are lower."""
+    found = impulses("zv2", np.array([1.0, *FREQUENCIES]), np.array([1.2, *RATIOS]))
+    for part, alone in zip(found, impulses("zv2", FREQUENCIES, RATIOS), strict=True):
+        np.testing.assert_array_equal(part, alone)

@@ -24,13 +24,14 @@ def impulses(kind: str, frequencies: Array, damping: Array) -> tuple[Array, Arra
     """Times [s] and amplitudes, of sum one, of a shaper.
 
     Args:
-        kind: `zv` or `zvd` for the lowest mode, `zv2` or `zvd2` for the lowest two.
+        kind: `zv` or `zvd` for the lowest mode that vibrates, `zv2` or `zvd2` for the lowest two.
         frequencies: Undamped, of the modes [Hz], ascending.
-        damping: Their ratios of critical.
+        damping: Their ratios of critical; modes of one and more do not vibrate.
     """
     times, amplitudes = np.zeros(1), np.ones(1)
     count = 2 if kind.endswith("2") else 1
-    for frequency, ratio in zip(frequencies[:count], damping[:count], strict=True):
+    vibrates = damping < 1.0
+    for frequency, ratio in zip(frequencies[vibrates][:count], damping[vibrates][:count], strict=True):
         K = np.exp(-np.pi * ratio / np.sqrt(1.0 - ratio**2))
         own = np.array([1.0, 2.0 * K, K * K]) if "d" in kind else np.array([1.0, K])
         half = 0.5 / (frequency * np.sqrt(1.0 - ratio**2))
@@ -55,12 +56,13 @@ def shaped(
     Raises:
         ShotError: There is no such shaper, or no frequency to shape for.
     """
-    if kind not in SHAPERS or not len(frequencies):
+    vibrates = len(frequencies) > 0 if kind == "lowpass" else np.any(damping < 1.0)
+    if kind not in SHAPERS or not vibrates:
         raise ShotError(
-            "there is no such shaper" if len(frequencies) else "a rigid robot has no frequency for a shaper",
+            "there is no such shaper" if vibrates else "a robot that does not vibrate has no frequency for a shaper",
             attribute="--shaper",
             found=kind,
-            remedy=f"Use one of {', '.join(SHAPERS)}." if len(frequencies) else "Leave it out.",
+            remedy=f"Use one of {', '.join(SHAPERS)}." if vibrates else "Leave it out.",
         )
     times = grid.times
     if kind == "lowpass":
