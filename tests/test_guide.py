@@ -49,6 +49,37 @@ def test_the_command_of_the_guide_runs(calmotion, make_plugin, monkeypatch):
     assert "list the fastest moments of a shot" in calmotion("--help").stdout
 
 
+def test_limits_and_residuals_of_plugins_count_in_a_search(make_plugin, repository):
+    from calmotion.host import Outcome
+    from calmotion.model import Result
+    from calmotion.model.run import RunSettings, Source
+    from calmotion.simulation.compiled_shot import compile_shot
+    from calmotion.testing import check_plugin, derivative_error, host_with, run_operator, small_shot
+
+    sources = re.findall(r"```python\n(.*?)```", (GUIDE.parent / "three_plugins.md").read_text(), re.DOTALL)
+    folders = [make_plugin(*plugin) for plugin in zip(("soft_start", "slow_target"), sources, strict=False)]
+    assert [check_plugin(folder) for folder in folders] == [[], []]
+    character, animation = small_shot()
+    host = host_with(repository / "plugins/vibration_optimizer", *folders)
+    given = [character, animation, compile_shot(character, animation), Source("a", "optimize", RunSettings(step=0.01))]
+    ask = {"soft_start.limit": {"largest": 10.0}, "slow_target.residual": {"target": character.targets[0].path}}
+    run = host.run(given, [Result], settings=ask).finish()
+    assert run.results[-1].outcome is Outcome.DONE, run.results[-1].traceback
+    used, reports = {use.name: use for use in run.get(Result).terms}, [line.text for line in run.results[-1].records]
+    limit, residual = used["change of acceleration"], used["velocity of a target"]
+    assert 9.9 < abs(limit.after) <= 10.0 and limit.label in {motor.path for motor in character.motors}
+    assert residual.after < 0.8 * residual.before
+    assert any("keeps its limit" in line for line in reports) and any("m/s rms" in line for line in reports)
+    for idname in ask:
+        values = [character] if host.operators[idname].requires else []
+        (made,) = run_operator(host, idname, values, {idname: ask[idname]})
+        assert derivative_error(made.terms[0], character, animation) < 1e-6
+    wrong = host.run(given, [Result], settings={"slow_target.residual": {"target": "/Arm/Tip"}}).finish()
+    outcomes = {step.idname: step.outcome for step in wrong.results}
+    assert outcomes["slow_target.residual"] is Outcome.FAILED
+    assert outcomes["retarget.optimize"] is Outcome.BLOCKED, "not left out silently"
+
+
 @pytest.mark.long
 def test_the_guide_leads_from_an_empty_folder_to_an_installed_wheel(repository, tmp_path):
     wheels = tmp_path / "wheels"

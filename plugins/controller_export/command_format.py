@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from calmotion.errors import ShotError
-from calmotion.host import NotAsked, Operator, PropertyValues, RunContext
+from calmotion.host import NotAsked, Operator, PluginError, PropertyValues, RunContext
 
 from .commands import HIGHEST_RATE, Commands, ExportRequest, MotorCurves, WrittenCommands
 
 
-class CommandFormat(Operator):
+class CommandFormat(Operator, ABC):
     """Base of the formats of `calmotion export`: samples curves, writes commands, and reads them back.
 
     What is read back is simulated as its player plays it, so that `read` shall parse the files, and not return what
@@ -26,6 +27,7 @@ class CommandFormat(Operator):
     format: ClassVar[str] = ""
     suffix: ClassVar[str] = ""
     highest_rate: ClassVar[float] = HIGHEST_RATE
+    named = ("format", "suffix")
     requires = (MotorCurves, ExportRequest)
     provides = (WrittenCommands,)
 
@@ -38,19 +40,35 @@ class CommandFormat(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         """Sample, write and read back."""
         curves, request, properties = context.get(MotorCurves), context.get(ExportRequest), context.properties
-        commands = self.sampled(curves, request.rate, properties)
+        commands = self._checked("sampled", self.sampled(curves, request.rate, properties), curves)
         try:
             files = self.write(request.file, commands, curves, request.rate, properties)
         except OSError as error:
             raise ShotError(
                 "the commands cannot be written", path=request.file, found=error.strerror, remedy="Choose another file"
             ) from error
-        return (WrittenCommands(files, commands, self.read(files, curves, properties), self.notes(commands, curves)),)
+        if not isinstance(files, tuple) or not all(isinstance(file, str) for file in files):
+            raise self._fault("write", "returns no tuple of paths", files)
+        read = self._checked("read", self.read(files, curves, properties), curves)
+        return (WrittenCommands(files, commands, read, self.notes(commands, curves)),)
 
+    def _checked(self, method: str, commands: Commands, curves: MotorCurves) -> Commands:
+        fault = commands.fault(len(curves.motors)) if isinstance(commands, Commands) else "they are no Commands"
+        if fault:
+            raise self._fault(method, "returns commands that no player can play", fault)
+        return commands
+
+    def _fault(self, method: str, problem: str, found: object) -> PluginError:
+        return PluginError(
+            f"{method} of the format {self.format} {problem}", path=f"operator {self.idname}", found=found,
+            remedy="See the docstrings of calmotion_plugins.controller_export.CommandFormat and Commands.",
+        )  # fmt: skip
+
+    @abstractmethod
     def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
         """Commands for curves at a rate [Hz], not rounded."""
-        raise NotImplementedError
 
+    @abstractmethod
     def write(
         self, file: str, commands: Commands, curves: MotorCurves, rate: float, properties: PropertyValues
     ) -> tuple[str, ...]:
@@ -60,11 +78,10 @@ class CommandFormat(Operator):
             OSError: A file cannot be written.
             ShotError: The format cannot express them.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def read(self, files: Sequence[str], curves: MotorCurves, properties: PropertyValues) -> Commands:
         """Read commands back from the files, in the order of the motors of the curves."""
-        raise NotImplementedError
 
     def notes(self, commands: Commands, curves: MotorCurves) -> tuple[str, ...]:
         """What the user of the files must know, as sentences."""

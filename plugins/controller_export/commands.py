@@ -11,7 +11,14 @@ from calmotion.model import Animation, Character, Motor
 
 HOLD, LINEAR, CUBIC, QUINTIC, BEZIER, FOLLOW = "hold", "linear", "cubic", "quintic", "bezier", "follow"
 LOWEST_RATE, HIGHEST_RATE = 1.0, 1e5  # commands a second [Hz]
-INTERPOLATIONS = (HOLD, LINEAR, CUBIC, QUINTIC, BEZIER, FOLLOW)
+INTERPOLATIONS: dict[str, tuple[str, ...]] = {  # with what a player needs beside times and positions
+    HOLD: (),
+    LINEAR: (),
+    CUBIC: ("velocities",),
+    QUINTIC: ("velocities", "accelerations"),
+    BEZIER: ("handles",),
+    FOLLOW: ("follower",),
+}
 # A held value is a step, which no motor can follow: it gets there at constant speed within this time, or within a
 # period where that is shorter [s]. Steps of splines are played within the same time.
 SETTLED = 0.01
@@ -109,6 +116,24 @@ class Commands:
     start: Array | None = None
     handles: Array | None = None
     follower: Follower | None = None
+
+    def fault(self, motors: int) -> str:
+        """What keeps a player of M motors from playing them; empty where nothing does."""
+        n, needed = len(self.times), INTERPOLATIONS.get(self.interpolation)
+        if needed is None:
+            return f"the interpolation {self.interpolation!r} is none of {', '.join(INTERPOLATIONS)}"
+        if lacking := [name for name in needed if getattr(self, name) is None]:
+            return f"the interpolation {self.interpolation} needs {' and '.join(lacking)}"
+        if np.ndim(self.times) != 1 or not n or not np.all(np.diff(self.times) > 0.0):
+            return "their times do not increase"
+        shapes = dict.fromkeys(("positions", "velocities", "accelerations"), (n, motors))
+        for name, shape in {**shapes, "start": (motors,), "handles": (n - 1, motors, 4)}.items():
+            values = getattr(self, name)
+            if values is not None and np.shape(values) != shape:
+                return f"{name} have shape {list(np.shape(values))} instead of {list(shape)}"
+            if values is not None and not np.all(np.isfinite(values)):
+                return f"{name} are not finite"
+        return ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,12 +18,14 @@ from calmotion.model import (
     ShapedTracks,
     Source,
     TempoSettings,
+    TermUse,
     is_exceeded,
     is_reached,
     run_settings,
     simplified_character,
     with_choices,
 )
+from calmotion.retargeting import SearchTerms
 from calmotion.simulation import CompiledShot
 from calmotion.tolerance import ConvergedReduction, compiled_in
 
@@ -57,6 +59,17 @@ def _input(context: RunContext) -> tuple[Character | None, Animation | None]:
     if character is not None:
         character = simplified_character(character, context.get(ModelChoices))
     return character, context.get(Animation)
+
+
+def _told(term: TermUse) -> str:
+    """What became of a residual or limit of a plugin, as a clause."""
+    before, after = f"{term.before:.4g} {term.unit}".rstrip(), f"{term.after:.4g} {term.unit}".rstrip()
+    if term.limit is None:
+        return f"{term.name}: {after} rms, {before} before"
+    where = f" of {term.label}" if term.label else ""
+    verdict = "exceeds its limit" if is_exceeded(term) else "keeps its limit"
+    limit = f"{term.limit:.4g} {term.unit}".rstrip()
+    return f"{term.name}{where} {verdict} {limit}: {after} at {term.time_s:.3f} s, {before} before"
 
 
 def _wrong_command(data: Mapping[type, Any], command: str) -> str | None:
@@ -133,9 +146,9 @@ class OptimizeShot(Operator):
     idname = "retarget.optimize"
     label = "Optimise the motor curves"
     requires = (CompiledShot, Source)
-    uses = (ConvergedReduction, OutputPaths, ModelChoices, Character, Animation, Provenance)
+    uses = (ConvergedReduction, OutputPaths, ModelChoices, Character, Animation, Provenance, SearchTerms)
     provides = (Result,)
-    checks = (Character, Animation, Source, ModelChoices, Provenance)
+    checks = (Character, Animation, Source, ModelChoices, Provenance, SearchTerms)
     properties = (
         Property("max_iterations", int, 30, minimum=1, description="Largest number of Gauss-Newton iterations"),
         Property(
@@ -270,10 +283,12 @@ class OptimizeShot(Operator):
             context.report(
                 "warning", "interrupted: these are the best curves so far; the same command resumes from them"
             )
+        for term in result.terms:
+            context.report("warning" if is_exceeded(term) else "info", _told(term))
         if not result.improved:
             reason = f"the search ended: {result.search.stopped}"
-            if any(map(is_exceeded, result.limits)):
-                reason = "limits of motors are still exceeded. Slow the animation down there, or raise the limits"
+            if any(map(is_exceeded, (*result.limits, *result.terms))):
+                reason = "limits are still exceeded. Slow the animation down there, or raise the limits"
             elif any(map(is_reached, result.limits)):
                 reason = "the limits of the motors require it"
             context.report(
@@ -283,11 +298,12 @@ class OptimizeShot(Operator):
         return [_with_budget(context, result, least_gain=options.least_gain)]
 
     def _search_options(self, context: RunContext) -> Any:
-        values = context.properties
+        values, added = context.properties, context.get(SearchTerms)
         given = {"least_gain": values.least_gain} if values.least_gain else {}
         return _options(
             context,
             **given,
+            terms=() if added is None else added.terms,
             max_iterations=values.max_iterations,
             goal=values.goal or None,
             knot_spacing=values.knot_spacing or None,

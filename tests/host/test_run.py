@@ -1,4 +1,5 @@
 import os
+from dataclasses import dataclass
 
 import pytest
 from calmotion.errors import ShotError
@@ -273,3 +274,23 @@ def test_settings_are_not_checked_where_a_value_for_it_could_not_be_made():
     melt = operator("smithy.melt", requires=[Ore], uses=[Coal], provides=[Iron], checks=[Ore, Coal], check=check)
     run = host_of(DIG, burn, melt).run([], [Iron]).finish()
     assert not seen and [failure.idname for failure in run.failures()] == ["wood.burn"]
+
+
+def test_values_that_add_up_come_from_several_operators_and_none_is_lost():
+    @dataclass(frozen=True)
+    class Logs:
+        names: tuple[str, ...] = ()
+
+        @classmethod
+        def joined(cls, parts):
+            return cls(sum((part.names for part in parts), ()))
+
+    def cut(name, fails=False):
+        return lambda context: [Logs((name,))] if not fails else 1 / 0
+
+    saw = operator("mill.saw", requires=[Logs], provides=[Coal])
+    oak, elm = (operator(f"wood.{name}", provides=[Logs], execute=cut(name)) for name in ("oak", "elm"))
+    run = host_of(oak, saw, elm).run([], [Coal]).finish()
+    assert run.get(Logs) == Logs(("oak", "elm")) and run.results[-1].idname == "mill.saw"
+    broken = operator("wood.ash", provides=[Logs], execute=cut("ash", fails=True))
+    assert outcomes(host_of(oak, broken, saw).run([], [Coal]).finish())["mill.saw"] == Outcome.BLOCKED

@@ -85,6 +85,7 @@ class Operator:
         provides: Types that it makes.
         properties: What can be set.
         checks: Types among `requires` and `uses` from which `check` refuses what `execute` would refuse.
+        named: Attributes that operators of this base have to fill in.
     """
 
     idname: ClassVar[str] = ""
@@ -94,6 +95,7 @@ class Operator:
     provides: ClassVar[tuple[type, ...]] = ()
     properties: ClassVar[tuple[Property, ...]] = ()
     checks: ClassVar[tuple[type, ...]] = ()
+    named: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
@@ -158,6 +160,9 @@ def check_operator(cls: object) -> None:
         refuse("checks and check belong together", remedy="Name in `checks` the types that `check` reads.")
     if cls.execute is Operator.execute:
         refuse("execute is missing")
+    lacking = [*(name for name in cls.named if not getattr(cls, name)), *getattr(cls, "__abstractmethods__", ())]
+    if lacking:
+        refuse(f"it lacks {', '.join(lacking)}", remedy=f"Define them as {cls.__mro__[1].__name__} describes.")
     for method, arguments in (("poll", [{}]), ("check", [None, None]), ("execute", [None, None])):
         try:
             inspect.signature(getattr(cls, method)).bind(*arguments)

@@ -15,6 +15,11 @@ from calmotion.host.operators import Operator
 Operators = Sequence[type[Operator]]
 
 
+def adds_up(kind: type) -> bool:
+    """Whether several operators may make values of a type: it has a class method `joined` that takes all of them."""
+    return callable(getattr(kind, "joined", None))
+
+
 @dataclass(frozen=True)
 class Plan:
     """What runs, in order.
@@ -31,9 +36,9 @@ class Plan:
 
     @cached_property
     def contested(self) -> frozenset[type]:
-        """Types that more than one operator makes."""
+        """Types that more than one operator makes, and one may."""
         makers = Counter(kind for cls in self.operators for kind in cls.provides)
-        return frozenset(kind for kind, count in makers.items() if count > 1)
+        return frozenset(kind for kind, count in makers.items() if count > 1 and not adds_up(kind))
 
     def useful(self, lost: Collection[type], known: Collection[type]) -> set[type[Operator]]:
         """The operators that are still needed where some types cannot be made.

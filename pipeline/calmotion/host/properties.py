@@ -131,7 +131,7 @@ class Property:
         kind: `float`, `int`, `bool` or `str`.
         default: Value when nobody sets it, always allowed, also outside the range; None for a number that is optional:
             `auto` then leaves it to the operator.
-        unit: Unit of the value (one of `units.py`), empty for a number without one.
+        unit: Unit of the value (one of `_UNITS`), empty for a number without one.
         minimum, maximum: Range, bounds included; None: open.
         choices: The allowed strings; empty: any.
         description: One sentence for the user.
@@ -219,7 +219,11 @@ class Property:
         if self.kind not in (float, int, bool, str):
             raise PluginError(f"property {self.name} must be float, int, bool or str", found=self.kind)
         if not is_unit(self.unit) or (self.unit and self.kind not in (float, int)):
-            raise PluginError(f"property {self.name} has a unit that is not known", found=repr(self.unit))
+            known = ", ".join(unit for unit in _UNITS if unit)
+            raise PluginError(
+                f"property {self.name} has a unit that is not known", found=repr(self.unit),
+                remedy=f"Use one of {known}, of a float or an int, or none, and say it in the description.",
+            )  # fmt: skip
         if self.default is None:
             if self.kind not in (float, int):
                 raise PluginError(f"property {self.name} has no default", found=None)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from calmotion.host.errors import PluginError
 from calmotion.host.operators import NotAsked, Operator, Record, RunContext
-from calmotion.host.plan import Plan, can_check, find_rivals, poll, will_run
+from calmotion.host.plan import Plan, adds_up, can_check, find_rivals, poll, will_run
 from calmotion.host.properties import PropertyValues
 from calmotion.support import interrupts
 from calmotion.support.memory import RESERVE, peak_memory, require_address_space
@@ -162,7 +162,8 @@ class Run:
         if rivals:
             return self._failure(cls, self._rivalry(rivals[0], self._refused[rivals[0]]))
         # A used value may be absent because nobody needs it, but not because making it failed.
-        failed = [kind for kind in cls.requires + cls.uses if kind not in self.data and kind in self._failed]
+        needs = (kind for kind in cls.requires + cls.uses if kind in self._failed)
+        failed = [kind for kind in needs if kind not in self.data or adds_up(kind)]
         missing = failed or [kind for kind in cls.requires if kind not in self.data]
         if missing:
             self._failed |= set(cls.provides if failed else ())
@@ -186,7 +187,7 @@ class Run:
             if reason is not None:
                 return self._result(cls, Outcome.LEFT_OUT, reason=reason)
             for kind in cls.provides:
-                if kind in self.data:
+                if kind in self.data and not adds_up(kind):
                     made = (self._made[kind],) if kind in self._made else ()
                     raise self._rivalry(kind, (*made, cls))
             self._progress(cls.label, 0.0, "")
@@ -198,7 +199,9 @@ class Run:
         except (Exception, SystemExit) as error:  # a plugin does not end the host
             interrupts.check()  # which it may have made of an interrupt
             return self._failure(cls, error, start, context)
-        self.data.update(values)
+        for kind, value in values.items():
+            known = [self.data[kind]] if kind in self.data else []
+            self.data[kind] = kind.joined([*known, value]) if adds_up(kind) else value  # type: ignore[attr-defined]
         self._made |= dict.fromkeys(values, cls)
         return self._result(cls, Outcome.DONE, **_cost(start), records=self._records(context), progress=1.0)
 

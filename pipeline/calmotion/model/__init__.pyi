@@ -29,6 +29,7 @@ from calmotion.model.curves import curve_of as curve_of
 from calmotion.model.curves import held_curve as held_curve
 from calmotion.model.limits.kinds import has_limits as has_limits
 from calmotion.model.limits.use import LimitUse as LimitUse
+from calmotion.model.limits.use import TermUse as TermUse
 from calmotion.model.limits.use import is_exceeded as is_exceeded
 from calmotion.model.limits.use import is_reached as is_reached
 from calmotion.model.meshes import FEMesh as FEMesh

@@ -9,7 +9,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model.animation import Animation
 from calmotion.model.character import Character
-from calmotion.model.limits.use import LimitUse
+from calmotion.model.limits.use import LimitUse, TermUse
 from calmotion.model.run import SearchRecord
 from calmotion.model.tempo import TempoReport
 from calmotion.model.tolerance import BudgetEntry
@@ -265,6 +265,7 @@ class Result:
         robustness: The curves on robots that differ from the model; None where they were optimised for one robot.
         friction_band_m: How far Coulomb friction may hold each target off at rest [m], shape [K]; None without any.
         goal_m: Error that is accepted at the targets [m]; None where none is named.
+        terms: Residuals and limits of plugins.
         retimed: The animation at the tempo that was found, to whose times all motions belong; None: at its own.
     """
 
@@ -293,6 +294,7 @@ class Result:
     friction_band_m: Array | None = None
     retimed: Retimed | None = None
     goal_m: float | None = None
+    terms: tuple[TermUse, ...] = ()
 
     @property
     def interrupted(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from calmotion.model.tempo import TempoSettings
 from calmotion.model.tolerance import SEARCH_SHARE
@@ -35,6 +36,7 @@ class RunSettings:
         narrowed: Shares of the limits within which a search keeps each motor, by the name of the quantity; those of
             others are kept as they are.
         robust: Settings of an optimisation for a set of robots; None: for the nominal robot alone.
+        terms: Residuals and limits of plugins, `retargeting.SearchTerm`.
     """
 
     tolerance: float | None = None
@@ -55,6 +57,7 @@ class RunSettings:
     limited_by_tempo: bool = False
     narrowed: tuple[tuple[str, tuple[float, ...]], ...] = ()
     goal: float | None = None
+    terms: tuple[Any, ...] = ()
 
     @property
     def scheme(self) -> str:

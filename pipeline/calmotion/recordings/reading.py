@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -17,7 +18,7 @@ from calmotion.support.naming import nearest
 from calmotion.workflow.problems import value_of
 
 
-class RecordingReader(Operator):
+class RecordingReader(Operator, ABC):
     """Base of the readers of `calmotion calibrate --recording FILE`.
 
     Attributes:
@@ -25,6 +26,7 @@ class RecordingReader(Operator):
     """
 
     suffixes: ClassVar[tuple[str, ...]] = ()
+    named = ("suffixes",)
     requires = (RecordingRequest,)
     provides = (SensorRecording,)
 
@@ -54,6 +56,7 @@ class RecordingReader(Operator):
             context.report("info", note)
         return (recording,)
 
+    @abstractmethod
     def read(self, request: RecordingRequest, properties: PropertyValues) -> SensorRecording:
         """The recording in a file.
 
@@ -61,7 +64,6 @@ class RecordingReader(Operator):
             OSError: It cannot be read.
             ShotError: It is wrong; the message names the place in the file and what to do.
         """
-        raise NotImplementedError
 
 
 def hash_of(file: str) -> str:

@@ -11,6 +11,17 @@ from calmotion.retargeting.problem.posing import CLOSENESS as CLOSENESS
 from calmotion.retargeting.problem.posing import SMOOTHNESS as SMOOTHNESS
 from calmotion.retargeting.problem.problem import Evaluation as Evaluation
 from calmotion.retargeting.problem.problem import RetargetProblem as RetargetProblem
+from calmotion.retargeting.quantities.base import Quantity as Quantity
+from calmotion.retargeting.quantities.base import RobotChange as RobotChange
+from calmotion.retargeting.quantities.base import Slopes as Slopes
+from calmotion.retargeting.quantities.efforts import Efforts as Efforts
+from calmotion.retargeting.quantities.functions import FilteredCommands as FilteredCommands
+from calmotion.retargeting.quantities.functions import FunctionOf as FunctionOf
+from calmotion.retargeting.quantities.functions import TargetPositions as TargetPositions
+from calmotion.retargeting.quantities.terms import AddedLimit as AddedLimit
+from calmotion.retargeting.quantities.terms import AddedResidual as AddedResidual
+from calmotion.retargeting.quantities.terms import SearchTerm as SearchTerm
+from calmotion.retargeting.quantities.terms import SearchTerms as SearchTerms
 from calmotion.retargeting.retiming.retime import optimize_with_tempo as optimize_with_tempo
 from calmotion.retargeting.retiming.rigid_robot import tempo_input as tempo_input
 from calmotion.retargeting.retiming.settings import pinned_times as pinned_times

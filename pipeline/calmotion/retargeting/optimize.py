@@ -28,6 +28,7 @@ from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem, w
 from calmotion.retargeting.robust.robots import robots_of
 from calmotion.retargeting.search import RetargetSearch
 from calmotion.retargeting.search_progress import SearchMemory
+from calmotion.retargeting.search_terms import refuse_terms, term_uses, with_terms
 from calmotion.retargeting.solver.gauss_newton import Search
 from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -61,6 +62,7 @@ def optimize_shot(
         ShotError: The shot cannot be processed.
     """
     refuse_other_integrators(options)
+    refuse_terms(options, shot.character)
     prepared = prepare(shot, options)
     model, grid = prepared.model, prepared.grid
     curves = sample_curves(shot.animation.tracks, grid)
@@ -100,7 +102,8 @@ def _optimized(
     refuse_open_joints(character, prepared.model, prepared.grid, at.run, options)
     if options.avoid_reversals:
         at = with_reversals(at, play_of(character), options.avoid_reversals)
-    at = before = with_first_penalty(with_kept_feet(prepared, at), tolerance)
+    at = with_terms(with_kept_feet(prepared, at), character, options.terms)
+    at = before = with_first_penalty(at, tolerance)
     problem = at.problem
     locked = locked_coefficients(animation, problem.space.basis, problem.space.motors, problem.grid.end)
     kept = Checkpoint(checkpoint, problem_key(problem, locked, (options, tolerance)))
@@ -139,6 +142,7 @@ def _optimized(
         limits=limit_uses(_used(before, character), _used(after, character), problem.grid, costs),
         performed=performed_motion(prepared, after.curves),
         goal_m=goal_of(character, options.goal),
+        terms=term_uses(before, after, character, options.terms),
     )
 
 

@@ -9,6 +9,7 @@ from calmotion.retargeting.optimize import refuse_other_integrators
 from calmotion.retargeting.problem.posing import unknowns
 from calmotion.retargeting.retiming.settings import refuse_tempo
 from calmotion.retargeting.robust.retarget import uncertainties_of
+from calmotion.retargeting.search_terms import refuse_terms
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.run_checks import check_simulation
 
@@ -21,6 +22,7 @@ def check_search(character: Character, animation: Animation, options: RunSetting
             robot of which nothing is uncertain, to be robust against, or none whose gears have play to avoid reversals.
     """
     refuse_other_integrators(options)
+    refuse_terms(options, character)
     refuse_without_play(character, options)
     if options.retime is not None:
         refuse_tempo(character, animation, options.retime)

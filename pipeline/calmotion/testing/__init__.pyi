@@ -10,5 +10,6 @@ from calmotion.testing.beam_arms import shot_of as shot_of
 from calmotion.testing.plugins import check_plugin as check_plugin
 from calmotion.testing.plugins import host_with as host_with
 from calmotion.testing.plugins import run_operator as run_operator
+from calmotion.testing.search_terms import derivative_error as derivative_error
 from calmotion.testing.small_shots import beam as beam
 from calmotion.testing.small_shots import small_shot as small_shot

@@ -8,13 +8,15 @@ import json
 import os
 import re
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 from calmotion.errors import ShotError
+from calmotion.host import PluginError
 from calmotion.model.curves import commanded_curves
-from calmotion.testing import host_with, run_operator, small_shot
+from calmotion.testing import check_plugin, host_with, run_operator, small_shot
 from calmotion_plugins.controller_export.commands import ExportRequest, MotorCurves
 
 SERVOS = """
@@ -272,3 +274,47 @@ def test_a_file_that_cannot_be_written_is_refused(write, tmp_path, name):
     with pytest.raises(ShotError, match="cannot be written"):
         write(name, file="taken/commands")
     assert [path.name for path in tmp_path.iterdir()] == ["taken"] and os.path.isfile(tmp_path / "taken")
+
+
+EXAMPLE = Path(__file__).resolve().parents[3] / "docs" / "three_plugins.md"
+
+
+@pytest.fixture
+def example(make_plugin):
+    """The format of the page of examples, with parts of its source replaced."""
+    source = re.findall(r"```python\n(.*?)```", EXAMPLE.read_text(), re.DOTALL)[2]
+
+    def make(part="", by=""):
+        return make_plugin("xml_angles", source.replace(part, by))
+
+    return make
+
+
+def test_the_format_of_the_page_is_one_file(example, curves, tmp_path):
+    assert check_plugin(folder := example()) == []
+    request = ExportRequest("xml", 60.0, str(tmp_path / "a.xml"))
+    (written,) = run_operator(host_with(folder), "export.xml", [curves, request])
+    np.testing.assert_allclose(written.read.positions, curves.at(written.read.times), atol=0.51e-2 * np.pi / 180.0)
+    assert len(written.read.times) == 61
+
+
+@pytest.mark.parametrize(
+    ("part", "by", "told"),
+    [
+        ("    def read(", "    def reads(", "lacks read"),
+        ('    format = "xml"', "", "lacks format"),
+        ("return (file,)", "return file", "write of the format xml returns no tuple of paths"),
+        ("Commands(LINEAR, times, curves", 'Commands("lines", times, curves', "sampled .* 'lines' is none of hold"),
+        ("Commands(LINEAR, times, values", 'Commands("cubic", times, values', "read .* cubic needs velocities"),
+        (
+            "values / per_unit(curves)",
+            "(values / per_unit(curves))[:, :1]",
+            r"read .* shape \[61, 1\]",
+        ),
+        ("Commands(LINEAR, times, values", "Commands(LINEAR, times * 0.0, values", "read .* times do not increase"),
+    ],
+)
+def test_a_format_that_is_wrong_is_told_what_is(example, curves, tmp_path, part, by, told):
+    request = ExportRequest("xml", 60.0, str(tmp_path / "a.xml"))
+    with pytest.raises(PluginError, match=told):
+        run_operator(host_with(example(part, by)), "export.xml", [curves, request])

@@ -25,6 +25,13 @@ class Bounds:
     upper: Array
     scale: Array
 
+    @classmethod
+    def between(cls, lower: Array, upper: Array) -> Bounds:
+        """Bounds whose scale is their size, or 1 where that is zero or there are none."""
+        both = np.abs(np.stack([lower, upper]))
+        size = np.max(np.where(np.isfinite(both), both, 0.0), axis=0)
+        return cls(lower, upper, np.where(size > 0.0, size, 1.0))
+
     def narrowed(self, shares: Array) -> Bounds:
         """So large shares of these bounds, shape [M]."""
         return Bounds(self.lower * shares, self.upper * shares, self.scale)
@@ -43,10 +50,8 @@ def motor_bounds(character: Character, movable: BoolArray | None = None) -> dict
         lower, upper = np.array(pairs, float).reshape(-1, 2).T
         if movable is not None and isinstance(kind, CurveLimit):
             lower, upper = np.where(movable, lower, -np.inf), np.where(movable, upper, np.inf)
-        finite = np.isfinite(np.stack([lower, upper]))
-        size = np.max(np.where(finite, np.abs(np.stack([lower, upper])), 0.0), axis=0)
-        if np.any(finite):
-            found[name] = Bounds(lower, upper, np.where(size > 0.0, size, 1.0))
+        if np.any(np.isfinite([lower, upper])):
+            found[name] = Bounds.between(lower, upper)
     return found
 
 

@@ -29,6 +29,30 @@ class LimitUse:
     cost_m: float | None = None
 
 
+@dataclass(frozen=True)
+class TermUse:
+    """What the quantity of a plugin's residual or limit is.
+
+    Attributes:
+        name, unit: Of the quantity.
+        label: What the number belongs to; empty where there is only one.
+        before, after: With the curves of the input and of the result, in SI: the root mean square over time of a
+            residual, and of a limit the value that comes closest to it or exceeds it most.
+        limit: In SI; None for a residual.
+        time_s: When, in the result [s].
+        excess: (after - limit) over the size of the limit: positive where it is exceeded.
+    """
+
+    name: str
+    unit: str
+    label: str
+    before: float
+    after: float
+    limit: float | None = None
+    time_s: float = 0.0
+    excess: float = 0.0
+
+
 _REACHED = 1e-3  # of the size of a limit: what is nearer touches it
 _ROUNDING = 1e-6  # of the size of a limit
 
@@ -38,6 +62,6 @@ def is_reached(limit: LimitUse) -> bool:
     return limit.cost_m is not None or limit.excess > -_REACHED
 
 
-def is_exceeded(limit: LimitUse) -> bool:
-    """Whether a motor goes beyond a limit, by more than rounding."""
+def is_exceeded(limit: LimitUse | TermUse) -> bool:
+    """Whether a quantity goes beyond a limit, by more than rounding."""
     return limit.excess > _ROUNDING

@@ -151,7 +151,7 @@ class LinearRobot:
         efforts, loads = self._needs(names)
         d_load = np.zeros_like(self.at.run.trajectory.states.lam) if loads else None
         motion, effort = self.linear.tangent(values, rates, efforts, d_load)
-        change = RobotChange(motion, effort if efforts else None, d_load)
+        change = RobotChange(motion, effort if efforts else None, d_load, values)
         errors = self.errors.change(change)
         others = [np.sqrt(robot.weight) * slopes.change(change) for slopes in self.residuals]
         residuals = np.concatenate([errors, *others], axis=1) if others else errors
@@ -165,6 +165,7 @@ class LinearRobot:
             np.zeros((len(residuals), len(self.linear.model.system.parent), self.errors.jacobian.shape[3])),
             np.zeros(run.commands.shape) if efforts else None,
             np.zeros_like(run.trajectory.states.lam) if loads else None,
+            commands := np.zeros(run.commands.shape),
         )
         ends = np.cumsum([part.shape[1] for part in self.at.parts])
         errors, *others = np.split(residuals, ends[:-1], axis=1)
@@ -173,7 +174,8 @@ class LinearRobot:
             slopes.pull(root * values, pulls)
         for name, values in limited.items():
             self.limited[name].pull(values, pulls)
-        return self.linear.adjoint(pulls.motion, pulls.efforts, pulls.loads)
+        by_value, by_rate = self.linear.adjoint(pulls.motion, pulls.efforts, pulls.loads)
+        return by_value + commands, by_rate
 
     def _needs(self, names: Collection[str]) -> tuple[bool, bool]:
         """Whether the changes of efforts and of multipliers are needed for these limits and the residuals."""

@@ -22,11 +22,13 @@ class RobotChange:
         motion: Of the coordinates of the components (R^T dc, dphi, du), shape [T, B, N].
         efforts: Of the motors [N m or N], shape [T, M]; None where no quantity needs them.
         loads: Of the multipliers of the joints, shape [T, J, 6]; None where no quantity needs them.
+        commands: Of the motors' curves [rad or m], shape [T, M].
     """
 
     motion: Array
     efforts: Array | None = None
     loads: Array | None = None
+    commands: Array | None = None
 
 
 class Slopes(Protocol):
@@ -43,14 +45,21 @@ class Quantity(ABC):
     """R numbers at each of T instants of a run.
 
     Attributes:
-        by_efforts, by_loads: Whether its derivatives need the change of the efforts, and of the multipliers.
         is_stiff: Whether few of its limits act, each of which is far stiffer than all else and no matrix that is banded
             in time knows it: what a foot asks follows from all that the motors did before.
     """
 
-    by_efforts: ClassVar[bool] = False
-    by_loads: ClassVar[bool] = False
     is_stiff: ClassVar[bool] = False
+
+    @property
+    def by_efforts(self) -> bool:
+        """Whether its derivatives need the change of the efforts."""
+        return False
+
+    @property
+    def by_loads(self) -> bool:
+        """Whether its derivatives need the change of the multipliers."""
+        return False
 
     @abstractmethod
     def values(self, run: ForwardRun) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -21,7 +20,7 @@ class Efforts(Quantity):
     """Torques [N m] or forces [N] of the motors of a robot, R = M."""
 
     model: Model
-    by_efforts: ClassVar[bool] = True
+    by_efforts = True
 
     def values(self, run: ForwardRun) -> Array:
         """By the reactions of the joints."""

@@ -19,7 +19,6 @@ where a torque is far on the wrong side, r no longer depends on it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -54,7 +53,7 @@ class GearPlay(Quantity):
     sides: Array
     widths: Array
     ways: Array
-    by_efforts: ClassVar[bool] = True
+    by_efforts = True
 
     def values(self, run: ForwardRun) -> Array:
         """r."""

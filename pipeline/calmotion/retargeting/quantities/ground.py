@@ -39,7 +39,7 @@ class Ground(Quantity):
 
     limits: GroundLimits
     h: float
-    by_loads: ClassVar[bool] = True
+    by_loads = True
     is_stiff: ClassVar[bool] = True
 
     def values(self, run: ForwardRun) -> Array:

@@ -23,6 +23,7 @@ from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
 from calmotion.retargeting.robust.measure import largest_errors
 from calmotion.retargeting.robust.robots import robots_of
+from calmotion.retargeting.search_terms import with_terms
 from calmotion.retargeting.solver.gauss_newton import Ends, Search, minimize
 from calmotion.retargeting.solver.norm import PowerMean
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -193,7 +194,7 @@ def _posed(
     at = problem.at(np.zeros(problem.size))
     if options.avoid_reversals:
         at = with_reversals(at, play_of(prepared.character), options.avoid_reversals)
-    at = with_kept_feet(prepared, at)
+    at = with_terms(with_kept_feet(prepared, at), prepared.character, options.terms)
     limits = at.problem.limits or LimitTerms({}, grid.judged, grid.h, 1.0)
     limits = replace(limits, on=True, rho=FIRST_PENALTY * at.objective_value / grid.end)
     fixed = locked_coefficients(shot.animation, problem.space.basis, problem.space.motors, grid.end)
