@@ -287,8 +287,12 @@ class OptimizeShot(Operator):
             context.report("warning" if is_exceeded(term) else "info", _told(term))
         if not result.improved:
             reason = f"the search ended: {result.search.stopped}"
-            if any(map(is_exceeded, (*result.limits, *result.terms))):
-                reason = "limits are still exceeded. Slow the animation down there, or raise the limits"
+            if any(map(is_exceeded, result.limits)):
+                reason = "limits of motors are still exceeded. Slow the animation down there, or raise the limits"
+            elif any(map(is_exceeded, result.terms)):
+                reason = "limits of plugins are still exceeded. Slow the animation down there, or widen them"
+            elif result.terms:
+                reason = "residuals or limits of plugins count as well"
             elif any(map(is_reached, result.limits)):
                 reason = "the limits of the motors require it"
             context.report(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import calmotion as cm
 import numpy as np
 import pytest
+from calmotion.model.limits.use import TermUse
 from calmotion.workflow.report import main_target, remaining_errors, still_targets
 from pxr import UsdGeom
 from small_shots import FORE, UPPER, make_target, write_arm
@@ -36,6 +37,12 @@ def test_the_main_target_and_the_causes_of_what_remains_follow_from_weights_moto
     assert (row["directions"], row["motors"], row["causes"]) == (3, 2, ["motors"])
     ended = replace(result, search=replace(result.search, stopped="no further decrease"))
     assert remaining_errors(character, ended)[0]["causes"][0] == "search"
+    for term, causes in (
+        (TermUse("speed", "m/s", "", 2.0, 1.0), ["plugins", "motors"]),
+        (TermUse("speed", "m/s", "", 2.0, 1.0, limit=1.0, excess=0.0), ["plugins", "motors"]),
+        (TermUse("speed", "m/s", "", 2.0, 1.0, limit=2.0, excess=-0.5), ["motors"]),
+    ):
+        assert remaining_errors(character, replace(result, terms=(term,)))[0]["causes"] == causes
     assert remaining_errors(character, replace(result, tolerance_m=1.0)) == []
     assert remaining_errors(character, replace(result, after=None)) == []
     still = np.full_like(result.after.position_errors, row["max_error_m"])  # as far off at rest

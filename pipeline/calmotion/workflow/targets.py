@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.model import Character, Result, Simulation, is_exceeded
+from calmotion.model import Character, Result, Simulation, is_exceeded, is_reached
 from calmotion.model.result import GOAL_REACHED
 from calmotion.model.uncertainty import CURVES
 
@@ -97,7 +97,8 @@ def remaining_errors(character: Character, result: Result) -> list[dict[str, Any
 
     Returns:
         Rows with `path`, `max_error_m`, the number of `motors` that could change, the `directions` in which all targets
-        are followed, and `causes`: `limits` of motors that cost something, `search` that did not converge, `sag` where
+        are followed, and `causes`: `limits` of motors that cost something, `plugins` whose
+        residuals count or whose limits are reached, `search` that did not converge, `sag` where
         half of the error is there at rest and gravity moves the target by as much, `motors` where these are fewer than
         the directions, `weight` where other targets count more, and `reach` where none of these holds, so that these
         motors can do no better.
@@ -111,6 +112,7 @@ def remaining_errors(character: Character, result: Result) -> list[dict[str, Any
     weights = [target.position_weight for target in character.targets]
     directions = 3 * sum((t.position_weight > 0.0) + (t.rotation_weight > 0.0) for t in character.targets)
     common = ["limits"] * any(limit.cost_m is not None for limit in result.limits)
+    common += ["plugins"] * any(term.limit is None or is_reached(term) for term in result.terms)
     common += ["search"] * (result.search.stopped not in ("", "converged", GOAL_REACHED))
     rows = []
     for k in np.flatnonzero(largest > (result.goal_m or result.tolerance_m)):

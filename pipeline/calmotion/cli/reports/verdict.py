@@ -26,6 +26,7 @@ NOTHING_SHAKES = "nothing shakes: all bodies are rigid and all motors ideal"
 HEADLINES, MOTORS = 3, 6  # targets, and motors, that have a place in a sentence
 CAUSES = {
     "limits": "motors are at their limits (see the table of limits)",
+    "plugins": "residuals or limits of plugins count as well (see the notes)",
     "search": "the search ended early (see below)",
     "sag": "gravity alone causes half of it, even at rest",
     "motors": "{motors} cannot follow {targets}",

@@ -57,9 +57,10 @@ _REACHED = 1e-3  # of the size of a limit: what is nearer touches it
 _ROUNDING = 1e-6  # of the size of a limit
 
 
-def is_reached(limit: LimitUse) -> bool:
-    """Whether a motor goes up to a limit, or the limit costs something; not whether it merely has one."""
-    return limit.cost_m is not None or limit.excess > -_REACHED
+def is_reached(limit: LimitUse | TermUse) -> bool:
+    """Whether a quantity goes up to a limit, or the limit costs something; not whether there merely is one."""
+    costs = isinstance(limit, LimitUse) and limit.cost_m is not None
+    return costs or limit.excess > -_REACHED
 
 
 def is_exceeded(limit: LimitUse | TermUse) -> bool:
