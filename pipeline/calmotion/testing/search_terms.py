@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,7 @@ NAME = "the term"
 
 
 def derivative_error(
-    term: SearchTerm, character: Character, animation: Animation, bodies: Mapping[int, ReducedBody] | None = None
+    term: SearchTerm, character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None = None
 ) -> float:
     """By how much the derivatives of a term's quantity differ from central differences, and their transpose from them,
     as a share of their size: about 1e-6 where they are right.
@@ -41,8 +41,9 @@ def derivative_error(
     ends = [quantity.values(problem.at(x + side * STEP * direction).run) for side in (1.0, -1.0)]
     linear = problem.at(x).runs[0].linearized(0)
     change = linear.tangent(*problem.space.offsets(direction), [NAME])[1][NAME]
-    found = np.linalg.norm(change - (ends[0] - ends[1]) / (2.0 * STEP)) / max(np.linalg.norm(change), 1e-300)
+    size = max(float(np.linalg.norm(change)), 1e-300)
+    found = np.linalg.norm(change - (ends[0] - ends[1]) / (2.0 * STEP)) / size
     pulls = random.normal(size=change.shape)
     pulled = linear.adjoint(np.zeros_like(linear.at.residuals), {NAME: pulls})
     both = sum(float(np.sum(one * other)) for one, other in zip(pulled, problem.space.offsets(direction), strict=True))
-    return float(max(found, abs(both - np.sum(pulls * change)) / np.linalg.norm(pulls) / np.linalg.norm(change)))
+    return max(float(found), float(abs(both - np.sum(pulls * change)) / np.linalg.norm(pulls) / size))
