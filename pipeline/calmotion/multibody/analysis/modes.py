@@ -72,12 +72,34 @@ def elastic_modes(model: Model) -> tuple[Array, list[Array]]:
     size = allowed.shape[1]
     if not size:
         return np.zeros(0), [np.zeros((int(r), 0)) for r in system.elastic]
-    unit = solve_triangular(cholesky(allowed.T @ M @ allowed, lower=True), allowed.T, lower=True).T
-    _, roots, rotation = svd(np.concatenate([_root(K[part, part]) @ unit[part] for part in parts]))
-    omega = np.zeros(size)
-    omega[: len(roots)] = roots
-    shapes = unit @ rotation.T
-    return omega[::-1], [shapes[part, ::-1] for part in parts]
+    mass = allowed.T @ M @ allowed
+    stiff = _stiff_modes(sum(allowed[part].T @ K[part, part] @ allowed[part] for part in parts), mass)
+    if stiff is not None:
+        omega, shapes = np.sqrt(stiff[0]), allowed @ stiff[1]
+    else:
+        unit = solve_triangular(cholesky(mass, lower=True), allowed.T, lower=True).T
+        _, roots, rotation = svd(np.concatenate([_root(K[part, part]) @ unit[part] for part in parts]))
+        omega, shapes = np.pad(roots, (0, size - len(roots)))[::-1], (unit @ rotation.T)[:, ::-1]
+    return omega, [shapes[part] for part in parts]
+
+
+def _stiff_modes(K: Array, M: Array) -> tuple[Array, Array] | None:
+    """Squares of the frequencies, ascending, and modes of mass one, of what resists every motion; None for the rest.
+
+    Rounding is relative to the largest eigenvalue, and a thin link has stretches that are 10^15 times as stiff as its
+    bending. The inverses of the squares have the slow modes as the largest, and scaled coordinates have one stiffness.
+    """
+    diagonal = np.diag(K)
+    if not diagonal.min() > 0.0:
+        return None
+    scale = 1.0 / np.sqrt(diagonal)
+    try:
+        inverses, shapes = eigh(scale[:, None] * M * scale, scale[:, None] * K * scale)
+    except np.linalg.LinAlgError:
+        return None
+    if not inverses[0] > 0.0:
+        return None
+    return 1.0 / inverses[::-1], (scale[:, None] * shapes / np.sqrt(inverses))[:, ::-1]
 
 
 def _root(K: Array) -> Array:
@@ -122,7 +144,8 @@ class Matrices(NamedTuple):
             return np.zeros(0), allowed
         stiffness = allowed.T @ self.stiffness @ allowed
         # symmetric but for a part from the axes of the moments, which vanishes on allowed motions
-        values, shapes = eigh(0.5 * (stiffness + stiffness.T), allowed.T @ self.mass @ allowed)
+        stiffness, mass = 0.5 * (stiffness + stiffness.T), allowed.T @ self.mass @ allowed
+        values, shapes = _stiff_modes(stiffness, mass) or eigh(stiffness, mass)
         return values, allowed @ shapes
 
 
