@@ -17,7 +17,7 @@ from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.problem import Evaluation
 from calmotion.retargeting.problem.robot import of_robot
 from calmotion.retargeting.quantities.base import Quantity
-from calmotion.retargeting.quantities.functions import FunctionOf
+from calmotion.retargeting.quantities.functions import FilteredCommands, FunctionOf
 from calmotion.retargeting.quantities.terms import AddedLimit, AddedResidual, SearchTerm
 from calmotion.simulation.inputs.time_grid import TimeGrid
 
@@ -64,6 +64,8 @@ def with_terms(at: Evaluation, character: Character, terms: Sequence[SearchTerm]
         for term in terms:
             made = term.quantity(character, run.robot.model, problem.grid)
             values = _checked(term, made.values(run.run), problem.grid)
+            if isinstance(term, AddedLimit) and k and isinstance(made, FilteredCommands):
+                continue  # all robots perform the same curves
             if isinstance(term, AddedLimit):
                 limited[term.name] = made
                 bounds[of_robot(term.name, k)] = _bounds(term, character, values.shape[1])

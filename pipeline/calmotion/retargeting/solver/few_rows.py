@@ -9,6 +9,8 @@ from scipy.linalg import cho_factor, cho_solve
 
 from calmotion.arrays import Array
 
+ROUNDING = 1e-9  # of the diagonal, added to it: rows that say the same differ by no more
+
 
 def with_rows(inverse: Callable[[Array], Array], rows: Array, weights: Array) -> Callable[[Array], Array]:
     """The inverse of P + A^T W A from that of P (Woodbury 1950).
@@ -21,10 +23,14 @@ def with_rows(inverse: Callable[[Array], Array], rows: Array, weights: Array) ->
     if not len(rows):
         return inverse
     solved = np.array([inverse(row) for row in rows])
-    factor = cho_factor(np.diag(1.0 / weights) + 0.5 * (rows @ solved.T + solved @ rows.T), lower=True)
+    inner = np.diag(1.0 / weights) + 0.5 * (rows @ solved.T + solved @ rows.T)
+    scale = 1.0 / np.sqrt(np.diag(inner))
+    # rounding leaves nothing of the difference of rows that say the same
+    inner = scale[:, None] * inner * scale + ROUNDING * np.eye(len(rows))
+    factor = cho_factor(inner, lower=True)
 
     def solve(x: Array) -> Array:
         own = inverse(x)
-        return np.asarray(own - cho_solve(factor, rows @ own) @ solved)
+        return np.asarray(own - (scale * cho_solve(factor, scale * (rows @ own))) @ solved)
 
     return solve
