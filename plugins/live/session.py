@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter, deque
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -244,7 +245,6 @@ class Live:
 
     def _weighting_of(self, shot: CompiledShot) -> Weighting:
         settings, targets = self.settings, shot.model.targets
-        worth = tolerance_of(shot.character, settings.tolerance)
         largest = np.array([shot.character.motors[k].max_acceleration for k in self._deviating])
         largest = np.where(np.isfinite(largest), largest, LiveSettings.ACCELERATION)
         weights = np.stack([targets.position_weight, targets.rotation_weight], axis=1)
@@ -253,14 +253,21 @@ class Live:
             self.tick_s,
             self._window_ticks,
             np.sqrt(np.repeat(weights, 3, axis=1)),
-            LiveSettings.PENALTY * worth / (largest * self.tick_s),
-            worth,
+            LiveSettings.PENALTY * tolerance_of(shot.character, settings.tolerance) / (largest * self.tick_s),
+            0.0,
             spread,
         )
 
     def _gains(self, position: Array) -> Gains:
         pose = pose_model(self.model, position, self.world, LiveSettings.HIGHEST * self.settings.rate)
-        return gains_at(pose, self._coupling, self._weighting)
+        weighting, tolerance = self._weighting, tolerance_of(self.character, self.settings.tolerance)
+        moved = (weighting.targets[..., None] * pose.targets_by_input).reshape(-1, len(self.joints))
+        lever = float(np.linalg.norm(moved, axis=0).max(initial=0.0))
+        coarser = max(LiveSettings.FINEST * lever / tolerance, 1.0)
+        weighting = replace(
+            weighting, penalty=coarser * weighting.penalty, closeness=max(LiveSettings.CLOSE * lever, tolerance)
+        )
+        return gains_at(pose, self._coupling, weighting)
 
     def _refuse_slow(self) -> None:
         """Some ticks at rest, for the time they take.

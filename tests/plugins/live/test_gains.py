@@ -16,7 +16,7 @@ def hinge(frequency=3.0, ratio=0.01, coupling=1.2):
     omega, rows = 2.0 * np.pi * np.array([frequency]), np.zeros((1, 6, 1))
     rows[0, 0] = 1.0
     damping, push = np.array([[2.0 * ratio * omega[0]]]), np.array([[-coupling]])
-    return PoseModel(omega, damping, push, np.zeros((1, 1)), rows, rows, *[np.eye(1)] * 4, np.eye(2))
+    return PoseModel(omega, damping, push, np.zeros((1, 1)), rows, rows, *[np.eye(1)] * 5, np.eye(2))
 
 
 def two_hinges():

@@ -33,7 +33,8 @@ class PoseModel:
         targets_by_input: The targets' frames (position in world axes, rotation in target axes), shape [K, 6, M].
         targets_by_mode: Shape [K, 6, n].
         shapes: Modes of mass one in all N coordinates of the components, shape [N, n].
-        momenta: Mass matrix times shapes, shape [N, n].
+        deflections, by_deflection: Coordinates that do not turn with the pose, such as deflections of links and motors,
+            by the amplitudes, shape [R, n], and the amplitudes by them; all coordinates where joints move freely.
         by_input: Motion of the equilibrium with the inputs, shape [N, M].
         inertia: Mass matrix in the inputs [kg m^2], shape [M, M].
         resistance: Efforts by the rates of the inputs and of the amplitudes, as of viscous friction, shape [M, M + n].
@@ -46,14 +47,15 @@ class PoseModel:
     targets_by_input: Array
     targets_by_mode: Array
     shapes: Array
-    momenta: Array
+    deflections: Array
+    by_deflection: Array
     by_input: Array
     inertia: Array
     resistance: Array
 
     def amplitudes_of(self, other: PoseModel) -> Array:
-        """The matrix from amplitudes in another pose to those of the same motion in this one, shape [n, n of other]."""
-        return np.asarray(self.momenta.T @ other.shapes)
+        """The matrix from amplitudes in another pose to those of the same deflections in this one, [n, n of other]."""
+        return np.asarray(self.by_deflection @ other.deflections)
 
     def efforts(self, rates: Array, accelerations: Array, forces: Array) -> Array:
         """Of the motors [N m or N], shape [M].
@@ -87,9 +89,13 @@ def pose_model(model: Model, values: Array, world: Array | None = None, highest:
     servo[:, [FRICTION, BEYOND_COULOMB]] = 0.0
     smooth = system._replace(servo=servo)
     found = matrices_at(smooth, state, angles, workspace)
-    squares, shapes = found.modes()
+    squares, every = found.modes()
     kept = squares <= (2.0 * np.pi * highest) ** 2
-    omega, shapes = np.sqrt(np.maximum(squares[kept], 0.0)), shapes[:, kept]
+    omega, shapes = np.sqrt(np.maximum(squares[kept], 0.0)), every[:, kept]
+    start = system.starts
+    rows = np.concatenate([np.arange(first + 6, end) for first, end in zip(start[:-1], start[1:], strict=True)])
+    own: Array = every[rows]
+    told = np.linalg.matrix_rank(own) == every.shape[1] if own.size else not every.shape[1]
     follows, on_rate = _by_inputs(model, system, found, workspace)
     at = [part[None] for part in (state.c, state.q, state.u)]
     J = _in_all_coordinates(model, target_jacobians(model, *at)[0])
@@ -101,7 +107,8 @@ def pose_model(model: Model, values: Array, world: Array | None = None, highest:
         targets_by_input=J @ follows,
         targets_by_mode=J @ shapes,
         shapes=shapes,
-        momenta=found.mass @ shapes,
+        deflections=own[:, kept] if told else shapes,
+        by_deflection=np.asarray(np.linalg.pinv(own))[kept] if told else shapes.T @ found.mass,
         by_input=follows,
         inertia=follows.T @ found.mass @ follows,
         resistance=follows.T @ np.concatenate([found.damping @ follows + on_rate, found.damping @ shapes], axis=1),
