@@ -107,31 +107,34 @@ def _resolved(problem: Calibrated, z: Array, halvings: int) -> tuple[Calibrated,
 def _converged(problem: Calibrated, solution: Solution, iterations: int, halvings: int) -> Found:
     """The minimum for ever smaller steps, extrapolated to a step of zero.
 
-    Derivatives are those of the first step: a minimum with another step is near, and its residuals alone decide where.
+    Derivatives are those of the first step where they serve: a minimum with another step is near, and its residuals
+    alone decide where.
     """
     deviations, of_model = _deviations(problem, solution)
-    earlier, limit, shift, extrapolated, interrupted = solution.z, solution.z, 0.0, False, False
+    limit, shift, extrapolated, interrupted = solution.z, 0.0, False, False
     for _ in range(halvings):
         finer = problem.with_options(replace(problem.options, step=0.5 * step_of(problem)))
         try:
-            near = chord(finer, solution)
-            other = near or minimize(finer, solution.z, finer.lower, FIRST_ITERATIONS)
-            if near is None:  # derivatives there are others
+            if finer.residuals(solution.z) is None:  # it cannot be simulated with this step
+                break
+            other = chord(finer, solution)
+            if other is None:  # derivatives there are others
+                other = minimize(finer, solution.z, finer.lower, FIRST_ITERATIONS)
+                iterations += other.iterations - 1
                 deviations, of_model = _deviations(finer, other)
         except KeyboardInterrupt:  # what converged is not thrown away
             answer()
             interrupted = True
             break
-        problem, solution, iterations = finer, other, iterations + (1 if near is not None else other.iterations)
-        if near is None:
-            earlier, limit, extrapolated = solution.z, solution.z, False
-            continue
-        change = solution.z - earlier
+        except (ShotError, SimulationFailure):  # nor can a robot near it
+            break
+        change = other.z - solution.z
+        problem, solution, iterations = finer, other, iterations + 1
         then = np.maximum(solution.z + change / (2**ORDER - 1), problem.lower)
         # the first extrapolation is compared with what it extrapolates, the next ones with the one before
         off = then - limit if extrapolated else change / (2**ORDER - 1)
         shift = float(np.max(np.abs(off) / deviations, initial=0.0))
-        earlier, limit, extrapolated = solution.z, then, True
+        limit, extrapolated = then, True
         if shift <= SHIFT:
             break
     problem = problem.with_measurement(correlated(problem, solution.z))

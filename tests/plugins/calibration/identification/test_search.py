@@ -36,11 +36,21 @@ def test_robots_of_which_none_can_be_simulated_are_refused(recorded_shot, record
         search.search(problem, quiet, halvings=0)
 
 
-def test_what_converged_is_kept_where_halving_the_step_is_interrupted(recorded_shot, recordings, monkeypatch):
+@pytest.mark.parametrize("failure", [KeyboardInterrupt(), ShotError("it diverges")])
+def test_what_converged_is_kept_where_halving_the_step_ends(recorded_shot, recordings, monkeypatch, failure):
     def stopped(*_):
-        raise KeyboardInterrupt
+        raise failure
 
     monkeypatch.setattr(search, "chord", stopped)
     problem = problem_of(recorded_shot, only(recordings, MARKER))
     found = search.search(problem, quiet, halvings=2)
-    assert found.interrupted and found.solution.converged and np.all(np.isfinite(found.covariance))
+    assert found.interrupted == isinstance(failure, KeyboardInterrupt)
+    assert found.solution.converged and np.all(np.isfinite(found.covariance))
+
+
+def test_halving_ends_where_estimates_stay_though_each_step_needs_derivatives_of_its_own(
+    recorded_shot, recordings, monkeypatch
+):
+    monkeypatch.setattr(search, "chord", lambda *_: None)
+    found = search.search(problem_of(recorded_shot, only(recordings, MARKER)), quiet, halvings=3)
+    assert found.shift < search.SHIFT
