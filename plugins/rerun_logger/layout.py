@@ -30,7 +30,7 @@ def make_blueprint(character: Character, animation: Animation, result: Result, s
     """The views that fit what the result holds; `scale` is the deviation of the strongest color [m]."""
     optimized = result.after is not None
     eye = choose_eye(character, animation, result)
-    legend = f"green: intended, orange: {1e3 * scale:.3g} mm off"
+    legend = f"green: intended, full orange: {1e3 * scale:.3g} mm off"
     views = [spatial_view(f"As animated{_farthest(result.before)} ({legend})", INPUT, eye)]
     if result.after is not None:
         views.append(spatial_view(f"Optimised{_farthest(result.after)} (same colours)", OPTIMIZED, eye))

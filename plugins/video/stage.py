@@ -33,7 +33,7 @@ SMOOTH = 2  # factor of the rendering, which is then averaged
 TRAIL_S, TRAIL_POINTS = 0.6, 48
 LARGEST_ZOOM = 6.0
 SHAKE = 0.18  # of a panel's shorter side: the largest error in the near view
-ROWS = 40  # instants that the camera keeps in the picture
+ROWS = 120  # instants that the camera keeps in the picture
 Color = tuple[int, int, int]
 
 

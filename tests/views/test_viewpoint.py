@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import synthetic
+from calmotion.views.playback import sample_motion
 from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, framed, hull_corners, moving_cloud
 
 
@@ -51,6 +52,16 @@ def test_the_eye_is_as_near_as_the_whole_motion_allows():
     across = np.abs(offset @ right) / depth / (aspect * np.tan(half))
     upright = np.abs(offset @ np.cross(right, forward)) / depth / np.tan(half)
     assert max(across.max(), upright.max()) == pytest.approx(1.0), "inside the picture, and reaching its edge"
+
+
+def test_a_swing_of_a_tenth_of_a_second_stays_in_the_picture():
+    character, result = synthetic.character(), synthetic.result()
+    times = np.linspace(0.0, 4.0, 481)
+    still = dataclasses.replace(sample_motion(result.reference, np.zeros(len(times))), times=times)
+    lifted = still.positions.copy()
+    lifted[300:313, 2, 2] += 1.0
+    cloud = moving_cloud(character, result.skins, dataclasses.replace(still, positions=lifted))
+    assert cloud[:, 2].max() > 1.0
 
 
 def test_of_a_flat_surface_all_points_are_taken():

@@ -14,6 +14,8 @@ from calmotion.views.playback import deformed_points, modes_of, rotation_matrice
 
 SIDE = np.radians(38.0)
 ELEVATION = np.radians(17.0)
+FEW = 12  # instants whose extent gives the size of a viewpoint
+INSTANTS = 60  # of a motion that a picture keeps; a fast swing takes a tenth of a second
 STILL = 1e-3  # of a body that does not move: range of its place [m] and of its quaternion
 ROOM = 1.25  # largest growth of a picture for what stands still
 ROOM_FOR_SURFACE = 1.05  # for one surface of a base that is not in the picture as a whole
@@ -67,7 +69,7 @@ def choose_viewpoint(character: Character, skins: tuple[Skin | None, ...], motio
     """
     clouds = [motion.target_positions.reshape(-1, 3)]
     fixed = []
-    for row in np.unique(np.linspace(0, len(motion.times) - 1, 12).astype(int)):
+    for row in np.unique(np.linspace(0, len(motion.times) - 1, FEW).astype(int)):
         for index, body in enumerate(character.bodies):
             points = [
                 p
@@ -125,7 +127,7 @@ def moving_cloud(character: Character, skins: tuple[Skin | None, ...], motion: M
     A picture that has the corners of a hull has all of its surface; robots have surfaces of a hundred thousand points.
     """
     clouds = [motion.target_positions.reshape(-1, 3)]
-    instants = np.unique(np.linspace(0, len(motion.times) - 1, 12).astype(int))
+    instants = np.unique(np.linspace(0, len(motion.times) - 1, INSTANTS).astype(int))
     matrices = rotation_matrices(motion.rotations[instants])
     moved = moving_bodies(motion)
     seen = moved if np.any(moved) else np.ones(len(moved), bool)
