@@ -108,9 +108,9 @@ def _section(section: Section) -> str:
 def _paragraph(text: str) -> str:
     """A line of a report as a sentence; below the heading of the simplifications, their mark says nothing."""
     text = text.removeprefix("simplified: ")
-    first = text.split(" ", 1)[0].rstrip(",:")
+    first = text.split(" ", 1)[0].rstrip(",")  # a name with a colon stays as it is
     text = text[:1].upper() + text[1:] if first.isalpha() and first.islower() else text
-    return f"<p>{_divisible(text if text.endswith(('.', '!', '?')) else text + '.')}</p>"
+    return f"<p>{_divisible(text if text.endswith(('.', '!', '?')) else text + '.', '/')}</p>"
 
 
 def _table(table: TextTable) -> str:
@@ -125,9 +125,9 @@ def _table(table: TextTable) -> str:
     return f'<h3>{title}</h3><div class="wide">{body}</div>'
 
 
-def _divisible(text: str) -> str:
-    """Text whose paths and names a narrow screen breaks after slashes, dots and underscores, not within words."""
-    return re.sub(r"(?<=[^\d\s])([/._])(?=\w)", r"\g<0><wbr>", escape(text))
+def _divisible(text: str, marks: str = "/._") -> str:
+    """Text whose paths a narrow screen breaks after slashes, and names in cells after dots and underscores."""
+    return re.sub(rf"(?<=[^\d\s])([{marks}])(?=\w)", r"\g<0><wbr>", escape(text))
 
 
 def _has_words(cells: Sequence[str]) -> bool:

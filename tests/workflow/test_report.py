@@ -49,6 +49,11 @@ def test_the_main_target_and_the_causes_of_what_remains_follow_from_weights_moto
     for sag, causes in ((0.0, ["motors"]), (2.0 * row["max_error_m"], ["sag", "motors"])):
         resting = replace(result, after=replace(result.after, position_errors=still, sag=np.array([sag])))
         assert remaining_errors(character, resting)[0]["causes"] == causes, "gravity alone is blamed for what it moves"
+    eased = replace(result.after.motion, times=result.after.motion.times - result.after.motion.times[1])
+    lifted = np.where(eased.times[:, None] < -1e-9, still, 0.0)
+    lifted[-1] = row["max_error_m"]
+    swinging = replace(result.after, motion=eased, position_errors=lifted, sag=2.0 * still[0])
+    assert remaining_errors(character, replace(result, after=swinging))[0]["causes"] == ["motors"], "not of a pre-roll"
     light = replace(tip, path="/light", position_weight=0.5)
     two = replace(character, targets=(light, tip))
     errors = replace(result.before, position_errors=np.repeat(result.before.position_errors, 2, axis=1))

@@ -105,9 +105,11 @@ def remaining_errors(character: Character, result: Result) -> list[dict[str, Any
     """
     if result.after is None:
         return []
-    errors, sag = result.after.position_errors, result.after.sag
+    errors, sag, judged = result.after.position_errors, result.after.sag, result.after.motion.judged
     sag = sag if len(sag) else np.zeros(errors.shape[1])
-    largest = np.max(errors[result.after.motion.judged], axis=0, initial=0.0)
+    largest = np.max(errors[judged], axis=0, initial=0.0)
+    # a pre-roll begins without the offsets that lift the robot in the shot
+    resting = np.minimum(errors[0], errors[judged][0])
     motors = sum(motor.optimize and not motor.idle and motor.follows is None for motor in character.motors)
     weights = [target.position_weight for target in character.targets]
     directions = 3 * sum((t.position_weight > 0.0) + (t.rotation_weight > 0.0) for t in character.targets)
@@ -116,7 +118,7 @@ def remaining_errors(character: Character, result: Result) -> list[dict[str, Any
     common += ["search"] * (result.search.stopped not in ("", "converged", GOAL_REACHED))
     rows = []
     for k in np.flatnonzero(largest > (result.goal_m or result.tolerance_m)):
-        causes = [*common, *["sag"] * bool(min(errors[0, k], sag[k]) >= 0.5 * largest[k])]
+        causes = [*common, *["sag"] * bool(min(resting[k], sag[k]) >= 0.5 * largest[k])]
         causes += ["motors"] * (motors < directions) + ["weight"] * (0.0 < weights[k] < max(weights))
         row = {"path": character.targets[k].path, "max_error_m": float(largest[k]), "causes": causes or ["reach"]}
         rows.append(row | {"motors": motors, "directions": directions})
