@@ -110,6 +110,7 @@ class Live:
         self._sample = self.start.copy()
         position = np.clip(self._values(pose), self._limits.lower, self._limits.upper)
         self._sample = position
+        begin = time.thread_time()
         try:
             gains = self._gains(position)
         except SimulationFailure as failure:
@@ -117,6 +118,7 @@ class Live:
                 "the robot has no static equilibrium in the pose in which it begins",
                 remedy="Begin in another pose, or see what calmotion inspect says of the shot.",
             ) from failure
+        self._gains_s = time.thread_time() - begin
         self._renewal.begin(position, gains)
         self._stream.begin(position)
         self._window.begin(position)
@@ -199,6 +201,7 @@ class Live:
             "limited": {self.joints[k]: count for k, count in sorted(self._counts.items())},
             "too_weak": {self.joints[k]: float(self._needed[k]) for k in np.flatnonzero(self._needed > 1.0)},
             "largest_deviation": self._largest,
+            "renewal_s": self._gains_s,
             "renewals": self._renewal.done,
             "renewals_failed": self._renewal.failed,
             "tick_s": {
@@ -279,6 +282,9 @@ class Live:
             self.advance()
         needed = float(np.median(np.array(self._spent)[10:]))
         self.reset(self.start)
+        if self._gains_s > LiveSettings.SLOW_GAINS_S:
+            note = f"gains for a new pose take {self._gains_s:.2g} s; moves that turn the robot faster leave more"
+            self.notes = (*self.notes, note)
         if needed > self.tick_s:
             raise SettingError(
                 "this machine cannot calm this robot at this rate",

@@ -31,6 +31,7 @@ class LiveSettings:
     CLOSE = 2e-3  # error over that lever for which motors may deviate by a radian, where no target moves
     HIGHEST = 1 / 3  # frequency of a mode that commands can act on, of the rate
     RENEWAL_S = 0.04  # between two renewals without a thread
+    SLOW_GAINS_S = 0.1  # processor time of a renewal that is told; poses turn by a tenth of a radian meanwhile
 
     rate: float = 250.0
     lookahead: float = 0.12
@@ -80,7 +81,8 @@ def notes_of(shot: CompiledShot, forces: VelocityForces) -> tuple[str, ...]:
             found.append("efforts are not known either, so that nothing tells where a motor has too little")
     free = [motor.path.rpartition("/")[2] for motor in shot.character.motors if not np.isfinite(motor.max_velocity)]
     if free:
-        found.append(f"a jump is played within a tick by motors without a limit of speed: {', '.join(free)}")
+        names = ", ".join(free) if len(free) < len(shot.character.motors) or len(free) < 4 else "all of them"
+        found.append(f"a jump is played within a tick by motors without a limit of speed: {names}")
     delays = {motor.delay for motor in shot.character.motors if motor.model != PRESCRIBED}
     if len(delays) > 1:
         found.append("motors with different delays are taken as if all had the longest")
