@@ -108,7 +108,7 @@ def _print_accuracy(console: Console, report: dict[str, Any]) -> None:
     """Whether the simulation keeps the tolerance, and what helps where it does not."""
     tolerance = length(report["tolerance_m"])
     if report["tolerance_kept"]:
-        error = about(report["simulation_error_m"])
+        error = about(report["simulation_error_m"]).replace("<", "less than")
         which = "errors after the optimisation" if is_optimized(report) else "these errors"
         say(console, f"The simulation keeps the tolerance of {tolerance}: {which} are accurate to {error}.")
     elif report["simulation_error_m"] is None:
