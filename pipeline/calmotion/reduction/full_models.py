@@ -7,7 +7,8 @@ modes.
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from calmotion.reduction.reduce import FullBody
 
 _KEPT = 60_000_000  # numbers in factors of full models, half a gigabyte
+_HANDED_ON = 20_000_000  # of those from a mesher to the reduction, while it makes others
+_AT_ONCE = 48_000  # nodes of full models that are worked on at the same time: some 1.2 gigabytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +49,56 @@ class Member:
         material = (replace(settings.material, path=""), None if mass is None else mass.mass)
         held = (mesh.patches, settings.interface_radius, frames, self.root)
         return cache_key((mesh.points, mesh.tets, material, held))
+
+
+class _HandedOn:
+    """Full models of meshes that were just made, for the reduction that follows; any thread may call."""
+
+    def __init__(self) -> None:
+        self._models: dict[str, FullBody] = {}
+        self._lock = threading.Lock()
+
+    def put(self, key: str, model: FullBody) -> None:
+        """Keep a model where there is room for it."""
+        with self._lock:
+            if model.entries + sum(own.entries for own in self._models.values()) <= _HANDED_ON:
+                self._models[key] = model
+
+    def take(self, key: str) -> FullBody | None:
+        """The model of a key, which is kept no longer."""
+        with self._lock:
+            return self._models.pop(key, None)
+
+    def clear(self) -> None:
+        """Free those that nobody took."""
+        with self._lock:
+            self._models.clear()
+
+
+handed_on = _HandedOn()
+
+
+class _Room:
+    """Lets work on large models wait for that of other threads, so that not all of them are in memory at once."""
+
+    def __init__(self, nodes: int):
+        self._most, self._taken, self._changed = nodes, 0, threading.Condition()
+
+    @contextmanager
+    def of(self, nodes: int) -> Iterator[None]:
+        """Context of work on a model of so many nodes; one that is larger than the room has it alone."""
+        with self._changed:
+            self._changed.wait_for(lambda: not self._taken or self._taken + nodes <= self._most)
+            self._taken += nodes
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._taken -= nodes
+                self._changed.notify_all()
+
+
+room = _Room(_AT_ONCE)
 
 
 class FullModels:
@@ -80,7 +133,7 @@ class FullModels:
         with self._lock:
             making = self._making.setdefault(key, threading.Lock())
         with making:  # others that need it wait for it
-            found = self._models.get(key)
+            found = self._models.get(key) or handed_on.take(key)
             if found is None:
                 quality = replace(member.mesh.quality, stiffness_factor=1.0)
                 mesh = replace(member.mesh, quality=quality)
@@ -94,6 +147,12 @@ class FullModels:
                     self._models.pop(key, None)
         factor = member.mesh.quality.stiffness_factor
         return found if factor == 1.0 else found.scaled(factor)
+
+    def hand_on(self, member: Member) -> None:
+        """Leave the model of a body to the reduction, if it is kept here."""
+        found = self._models.pop(member.key, None)
+        if found is not None:
+            handed_on.put(member.key, found)
 
     def only(self, members: Iterable[Member]) -> FullModels:
         """The models of some bodies, as far as they are kept here."""

@@ -32,9 +32,11 @@ from calmotion.reduction.basis.natural_modes import clamped_modes
 from calmotion.reduction.cache import cached_reduction
 from calmotion.reduction.discretization_error import element_errors
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.full_models import FullModels, Member
+from calmotion.reduction.full_models import FullModels, Member, room
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
 from calmotion.reduction.reduce import FullBody
+
+_OVER = 1.05  # of the nodes that a mesh may have
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +48,16 @@ class Response:
         compliances: 1 / omega^2 of the first modes [s^2], then the displacement of the targets by the loads on the
             moving interfaces [m] where there are any, shape [k].
         weights: Of each in the mean, in sum one, shape [k].
-        error: Their relative error as strains that are recovered at the nodes tell it, the largest; 0 where not judged.
+        shares: Of each beside that of the first mode, at most one, shape [k]: what its error does to a deflection.
+        error: Their relative error as strains that are recovered at the nodes tell it, the largest, of those of a shot
+            with known loads by their shares; 0 where not judged.
         indicators: Part of each element in it, shape [m]; empty where not judged.
     """
 
     nodes: int
     compliances: Array
     weights: Array
+    shares: Array
     error: float
     indicators: Array
 
@@ -110,22 +115,41 @@ class MeshController:
         self, mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], root: int | None,
         loads: LoadEnvelope | None, models: FullModels | None,
     ) -> FEMesh:  # fmt: skip
+        if models is not None or root is None:
+            return self._of_two(mesh, body, attachments, root, loads, models)
+        models = FullModels(keeps=True)
+        result = self._of_two(mesh, body, attachments, root, loads, models)
+        models.hand_on(Member(result, body, attachments, root))
+        return result
+
+    def _of_two(
+        self, mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], root: int | None,
+        loads: LoadEnvelope | None, models: FullModels | None,
+    ) -> FEMesh:  # fmt: skip
         coarse = response(mesh, body, attachments, root, loads, self.modes, models)
         nodes = self._nodes_of_finer(coarse)
+        unrefined = self.safety * self.recovered * coarse.error
         if nodes < self.fewest * coarse.nodes:
-            return _with_error(mesh, 1.0, self.safety * self.recovered * coarse.error)
-        finer = bisected_to(mesh, coarse.indicators, nodes, self.marked)
+            return _with_errors(mesh, 1.0, unrefined, unrefined)
+        finer = bisected_to(mesh, coarse.indicators, nodes, self.marked, self.max_nodes)
         try:
-            fine = response(finer, body, attachments, root, loads, self.modes, models, judged=False)
+            with room.of(nodes):
+                fine = response(finer, body, attachments, root, loads, self.modes, models, judged=False)
         except FactorsTooLarge as error:
-            raise _NotFiner(_with_error(mesh, 1.0, self.safety * self.recovered * coarse.error)) from error
+            raise _NotFiner(_with_errors(mesh, 1.0, unrefined, unrefined)) from error
         change, left = self.extrapolated(coarse, fine)
         whole = fine.compliances / coarse.compliances * (1.0 + change) - 1.0
+        every = np.ones_like(coarse.shares)
         if self.keeps == "given":
-            return _with_error(mesh, 1.0, left + float(whole.max()))
-        if self.keeps != "finer" and _deviation(whole, coarse.weights) <= self.parted * self.wanted:
-            return _with_error(mesh, *_by_one_factor(whole, coarse.weights, left))
-        return _with_error(finer, *_by_one_factor(change, coarse.weights, left))
+            errors = (_largest_of(left, share) + _largest_of(whole, share) for share in (every, coarse.shares))
+            return _with_errors(mesh, 1.0, *errors)
+        counted = every if loads is None else coarse.shares
+        if self.keeps != "finer" and _deviation(whole, coarse.weights, counted) <= self.parted * self.wanted:
+            finer, change = mesh, whole
+        errors = (
+            _largest_of(left, share) + _deviation(change, coarse.weights, share) for share in (every, coarse.shares)
+        )
+        return _with_errors(finer, 1.0 / (1.0 + float(coarse.weights @ change)), *errors)
 
     def _nodes_of_finer(self, coarse: Response) -> int:
         """Nodes with which the error of a finer mesh is expected to be as wanted, as far as they are allowed."""
@@ -133,12 +157,12 @@ class MeshController:
         growth = float(np.clip(ratio ** (1.0 / self.order), *self.growth))
         return int(min(growth * coarse.nodes, self.max_nodes))
 
-    def extrapolated(self, coarse: Response, fine: Response) -> tuple[Array, float]:
-        """What ever finer meshes add to the compliances of the finer of two, relative, shape [k], and its error."""
+    def extrapolated(self, coarse: Response, fine: Response) -> tuple[Array, Array]:
+        """What ever finer meshes add to the compliances of the finer of two, relative, and its errors, shape [k]."""
         difference = fine.compliances / coarse.compliances - 1.0
         change = difference / ((fine.nodes / coarse.nodes) ** self.order - 1.0)
         # a finer mesh that is stiffer tells nothing about ever finer ones
-        return np.maximum(change, 0.0), self.safety * self.left * float(np.abs(change).max())
+        return np.maximum(change, 0.0), self.safety * self.left * np.abs(change)
 
 
 class _NotFiner(Exception):
@@ -181,20 +205,21 @@ def response(
             raise _nothing_free(body, mesh)
         shapes = (columns @ U[:, : len(squares)]).reshape(len(model.mesh.nodes), 3, -1)
         moved = _moved_by_loads(full, attachments, loads)
-    fields, shares = moved
-    by_mode, by_load = squares[0] / squares, shares / max(float(shares.sum()), np.finfo(float).tiny)
-    by_mode = by_mode / by_mode.sum()
+    fields, by_each = moved
+    shares, by_load = squares[0] / squares, by_each / max(float(by_each.sum()), np.finfo(float).tiny)
+    by_mode = shares / shares.sum()
     compliances, weights, count = 1.0 / squares, by_mode, len(squares)
     error, indicators = 0.0, np.zeros(0)
     if judged:
         errors = element_errors(model.mesh, settings.material, np.concatenate([shapes, fields], axis=2))
         total = errors.sum(axis=0)
-        error = max(float(total[:count].max()), float(total[count:] @ by_load))
+        of_modes = total[:count] if loads is None else shares * total[:count]
+        error = max(float(of_modes.max()), float(total[count:] @ by_load))
         indicators = errors[:, :count] @ by_mode + errors[:, count:] @ by_load
-    if len(shares):
-        compliances = np.append(compliances, shares.sum())
-        weights = np.append(0.5 * by_mode, 0.5)
-    return Response(len(model.mesh.nodes), compliances, weights, error, indicators)
+    if len(by_each):
+        compliances = np.append(compliances, by_each.sum())
+        weights, shares = np.append(0.5 * by_mode, 0.5), np.append(shares, 1.0)
+    return Response(len(model.mesh.nodes), compliances, weights, shares, error, indicators)
 
 
 def _moved_by_loads(
@@ -223,17 +248,23 @@ def _moved_by_loads(
     return fields.reshape(len(nodes), 3, -1), np.asarray(moved[used])
 
 
-def bisected_to(mesh: FEMesh, indicators: Array, nodes: int, share: float) -> FEMesh:
+def bisected_to(mesh: FEMesh, indicators: Array, nodes: int, share: float, most: float = np.inf) -> FEMesh:
     """The mesh with elements bisected where the error arises, again and again, until it has so many nodes.
 
     Args:
         mesh: To refine.
         indicators: Part of each element in the error, shape [m].
         share: Of the error in the elements that are bisected at a time.
+        most: Nodes that it may have, nearly.
     """
-    points, tets = mesh.points, mesh.tets
-    while quadratic_nodes(points, tets) < nodes and indicators.any():
-        points, tets, parent = bisected(points, tets, _largest(indicators, share))
+    points, tets, had = mesh.points, mesh.tets, quadratic_nodes(mesh.points, mesh.tets)
+    while had < nodes and indicators.any():
+        finer = bisected(points, tets, _largest(indicators, share))
+        has = quadratic_nodes(*finer[:2])
+        if has > _OVER * most:  # the last step is smaller
+            finer = bisected(points, tets, _largest(indicators, share * (nodes - had) / (has - had)))
+            has = quadratic_nodes(*finer[:2])
+        (points, tets, parent), had = finer, has
         parts = np.bincount(parent, minlength=len(indicators)).astype(float)
         # the energy of the error of quadratic elements goes with the fourth power of their size
         indicators = (indicators * parts ** (-4.0 / 3.0) / parts)[parent]
@@ -252,22 +283,30 @@ def root_at(attachments: Sequence[AttachmentFrame], carrier: Frame | None) -> in
     return next((k for k, at in enumerate(same) if at and attachments[k].kind == "interface"), None)
 
 
-def _deviation(changes: Array, weights: Array) -> float:
-    """How far changes are from their mean."""
-    return float(np.abs(changes - weights @ changes).max())
+def _largest_of(errors: Array, shares: Array) -> float:
+    """The largest of errors, each by its share."""
+    return float((shares * errors).max())
 
 
-def _by_one_factor(changes: Array, weights: Array, left: float) -> tuple[float, float]:
-    """The factor of a stiffness that changes compliances, relative, in the mean, and the error with that of others."""
-    return 1.0 / (1.0 + float(weights @ changes)), left + _deviation(changes, weights)
+def _deviation(changes: Array, weights: Array, shares: Array) -> float:
+    """How far changes are from their mean, each by its share: what one factor of the stiffness leaves of them."""
+    return _largest_of(np.abs(changes - weights @ changes), shares)
 
 
-def _with_error(mesh: FEMesh, factor: float, error: float) -> FEMesh:
-    """The mesh with a factor of its stiffness and the error of its compliance, to which that of its volume is added."""
+def _with_errors(mesh: FEMesh, factor: float, error: float, of_deflection: float) -> FEMesh:
+    """The mesh with a factor of its stiffness and the errors of its compliances, to which that of its volume is added.
+
+    Args:
+        mesh: The mesh.
+        factor: Of its stiffness.
+        error: Relative, the largest.
+        of_deflection: The same, each by its share.
+    """
     by_volume = 2.0 * abs(mesh.quality.volume_error)  # the stiffness of a rod goes with its section squared
     quality = replace(
         mesh.quality,
         frequency_error=0.5 * (error + by_volume),
+        deflection_error=of_deflection + by_volume,
         stiffness_factor=factor,
         min_dihedral_deg=min_dihedral_deg(mesh.points, mesh.tets),
     )

@@ -211,9 +211,9 @@ def linear_modes(
 
 
 def _mesh_error(mesh: FEMesh) -> float | None:
-    """Relative error of the stiffness by the mesh: twice that of a frequency."""
-    error = mesh.quality.frequency_error
-    return None if error is None else 2.0 * error
+    """Relative error of the stiffness by the mesh: that of deflections, else twice that of a frequency."""
+    own, by_frequency = mesh.quality.deflection_error, mesh.quality.frequency_error
+    return own if own is not None or by_frequency is None else 2.0 * by_frequency
 
 
 def _mesh_error_at_targets(error: float | None, linear: LinearModes) -> float | None:

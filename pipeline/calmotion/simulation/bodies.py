@@ -64,7 +64,7 @@ def reduce_bodies(
     members = {index: full_model_of(character, mesh_of[index], anchors[index]) for index in flexible}
     models = full
     if flexible:
-        from calmotion.reduction.full_models import FullModels
+        from calmotion.reduction.full_models import FullModels, handed_on
 
         models = models or FullModels(keeps=False)
         models.expect(members.values())
@@ -80,10 +80,13 @@ def reduce_bodies(
         parts = (own.mesh, body, own.attachments, body.surfaces, own.root, load_envelope, allowed / len(flexible))
 
         def reduce() -> ReducedBody:
+            from calmotion.mesh.quadratic import quadratic_nodes
+            from calmotion.reduction.full_models import room
             from calmotion.reduction.reduce import reduce_body
 
             assert models is not None
-            made = reduce_body(*parts, full=models.of(own))
+            with room.of(quadratic_nodes(own.mesh.points, own.mesh.tets)):
+                made = reduce_body(*parts, full=models.of(own))
             # of finer and finer meshes the last one stays
             store_reduction(_meshed_before(own.body, own.attachments, own.root), replace(made, skin=()))
             return made
@@ -91,6 +94,8 @@ def reduce_bodies(
         return cached_reduction(parts, reduce)
 
     result = dict(zip(flexible, bodies_in_parallel(reduced, flexible, character, progress), strict=True))
+    if flexible:
+        handed_on.clear()
     rigid = (
         rigid_body(body, own) if index not in result else result[index]
         for index, (body, own) in enumerate(zip(character.bodies, anchors, strict=True))

@@ -53,8 +53,10 @@ def converged_reduction(
     refined.refine(reduction)
     # Meshes come second: most reductions are made on the first ones, which are some times smaller.
     if refined.limit_m <= refined.allowed:
-        known = None if retargeted else refined.known().run
-        meshed, finer = meshes_to_tolerance(refined.shot, reduction, options, known, progress, refined.bodies)
+        known = refined.known().run
+        meshed, finer = meshes_to_tolerance(
+            refined.shot, reduction, options, known, progress, refined.bodies, retargeted=retargeted
+        )
         if finer is not reduction:
             reduction, refined.shot, refined.found = finer, meshed, None
             if refined.off > refined.allowed:

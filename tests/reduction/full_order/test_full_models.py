@@ -8,9 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
+from calmotion.mesh.quadratic import quadratic_nodes
 from calmotion.mesh.tetrahedra import measure_quality
 from calmotion.model import Body, FEMesh, FlexibleSettings, MassProperties
-from calmotion.reduction.full_models import FullModels, Member
+from calmotion.reduction.cache import recomputed
+from calmotion.reduction.full_models import FullModels, Member, _Room, handed_on
+from calmotion.reduction.mesh_refinement import MeshController
 
 
 @pytest.fixture
@@ -111,3 +114,32 @@ def test_models_of_other_bodies_are_let_go(member, monkeypatch):
     assert few.of(member) is kept and not made
     few.of(other)
     assert len(made) == 1
+
+
+def test_the_model_of_a_mesh_that_was_judged_is_left_to_one_reduction(member, monkeypatch):
+    from calmotion.reduction import reduce
+
+    handed_on.clear()
+    with recomputed():
+        mesh = MeshController(0.02, 15_000).refined(member.mesh, member.body, member.attachments, member.root)
+    made = []
+    monkeypatch.setattr(reduce, "full_body", lambda *args: made.append(args))
+    told = replace(mesh, quality=replace(mesh.quality, repairs=("said later",)))
+    found = FullModels(keeps=False).of(replace(member, mesh=told))
+    assert len(found.model.mesh.nodes) == quadratic_nodes(mesh.points, mesh.tets) and not made
+    assert handed_on.take(member.key) is None is handed_on.take(replace(member, mesh=told).key)
+
+
+def test_large_models_are_worked_on_one_after_another():
+    room, large = _Room(10), threading.Event()
+
+    def work():
+        with room.of(20):
+            large.set()
+
+    with room.of(6), room.of(4):
+        thread = threading.Thread(target=work)
+        thread.start()
+        assert not large.wait(0.2)
+    thread.join(30.0)
+    assert large.is_set()

@@ -42,6 +42,13 @@ class Refining:
         self.released = True
 
 
+def by_deflections(shot, reduction, options):
+    """`meshes_to_tolerance` where deflections cost less than the motion."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mesh_budget, "mesh_error", lambda shot, options, run: float("inf"))
+        meshes_to_tolerance(shot, reduction, options, None, retargeted=True)
+
+
 def test_the_cost_is_that_of_bodies_that_are_softer_by_the_error(arm, animation, bodies):
     shot = compile_shot(arm, animation, with_mesh_errors(bodies, 0.02, 0.01))
     run = simulate_at(shot, OPTIONS, STEP)
@@ -61,7 +68,8 @@ def test_what_a_given_mesh_costs_is_not_known(arm, animation, bodies):
 @pytest.mark.parametrize("errors", [(1e-4, 1e-4), (None, None)])
 def test_meshes_that_are_good_enough_or_given_stay_as_they_are(arm, animation, bodies, errors):
     shot, reduction = compile_shot(arm, animation, with_mesh_errors(bodies, *errors)), Refining(bodies)
-    assert meshes_to_tolerance(shot, reduction, OPTIONS, None) == (shot, reduction)
+    run = simulate_at(shot, OPTIONS, STEP)
+    assert meshes_to_tolerance(shot, reduction, OPTIONS, run, retargeted=True) == (shot, reduction)
     assert reduction.wanted is None and not reduction.released
 
 
@@ -69,21 +77,27 @@ def test_only_the_mesh_that_costs_most_is_refined(arm, animation, bodies):
     errors = (1e-2, 1e-4)  # a millimetre, and a hundredth of one
     shot = compile_shot(arm, animation, with_mesh_errors(bodies, *errors))
     reduction = Refining(list(shot.bodies))
-    meshes_to_tolerance(shot, reduction, OPTIONS, None)
+    by_deflections(shot, reduction, OPTIONS)
     allowed = mesh_budget.SHARE * OPTIONS.tolerance
     assert reduction.released and set(reduction.wanted) == {0}
     assert 0.5 * allowed < 0.1 * reduction.wanted[0] < allowed
 
 
-def test_errors_at_the_targets_count_in_place_of_deflections_where_they_are_known(arm, animation, bodies):
-    shot = compile_shot(arm, animation, with_mesh_errors(bodies, 1e-2, 1e-2))
+@pytest.mark.parametrize("retargeted", [False, True])
+@pytest.mark.parametrize("deflected", [0.4, 10.0])
+def test_errors_at_the_targets_count_and_of_a_shake_that_will_be_removed_no_more_than_deflections(
+    arm, animation, bodies, retargeted, deflected
+):
+    shot = compile_shot(arm, animation, with_mesh_errors(bodies, 5e-2, 5e-2))
     run = simulate_at(shot, OPTIONS, STEP)
-    by_deflection, by_motion = Refining(list(shot.bodies)), Refining(list(shot.bodies))
-    meshes_to_tolerance(shot, by_deflection, OPTIONS, None)
-    meshes_to_tolerance(shot, by_motion, OPTIONS, run)
     total = mesh_error(shot, OPTIONS, run)
-    ratio = by_motion.wanted[0] / by_deflection.wanted[0]
-    assert ratio == pytest.approx(2e-3 / total, rel=1e-6)  # deflections: two bodies of a millimetre each
+    shot = shot.with_bodies([
+        replace(body, mesh_error_m=None if body.mesh_error is None else 0.5 * deflected * total) for body in shot.bodies
+    ])  # fmt: skip
+    reduction = Refining(list(shot.bodies))
+    meshes_to_tolerance(shot, reduction, OPTIONS, run, retargeted=retargeted)
+    counted = min(deflected, 1.0) * total if retargeted else total
+    assert reduction.wanted[0] == pytest.approx(5e-2 * 0.8 * mesh_budget.SHARE * OPTIONS.tolerance / counted, rel=1e-6)
 
 
 @pytest.mark.parametrize("tolerance, wanted", [(1e-5, 1.25e-5), (None, 2e-2)])
@@ -93,7 +107,7 @@ def test_meshes_are_no_finer_than_the_modulus_is_known_unless_a_tolerance_is_ask
     known = replace(arm, retarget=replace(arm.retarget, tolerance=None))
     shot = compile_shot(known, animation, with_mesh_errors(bodies, 0.2, 1e-4))
     reduction = Refining(list(shot.bodies))
-    meshes_to_tolerance(shot, reduction, RunSettings(tolerance=tolerance), None)
+    by_deflections(shot, reduction, RunSettings(tolerance=tolerance))
     allowed = mesh_budget.SHARE * 1e-5 / 0.1
     assert reduction.wanted[0] == pytest.approx(0.02) if tolerance is None else reduction.wanted[0] < allowed
     assert (1 in reduction.wanted) == (tolerance is not None and 1e-4 > 0.5 * allowed)

@@ -37,6 +37,7 @@ from calmotion.reduction.elements.patch_rotation import (
 from calmotion.support import interrupts
 
 MOST = 40  # directions of derivatives that are kept; the cost goes with the fourth power (samples have up to 37)
+_AT_ONCE = 32  # right-hand sides that are solved together: of more, the memory alone grows
 NEGLIGIBLE = 1e-3  # square root of the negligible share of the largest strain energy among the derivatives
 
 
@@ -126,22 +127,29 @@ def modal_derivatives(
     for k, change in enumerate(patch_changes):
         changes[k, :, at : at + change.shape[1]] = change
         at += change.shape[1]
-    new = second >= (0 if known is None else known.count)
-    here = int(new.sum())
-    force, imposed = np.zeros((n, 3, here + at)), np.zeros((n, 3, here + at))
-    for k, (i, j) in enumerate(zip(first[new], second[new], strict=True)):
-        interrupts.check()
-        force[:, :, k] = rule.second_order_force(gradients[i], gradients[j], lame, mu, law)
     change_sizes = np.einsum("pms,pmq->sq", changes, squares(basis.patch_motion[:, 3:, :count]))
-    for k, (patch, arm) in enumerate(zip(support.patches, arms, strict=True)):
-        imposed[patch] = square_fields(arm) @ changes[k] @ np.hstack([change_sizes[:, new], np.eye(at)])
-    flat, moved = support.fixed(model).balance(-force.reshape(3 * n, -1), imposed.reshape(3 * n, -1))
-    found = flat.reshape(n, 3, -1)
     fields, motion = np.empty((n, 3, pairs)), np.empty((p, 6, pairs))
-    fields[:, :, new], motion[:, :, new] = found[:, :, :here], moved[:, :, :here]
+    shapes, shape_motion = np.empty((n, 3, at)), np.empty((p, 6, at))
+    first_new = 0 if known is None else known.count
+    new = np.append(np.flatnonzero(second >= first_new), pairs + np.arange(at))
+    sizes = np.hstack([change_sizes, np.eye(at)])
+    for start in range(0, len(new), _AT_ONCE):
+        some = new[start : start + _AT_ONCE]
+        force, imposed = np.zeros((n, 3, len(some))), np.zeros((n, 3, len(some)))
+        for k, pair in enumerate(some[some < pairs]):
+            interrupts.check()
+            force[:, :, k] = rule.second_order_force(gradients[first[pair]], gradients[second[pair]], lame, mu, law)
+        for k, (patch, arm) in enumerate(zip(support.patches, arms, strict=True)):
+            imposed[patch] = square_fields(arm) @ changes[k] @ sizes[:, some]
+        flat, moved = support.fixed(model).balance(-force.reshape(3 * n, -1), imposed.reshape(3 * n, -1))
+        found, paired = flat.reshape(n, 3, -1), some < pairs
+        fields[:, :, some[paired]], motion[:, :, some[paired]] = found[:, :, paired], moved[:, :, paired]
+        others = some[~paired] - pairs
+        shapes[:, :, others], shape_motion[:, :, others] = found[:, :, ~paired], moved[:, :, ~paired]
     if known is not None:
-        fields[:, :, ~new], motion[:, :, ~new] = known.fields, known.motion
-    return Derivatives(count, fields, motion, changes, change_sizes, found[:, :, here:], moved[:, :, here:])
+        old = np.flatnonzero(second < first_new)
+        fields[:, :, old], motion[:, :, old] = known.fields, known.motion
+    return Derivatives(count, fields, motion, changes, change_sizes, shapes, shape_motion)
 
 
 def extended_basis(
@@ -181,7 +189,8 @@ def extended_basis(
     change_sizes = derivatives.change_sizes * weight
     shapes, shape_motion = derivatives.shapes.reshape(3 * n, -1), derivatives.shape_motion
     # the derivatives without changes of shape, and the responses to these changes
-    extra = derivatives.fields.reshape(3 * n, -1) * weight - shapes @ change_sizes
+    extra = derivatives.fields.reshape(3 * n, -1) * weight
+    extra -= shapes @ change_sizes
     moved = derivatives.motion * weight - shape_motion @ change_sizes
     M, K = vector_mass(model.mass), model.stiffness
     modes = basis.modes.reshape(3 * n, -1)

@@ -33,8 +33,8 @@ _SOFTEST = 0.5  # factor of a stiffness or a strain; a mesh that is off by more 
 
 def meshes_to_tolerance(
     shot: CompiledShot, reduction: BodyReduction, options: RunSettings,
-    run: StepRun | None, progress: Callable[[float, str], None] = lambda fraction, message: None,
-    bodies: Callable[[BodyReduction], list[ReducedBody]] | None = None,
+    run: StepRun, progress: Callable[[float, str], None] = lambda fraction, message: None,
+    bodies: Callable[[BodyReduction], list[ReducedBody]] | None = None, *, retargeted: bool = False,
 ) -> tuple[CompiledShot, BodyReduction]:  # fmt: skip
     """The shot and its reduction on meshes that keep their share of the tolerance, as far as the limit of nodes allows.
 
@@ -42,10 +42,11 @@ def meshes_to_tolerance(
         shot: With reduced bodies.
         reduction: Which made them.
         options: With the tolerance.
-        run: The shot as animated; None where its shake will be removed, and with it the effect of the stiffness on its
-            frequencies.
+        run: The shot as animated.
         progress: Called with a fraction and the body at hand.
         bodies: Makes the bodies on the finer meshes; None: to the tolerance.
+        retargeted: The shot's shake will be removed, and with it the effect of the stiffness on its frequencies: the
+            meshes cost no more than their part of the deflection.
 
     Raises:
         ShotError: A body cannot be reduced, or the shot not be simulated.
@@ -54,8 +55,12 @@ def meshes_to_tolerance(
     bound = sum(known.values())
     if not bound:
         return shot, reduction
-    total = bound if run is None else mesh_error(shot, options, run) or bound
     allowed = SHARE * tolerance_of(shot.character, options.tolerance)
+    if retargeted and bound <= allowed:
+        return shot, reduction
+    total = mesh_error(shot, options, run) or bound
+    if retargeted:
+        total = min(total, bound)  # the bound is of all loads at their worst, which the motion mostly is not
     if total <= allowed:
         return shot, reduction
     costs = {b: total / bound * error for b, error in known.items()}
