@@ -138,7 +138,7 @@ def beam_rows(folder: Path, machine: Machine, fits: Sequence[tuple[str, ...]]) -
 
 
 def machine_in(folder: Path) -> Machine:
-    """The shots of a folder that have a recording.
+    """The shots of a folder that have a recording; flexible links are reduced once, for the motion of the first.
 
     Raises:
         ShotError: There are fewer than two, or one cannot be read.
@@ -151,7 +151,11 @@ def machine_in(folder: Path) -> Machine:
             found=len(files),
             remedy="Put NAME.usda and NAME.csv of each into the folder",
         )
-    return Machine({file.stem: read_performed(str(file), [file.with_suffix(".csv")]) for file in files})
+    takes = dict[str, tuple[CompiledShot, tuple[SensorRecording, ...]]]()
+    for file in files:
+        first = next((shot for shot, _ in takes.values()), None)
+        takes[file.stem] = read_performed(str(file), [file.with_suffix(".csv")], first)
+    return Machine(takes)
 
 
 def choices(names: Sequence[str], count: int, most: int | None) -> list[tuple[str, ...]]:

@@ -11,6 +11,7 @@ Source: Tapley, Schutz, Born, Statistical Orbit Determination, 2004, section 6.3
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +28,9 @@ OWN = 0.25  # of the error of the mesh: how much the errors of modes differ (bea
 SMALL = 0.1  # standard deviation of the errors by which is differentiated
 
 
-def covariance_of_model(problem: Calibrated, z: Array, jacobian: Array, weights: Array) -> Array:
+def covariance_of_model(
+    problem: Calibrated, z: Array, jacobian: Array, weights: Array, of: Callable[[Array], Array] = lambda values: values
+) -> Array:
     """Covariance of z by the errors of the model's meshes, shape [n, n]; zero where these are not known.
 
     Args:
@@ -35,6 +38,7 @@ def covariance_of_model(problem: Calibrated, z: Array, jacobian: Array, weights:
         z: Where, in standard deviations of the priors.
         jacobian: Derivative of the residuals by z there, shape [N, n].
         weights: Of the residuals, shape [N].
+        of: What is done to residuals before they are weighed.
     """
     count = len(problem.parameters)
     gain = np.linalg.inv(jacobian.T @ (weights[:, None] * jacobian) + np.eye(len(z)))
@@ -53,7 +57,7 @@ def covariance_of_model(problem: Calibrated, z: Array, jacobian: Array, weights:
 
     for other in in_parallel(residuals, _errors(problem.shot.bodies)):
         if other is not None:
-            off = gain @ (jacobian.T @ (weights * (other - here))) / SMALL
+            off = gain @ (jacobian.T @ (weights * of(other - here))) / SMALL
             found += np.outer(off, off)
     return found
 

@@ -14,7 +14,7 @@ from scipy.stats import norm
 from scipy.stats.qmc import Sobol
 
 from ..model.estimates import DAMPING, DELAY, FRICTION, LOAD_FRICTION, MAX_TORQUE
-from .disagreement import widened
+from .disagreement import Scattered, settled, together
 from .least_squares import Solution, chord, loss_of, minimize, posterior, weights_of
 from .measurement import Measurement
 from .model_error import covariance_of_model
@@ -34,7 +34,6 @@ ROUNDS, STEADY = 5, 0.05  # of the noise, and its relative change at which they 
 COARSE = 0.3  # error of a step, over the noise, with which no search begins but for a first guess
 HALVINGS, SHIFT = 5, 0.2  # of the step, and the change of an estimate at which they end, over its standard deviation
 ORDER = 2  # of the integrators
-DISAGREES = 1.5  # times as wide as noise makes it: pieces of the recordings tell other values
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +86,15 @@ def search(problem: Calibrated, tell: Callable[[float, str], None], halvings: in
         best = best.with_measurement(correlated(best, z))
         if np.all(np.abs(np.array([s.sigma for s in best.measurement.sensors]) / used - 1.0) < STEADY):
             break
+    tell(0.7, "comparing pieces of the recordings")
+    interrupted = False
+    try:
+        apart, solution = settled(best, solution)
+    except KeyboardInterrupt:  # what converged is not thrown away
+        answer()
+        apart, halvings, interrupted = together(best), 0, True
     tell(0.8, "halving the time step")
-    return _converged(best, solution, iterations, halvings)
+    return _converged(apart, solution, iterations, halvings, interrupted)
 
 
 def _resolved(problem: Calibrated, z: Array, halvings: int) -> tuple[Calibrated, int]:
@@ -104,16 +110,19 @@ def _resolved(problem: Calibrated, z: Array, halvings: int) -> tuple[Calibrated,
     return problem, halvings
 
 
-def _converged(problem: Calibrated, solution: Solution, iterations: int, halvings: int) -> Found:
+def _converged(
+    problem: Scattered, solution: Solution, iterations: int, halvings: int, interrupted: bool = False
+) -> Found:
     """The minimum for ever smaller steps, extrapolated to a step of zero.
 
     Derivatives are those of the first step where they serve: a minimum with another step is near, and its residuals
     alone decide where.
     """
     deviations, of_model = _deviations(problem, solution)
-    limit, shift, extrapolated, interrupted = solution.z, 0.0, False, False
+    limit, shift, extrapolated = solution.z, 0.0, False
     for _ in range(halvings):
-        finer = problem.with_options(replace(problem.options, step=0.5 * step_of(problem)))
+        options = replace(problem.plain.options, step=0.5 * step_of(problem.plain))
+        finer = problem.with_options(options)
         try:
             if finer.residuals(solution.z) is None:  # it cannot be simulated with this step
                 break
@@ -137,11 +146,10 @@ def _converged(problem: Calibrated, solution: Solution, iterations: int, halving
         limit, extrapolated = then, True
         if shift <= SHIFT:
             break
-    problem = problem.with_measurement(correlated(problem, solution.z))
-    covariance = posterior(solution.jacobian, solution.residuals, problem.counts) + of_model
-    wider = widened(problem, solution, covariance)
-    covariance = wider[:, None] * covariance * wider
-    return Found(limit, problem, solution, covariance, iterations, shift, wider > DISAGREES, interrupted)
+    plain = problem.plain.with_measurement(correlated(problem.plain, solution.z))
+    covariance = problem.widened(posterior(solution.jacobian, solution.residuals, plain.counts) + of_model)
+    disagrees = np.zeros(len(limit), bool) if problem.disagrees is None else problem.disagrees
+    return Found(limit, plain, solution, covariance, iterations, shift, disagrees, interrupted)
 
 
 def step_of(problem: Calibrated) -> float:
@@ -150,14 +158,14 @@ def step_of(problem: Calibrated) -> float:
     return problem.options.step
 
 
-def _deviations(problem: Calibrated, solution: Solution) -> tuple[Array, Array]:
+def _deviations(problem: Scattered, solution: Solution) -> tuple[Array, Array]:
     """Standard deviations of z about a solution, and the covariance by what the model has wrong.
 
     Residuals that are correlated in time count as fewer.
     """
-    counts = correlated(problem, solution.z).counts
+    counts = correlated(problem.plain, solution.z).counts
     weights = weights_of(solution.residuals) / counts
-    of_model = covariance_of_model(problem, solution.z, solution.jacobian, weights)
+    of_model = covariance_of_model(problem.plain, solution.z, solution.jacobian, weights, problem.of)
     covariance = posterior(solution.jacobian, solution.residuals, counts) + of_model
     return np.sqrt(np.diag(covariance)), of_model
 

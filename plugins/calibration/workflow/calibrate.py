@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -13,7 +13,7 @@ from calmotion.host import SettingError, Settings, merge, nearest, quantity_of
 from calmotion.model import Animation, Character, OutputPaths, Provenance, RunSettings, Source, WrittenLayer
 from calmotion.multibody import IMPLICIT
 from calmotion.recordings import SensorRecording, measured_prims, read_recordings, refuse_unknown_channels
-from calmotion.simulation import CompiledShot
+from calmotion.simulation import CompiledShot, compile_shot
 from calmotion.tolerance import compiled_in
 from calmotion.workflow import (
     Given,
@@ -170,8 +170,13 @@ def _refuse_twice(recordings: Sequence[SensorRecording], earlier: Sequence[Senso
             )  # fmt: skip
 
 
-def read_performed(shot: Shot | Path, recordings: Sequence[Path]) -> tuple[CompiledShot, tuple[SensorRecording, ...]]:
+def read_performed(
+    shot: Shot | Path, recordings: Sequence[Path], like: CompiledShot | None = None
+) -> tuple[CompiledShot, tuple[SensorRecording, ...]]:
     """A shot with a target at each sensor, ready to be simulated, and its recordings, as `calibrate_shots` takes them.
+
+    Args:
+        like: A shot of the same robot, whose flexible bodies, reduced for its motion, serve here too.
 
     Raises:
         ShotError: The shot cannot be processed, or a recording does not fit it.
@@ -179,7 +184,15 @@ def read_performed(shot: Shot | Path, recordings: Sequence[Path]) -> tuple[Compi
     """
     opened = with_sensors(shot)
     read = read_recordings(opened.host, [os.fspath(file) for file in recordings], opened.settings)
-    outcome = compiled_with_sensors(opened, read, RunSettings(), None, (), {}, Hooks(None, None, None))
+    hooks = Hooks(None, None, None)
+    if like is not None and any(body.simulated_flexible for body in like.character.bodies):
+        source = Source("", "", RunSettings(), measured=measured_prims(read))
+        first = carry_out(opened, "simulate", wanted=_READ, source=source, hooks=hooks)
+        character = first.require(Character)
+        if [body.path for body in character.bodies] == [body.path for body in like.character.bodies]:
+            character = replace(character, bodies=like.character.bodies)
+            return compile_shot(character, first.require(Animation), like.bodies), read
+    outcome = compiled_with_sensors(opened, read, RunSettings(), None, (), {}, hooks)
     return compiled_in(outcome.run.get), read
 
 

@@ -73,7 +73,7 @@ def elastic_modes(model: Model) -> tuple[Array, list[Array]]:
     if not size:
         return np.zeros(0), [np.zeros((int(r), 0)) for r in system.elastic]
     mass = allowed.T @ M @ allowed
-    stiff = _stiff_modes(sum(allowed[part].T @ K[part, part] @ allowed[part] for part in parts), mass)
+    stiff = _stiff_modes(np.sum([allowed[part].T @ K[part, part] @ allowed[part] for part in parts], axis=0), mass)
     if stiff is not None:
         omega, shapes = np.sqrt(stiff[0]), allowed @ stiff[1]
     else:
