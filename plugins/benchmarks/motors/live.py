@@ -31,6 +31,7 @@ from .lumped_robot import MUJOCO_STEP, simulate_lumped
 RATE = 250.0  # of the stream [Hz]
 SHARES = (0.1, 0.2, 0.4, 0.8)  # of the longest period, as look-ahead
 FREQUENCIES = (0.9, 1.0, 1.1)
+UNCERTAIN = 0.1  # share of the frequencies, with 0.4 of the period
 Left = tuple[float, Array]  # a delay, and distances of targets
 KINDS = ("zv", "zvd", "zv2", "zvd2")
 
@@ -67,12 +68,12 @@ def compare(
     grid, modes = prepared.grid, modes_of(prepared)
     trial = Trial(prepared)
     curves, longest = trial.curves, 1.0 / modes[0][0]
+    asked = {f"live, {share:g} of the period": LiveSettings(RATE, share * longest) for share in SHARES}
+    asked[f"live, {UNCERTAIN:.0%} uncertain"] = LiveSettings(RATE, 0.4 * longest, uncertainty=UNCERTAIN)
     streams = []
-    for share in SHARES:
-        settings = LiveSettings(rate=RATE, lookahead=share * longest)
-        streams.append(
-            (*trial.streamed(shot, settings), _ticks(shot, settings, CubicSpline(grid.times, curves.angles)))
-        )
+    for method, settings in asked.items():
+        ticks = _ticks(shot, settings, CubicSpline(grid.times, curves.angles))
+        streams.append((method, *trial.streamed(shot, settings), ticks))
     for factor in frequencies:
         robot = Trial(prepared, factor)
 
@@ -88,11 +89,11 @@ def compare(
         for kind in KINDS:
             made: Curves = shaped(curves, grid, kind, *modes)
             yield _row(name, kind, factor, left(made.angles, made.rates, None))
-        for share, (angles, rates, report, ticks) in zip(SHARES, streams, strict=True):
+        for method, angles, rates, report, ticks in streams:
             found, limited = left(angles, rates, report["latency_s"]), report["limited"].values()
             share_limited = 100.0 * max(limited, default=0) / report["ticks"]
             half, most = 1e3 * np.quantile(ticks, [0.5, 0.99])
-            row = _row(name, f"live, {share:g} of the period", factor, found)
+            row = _row(name, method, factor, found)
             yield replace(row, tick_ms=half, tick_99_ms=most, limited_percent=share_limited)
 
 
