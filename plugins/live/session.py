@@ -13,7 +13,7 @@ from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
 from calmotion.host import SettingError, nearest
 from calmotion.model import PRESCRIBED, RunSettings, tolerance_of
-from calmotion.multibody import SimulationFailure, VelocityForces, pose_model
+from calmotion.multibody import SimulationFailure, State, VelocityForces, pose_model
 from calmotion.simulation import CompiledShot, coupling_of, leaders, prepare
 
 from .gains import Gains, Weighting, gains_at
@@ -69,6 +69,7 @@ class Live:
         self._window = Window(self._window_ticks, self._limits, forces)
         self._regulator = Regulator(self._coupling, self._deviating, self._limits)
         self._renewal = Renewal(self._gains, settings.background)
+        self._closed = len(self.model.system.rows) > len(self.model.system.parent)
         self._delay = max((motor.delay for motor in character.motors if motor.model != PRESCRIBED), default=0.0)
         most = np.array([motor.max_torque for motor in character.motors])
         self._most = most if forces.known else np.full(len(most), np.inf)
@@ -111,6 +112,7 @@ class Live:
         position = np.clip(self._values(pose), self._limits.lower, self._limits.upper)
         self._sample = position
         begin = time.thread_time()
+        self._near: State | None = None
         try:
             gains = self._gains(position)
         except SimulationFailure as failure:
@@ -262,7 +264,9 @@ class Live:
         )
 
     def _gains(self, position: Array) -> Gains:
-        pose = pose_model(self.model, position, self.world, LiveSettings.HIGHEST * self.settings.rate)
+        # chains that close in several ways stay in theirs
+        pose = pose_model(self.model, position, self.world, LiveSettings.HIGHEST * self.settings.rate, self._near)
+        self._near = pose.state if self._closed else None
         weighting, tolerance = self._weighting, tolerance_of(self.character, self.settings.tolerance)
         moved = (weighting.targets[..., None] * pose.targets_by_input).reshape(-1, len(self.joints))
         lever = float(np.linalg.norm(moved, axis=0).max(initial=0.0))

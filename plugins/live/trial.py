@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.multibody import Model, Workspace
+from calmotion.multibody import POSITION_GAIN, Model, Workspace
 from calmotion.simulation import (
     CompiledShot,
     Prepared,
@@ -34,8 +34,9 @@ class Trial:
 
     def __init__(self, prepared: Prepared, frequencies: float = 1.0):
         system, self._grid, self._world = prepared.model.system, prepared.grid, prepared.world
-        square = frequencies**2
-        stiffer = system._replace(stiffness=square * system.stiffness, data=square * system.data)
+        square, servo = frequencies**2, system.servo.copy()
+        servo[:, POSITION_GAIN] *= square
+        stiffer = system._replace(stiffness=square * system.stiffness, data=square * system.data, servo=servo)
         self._model: Model = replace(prepared.model, system=stiffer)
         self.curves = sample_curves(prepared.shot.animation.current, prepared.grid)
         angles, rates = self.curves.angles, self.curves.rates

@@ -13,7 +13,15 @@ from calmotion.multibody.analysis.modes import Matrices, matrices_at
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, start_angles
 from calmotion.multibody.model.phases import system_held
-from calmotion.multibody.model.system import BEYOND_COULOMB, FRICTION, JOINT_ROWS, RATE_SHARE, VELOCITY_GAIN, System
+from calmotion.multibody.model.system import (
+    BEYOND_COULOMB,
+    FRICTION,
+    JOINT_ROWS,
+    RATE_SHARE,
+    VELOCITY_GAIN,
+    State,
+    System,
+)
 from calmotion.multibody.statics.equilibrium import equilibrium
 
 
@@ -38,6 +46,7 @@ class PoseModel:
         by_input: Motion of the equilibrium with the inputs, shape [N, M].
         inertia: Mass matrix in the inputs [kg m^2], shape [M, M].
         resistance: Efforts by the rates of the inputs and of the amplitudes, as of viscous friction, shape [M, M + n].
+        state: The equilibrium.
     """
 
     omega: Array
@@ -52,6 +61,7 @@ class PoseModel:
     by_input: Array
     inertia: Array
     resistance: Array
+    state: State | None = None
 
     def amplitudes_of(self, other: PoseModel) -> Array:
         """The matrix from amplitudes in another pose to those of the same deflections in this one, [n, n of other]."""
@@ -68,12 +78,16 @@ class PoseModel:
         return np.asarray(by_acceleration @ accelerations + self.resistance @ rates + forces @ self.by_input)
 
 
-def pose_model(model: Model, values: Array, world: Array | None = None, highest: float = np.inf) -> PoseModel:
+def pose_model(
+    model: Model, values: Array, world: Array | None = None, highest: float = np.inf, near: State | None = None
+) -> PoseModel:
     """The robot about its equilibrium at motor inputs of shape [M] [rad or m].
 
     Args:
         world: Moving roots where they stand, shape [W, 18]; needed where the model has any.
         highest: Modes up to this frequency [Hz].
+        near: The equilibrium of a pose nearby, from which that of this one is looked for: closed chains may meet in
+            several ways. None: from the pose as authored.
 
     Raises:
         SimulationFailure: No equilibrium.
@@ -83,7 +97,7 @@ def pose_model(model: Model, values: Array, world: Array | None = None, highest:
     if world is not None:
         workspace.work.world[:] = world
         system = system_held(system, world)
-    state, _ = equilibrium(system, rigid_state(model, angles, world), angles, workspace)
+    state, _ = equilibrium(system, near or rigid_state(model, angles, world), angles, workspace)
     # friction has a slope at rest alone; the robot moves
     servo = system.servo.copy()
     servo[:, [FRICTION, BEYOND_COULOMB]] = 0.0
@@ -112,6 +126,7 @@ def pose_model(model: Model, values: Array, world: Array | None = None, highest:
         by_input=follows,
         inertia=follows.T @ found.mass @ follows,
         resistance=follows.T @ np.concatenate([found.damping @ follows + on_rate, found.damping @ shapes], axis=1),
+        state=state,
     )
 
 
