@@ -11,12 +11,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 DOCS = REPOSITORY / "docs"
 PAGES = DOCS / "tutorials"
-FOLLOWED = ("usd", "urdf", "skinned_character", "calibration", "two_workers", "puppeteer")
+FOLLOWED = ("usd", "urdf", "skinned_character", "calibration", "two_workers", "puppeteer", "diagnosis")
 HOW_TO = ("arduino", "phone", "weights", "remaining_error", "offline_or_live", "slow_motors", "diagnose")
 # What newcomers want to do, and the page that is enough for it: all of them are followed below.
 TASKS = {
@@ -145,6 +146,28 @@ def test_the_loop_of_the_page_is_what_shakes(tmp_path):
     first = json.loads((tmp_path / "work" / "diagnosis.json").read_text())["causes"][0]
     assert first["cause"] == "servo_gains" and first["share"] > 0.9
     assert "rings at 5" in (tmp_path / "work" / "diagnosis.html").read_text()
+
+
+def test_a_public_recording_sticks_as_its_authors_say(tmp_path, shared_data):
+    """The log is made from the tables that were made from it, where they are."""
+    record = shared_data / "measured" / "xl330_pendulum" / "sin_sin_kp100"
+    if not record.with_suffix(".csv").is_file():
+        pytest.skip("the records of real machines are not there")
+    from calmotion.usd import read_shot
+
+    track = read_shot(str(record.with_suffix(".usda")))[1].tracks[0]
+    times, angles = np.loadtxt(record.with_suffix(".csv"), delimiter=",", skiprows=1, unpack=True)
+    asked = np.interp(times, track.times, track.values)
+    entries = [
+        {"timestamp": float(t), "goal_position": float(goal), "position": float(angle)}
+        for t, goal, angle in zip(times - 0.5, asked, angles, strict=True)  # half a second of rest was put in front
+    ]
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work" / "servo.json").write_text(json.dumps({"entries": entries}))
+    printed = follow("diagnosis", tmp_path)
+    assert printed.count("explains") == 2 and "An unknown cause explains 100%" in printed
+    cause = json.loads((tmp_path / "work" / "diagnosis.json").read_text())["causes"][0]
+    assert cause["cause"] == "friction" and cause["share"] == pytest.approx(0.79, abs=0.03)
 
 
 @pytest.mark.long

@@ -14,7 +14,7 @@ from .explanations.joints import Backlash, Ripple
 from .explanations.loops import Delay, Friction, ServoGains
 from .explanations.stream import Stream
 from .explanations.structure import Base, Links
-from .fitting import Fit, fit, independent, score
+from .fitting import Fit, fit, independent, scores
 from .formats import read_spectrum
 from .ringing import peaks, ringing
 from .situation import CLOSED, Situation
@@ -93,7 +93,7 @@ class Comparison:
     def diagnosis(self) -> Diagnosis:
         """The causes."""
         s = self._situation
-        nothing = Fit({}, s.error, 0, score(s, s.error, 0))
+        nothing = Fit({}, s.error, 0)
         if self._is_quiet(self.QUIET):
             quiet = Cause(NONE, 1.0, 0.95, "nothing: within the noise, the robot moves like a healthy one")
             return Diagnosis((quiet,), "", self._channels(nothing), None, s)
@@ -102,7 +102,8 @@ class Comparison:
             self._fit(cause)
             if self._progress is not None:
                 self._progress(0.6 * (k + 1) / len(self._able))
-        singles = sorted(self._able, key=lambda cause: self._fits[frozenset([cause])].score)
+        ranked = self._scored()
+        singles = sorted(self._able, key=lambda cause: ranked[frozenset([cause])])
         for cause in singles[1 : self.PAIRED] if singles else ():
             self._fit(singles[0], cause)
         best = self._best()
@@ -123,7 +124,13 @@ class Comparison:
 
     def _best(self) -> Fit:
         """The fit of the best score; a larger one has to be better by more than chance."""
-        return min(self._fits.values(), key=lambda f: f.score + self.WORTH * len(f.causes))
+        ranked = self._scored()
+        return self._fits[min(ranked, key=lambda key: ranked[key] + self.WORTH * len(key))]
+
+    def _scored(self) -> dict[frozenset[str], float]:
+        """Score of each set of causes."""
+        found = scores(self._situation, list(self._fits.values()))
+        return dict(zip(self._fits, found.tolist(), strict=True))
 
     def _concluded(self) -> Diagnosis:
         best = self._best()
@@ -183,9 +190,9 @@ class Comparison:
 
     def _chances(self) -> tuple[dict[str, float], dict[str, float]]:
         """Chance of each cause to be the largest, and to act, over all fits."""
-        fits = list(self._fits.values())
-        scores = np.array([f.score + self.WORTH * len(f.causes) for f in fits])
-        weights = np.exp(-(scores - scores.min()) / self.TEMPERATURE)
+        fits, ranked = list(self._fits.values()), self._scored()
+        worth = np.array([value + self.WORTH * len(key) for key, value in ranked.items()])
+        weights = np.exp(-(worth - worth.min()) / self.TEMPERATURE)
         weights /= weights.sum()
         first, acts = dict.fromkeys(self._able, 0.0), dict.fromkeys(self._able, 0.0)
         for f, weight in zip(fits, weights, strict=True):

@@ -26,13 +26,11 @@ class Fit:
         effects: Of each, by its cause.
         left: What they do not explain, a weighted vector.
         count: Values that were fitted.
-        score: Negative logarithm of the likelihood of the held-out samples, and half the penalty of BIC.
     """
 
     effects: Mapping[str, Effect]
     left: Array
     count: int
-    score: float
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -66,24 +64,28 @@ def fit(situation: Situation, explanations: Sequence[Explanation], alone: Mappin
     left = error - sum((effect.vector for effect in found.values()), np.zeros(len(error)))
     count = sum(effect.count for effect in found.values())
     effects = {e.cause: found[e.cause] for e in explanations}
-    return Fit(effects, left, count, score(situation, left, count))
+    return Fit(effects, left, count)
 
 
-def score(situation: Situation, left: Array, count: int) -> float:
-    """Negative logarithm of the likelihood of held-out samples, and half of the penalty of BIC.
+def scores(situation: Situation, fits: Sequence[Fit]) -> Array:
+    """Of each fit the negative logarithm of the likelihood of held-out samples, and half of the penalty of BIC.
 
-    Samples that follow each other are not independent: each block counts with as many as its autocorrelation leaves.
+    Samples that follow each other are not independent: each block counts with as many as the autocorrelation of what
+    the best fit leaves there allows, the same for all fits. By the error itself a slow one would count as few samples,
+    and nothing could explain it.
     """
-    total, samples = 0.0, 0.0
-    held_out = ~situation.fitted
+    totals, samples = np.zeros(len(fits)), 0.0
     for block in situation.blocks:
-        own = left[block]
-        size = independent(situation.error[block])
-        rows = held_out[block]
+        rows = ~situation.fitted[block]
+        if not rows.any():
+            continue
+        powers = np.array([float(np.mean(fit.left[block][rows] ** 2)) for fit in fits])
+        size = independent(fits[int(powers.argmin())].left[block])
         # below the noise (a weighted variance of one) nothing is gained
-        total += 0.5 * size * np.log(1.0 + float(np.mean(own[rows] ** 2)) if rows.any() else 1.0)
+        totals += 0.5 * size * np.log(1.0 + powers)
         samples += size
-    return total + 0.5 * count * float(np.log(max(samples, 2.0)))
+    counts = np.array([fit.count for fit in fits])
+    return np.asarray(totals + 0.5 * counts * np.log(max(samples, 2.0)))
 
 
 def independent(signal: Array) -> float:
@@ -208,10 +210,12 @@ def _fit_group(
     assert best is not None
     before, after = float(np.sum((target[keep] * scale) ** 2)), 2.0 * float(best.cost)
     noise = float(keep.sum()) * scale**2
+    values = {key: p.value(float(v)) for (key, p), v in zip(own.items(), best.x, strict=True)}
+    size = independent(target - _shown(situation, loops, group, values, single)) if single else size
     worth = 0.5 * size * np.log((noise + before) / (noise + after))
     if worth < 0.5 * len(own) * np.log(max(size, 2.0)):
         return None
-    return {key: p.value(float(v)) for (key, p), v in zip(own.items(), best.x, strict=True)}
+    return values
 
 
 def _shown(

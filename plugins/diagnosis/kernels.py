@@ -26,7 +26,10 @@ def follow(
         out: Position, speed and acceleration, shape [3, T].
     """
     kp, kd, share, dry, excess, fast = gains[0], gains[1], gains[2], gains[3], gains[4], gains[5]
-    y = command[0] - load[0] / kp
+    # at rest: where it was, as far as friction holds it there
+    rest = (kp * command[0] - load[0] + slope[0] * near[0]) / (kp + slope[0])
+    held = dry * (1.0 + excess) / (kp + slope[0])
+    y = min(max(near[0], rest - held), rest + held)
     v = 0.0
     out[0, 0], out[1, 0], out[2, 0] = y, v, 0.0
     for n in range(len(command) - 1):

@@ -31,6 +31,7 @@ TOLD_BY = {
 }
 AHEAD = 0.015  # from which on a recording that is ahead of its command is on another clock [s]
 SHIFTED = 0.3  # from which on the clocks of command and recording are taken to differ [s]
+BEGINNING, ZERO = 0.1, 0.2  # [s], and what an encoder may be off there without having another zero [rad]
 CLEAR = 0.03  # largest mean square of what then is left, of the variance of the command
 SAME = 0.15  # difference of what was sent from the shot, of the range of its motion, up to which it is the same motion
 
@@ -142,8 +143,10 @@ def _joint(path: str, m: int, motor: Motor | None, mechanics: Mechanics | None, 
     inertia, torque, slope = (
         on_grid(times, mechanics.times, getattr(mechanics, name)[:, m]) for name in ("inertia", "torque", "slope")
     )
-    acceleration = np.gradient(np.gradient(command, times, edge_order=2), times, edge_order=2)
-    load = torque - inertia * acceleration
+    # both by the same differences, so that noise of encoders, twice differentiated, is not left over as a load
+    few, own = mechanics.times, on_grid(mechanics.times, times, command)
+    acceleration = np.gradient(np.gradient(own, few, edge_order=2), few, edge_order=2)
+    load = on_grid(times, few, mechanics.torque[:, m] - mechanics.inertia[:, m] * acceleration)
     rotor = motor.rotor
     if motor.model == PRESCRIBED:  # gains of a drive that this shot does not use
         return Joint(path, inertia + rotor.armature, load, torque, slope, delay=motor.delay)
@@ -231,9 +234,11 @@ def _sensors(
             notes.append(stale.format(channel.name))
         times, values, noise = _thinned(times, values, noise)
         index = list(names).index(channel.path) if channel.path in names else -1
-        found.append(
-            Sensor(channel.kind, channel.path, index, times, values, max(noise, 1e-12), tuple(map(int, there)))
-        )
+        unit = ""
+        if shot is not None and channel.kind == ANGLE and index >= 0:
+            unit = "m" if shot.character.motors[index].linear else "rad"
+        columns = tuple(map(int, there))
+        found.append(Sensor(channel.kind, channel.path, index, times, values, max(noise, 1e-12), columns, unit))
     if not found:
         raise ShotError(
             "no channel of the recordings can be compared with the motion",
@@ -308,7 +313,9 @@ def _measured(situation: Situation) -> Array:
     for m, k in situation.encoders.items():
         sensor, own = situation.sensors[k], situation.command[:, m]
         off = sensor.values[:, 0] - np.interp(sensor.times, situation.times, own)
-        off = np.interp(situation.times, sensor.times, off - np.median(off))
+        # a zero that is elsewhere shows at the beginning; later a joint may be far from its command by its own faults
+        first = float(np.median(off[sensor.times <= sensor.times[0] + BEGINNING]))
+        off = np.interp(situation.times, sensor.times, off - (first if abs(first) > ZERO else 0.0))
         near[:, m] = own + sosfiltfilt(butter(2, FASTEST, fs=1.0 / situation.h, output="sos"), off)
     return near
 

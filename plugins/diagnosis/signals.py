@@ -62,6 +62,7 @@ class Sensor:
         values: Shape [n, c].
         noise: Standard deviation [unit].
         components: Which of x, y and z the columns of the values are, of markers and accelerometers.
+        unit: Of its values, where more is known of it than its kind says.
     """
 
     kind: str
@@ -71,6 +72,7 @@ class Sensor:
     values: Array
     noise: float
     components: tuple[int, ...] = (0, 1, 2)
+    unit: str = ""
 
     @property
     def name(self) -> str:
@@ -80,7 +82,7 @@ class Sensor:
     @property
     def error_unit(self) -> str:
         """Unit of its errors: accelerations are integrated."""
-        return "m/s" if self.kind == ACCELEROMETER else UNITS[self.kind]
+        return "m/s" if self.kind == ACCELEROMETER else self.unit or UNITS[self.kind]
 
 
 @dataclass(frozen=True, eq=False)

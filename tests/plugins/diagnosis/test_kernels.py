@@ -41,6 +41,15 @@ def test_friction_holds_a_joint_within_the_band_of_friction_over_gain():
     np.testing.assert_allclose((ramp - own[0])[sliding], friction / gain + 8.0 * 0.1 / gain, rtol=0.02)
 
 
+@pytest.mark.parametrize(("friction", "at"), [(0.0, 0.9), (0.5, 0.9 + 0.5 / 20.0), (4.0, 1.05)])
+def test_a_joint_begins_at_rest_where_it_was_as_far_as_friction_holds_it(friction, at):
+    """A soft loop under a load that grows with the angle, near 1.05 rad: 10 (2 - y) = 12.5 + 10 (y - 1.05)."""
+    out, ones = np.zeros((3, len(TIMES))), np.ones(len(TIMES))
+    gains = np.array([10.0, 1.0, 0.0, friction, 0.0, 0.05])
+    follow(H, 2.0 * ones, NONE, 0.1 * ones, 12.5 * ones, 10.0 * ones, 1.05 * ones, gains, out)
+    np.testing.assert_allclose(out[0], at, atol=1e-9)
+
+
 def test_a_load_lies_on_the_side_of_its_play_to_which_it_is_pressed():
     width, load = 0.02, np.where(TIMES < 1.5, 4.0, -4.0)
     own = np.zeros((4, len(TIMES)))
