@@ -229,22 +229,22 @@ def _tell(robot: Live, source: Source) -> None:
     report = robot.report()
     rate = report["sender_rate"]
     events = ", ".join(f"{count} {name}" for name, count in sorted(report["events"].items()))
-    notice(f"{report['ticks']} ticks; {report['samples']} samples{': ' if events else ''}{events}")
+    notice(f"{report['ticks']} commands for {report['samples']} samples{': ' if events else ''}{events}")
     if source.fault:
         were = "message was" if source.faults == 1 else "messages were"
         notice(f"{source.faults} {were} left out; the first: {source.fault}")
     restarts, asked = report["events"].get(RESTARTED, 0), robot.settings.sender_rate
     if (rate and rate < SLOWEST) or restarts > 0.5 * report["samples"] > 1:
-        notice("the stamps of samples are far apart; stamps are in seconds")
+        notice("the time stamps of samples are far apart: they have to be in seconds")
     elif rate and (rate < 0.8 * (asked or robot.settings.rate) or (asked and rate > 1.25 * asked)):
         notice(f"the sender gave {rate:.3g} samples a second; --sender-rate {rate:.3g} follows them smoothly")
     if BEYOND in report["events"]:
-        notice("samples beyond the limits of the joints were taken as at the limits; angles are in radians")
+        notice("samples beyond the limits of joints were held at the limits: angles have to be in radians")
     for path, count in report["unknown_joints"].items():
         notice(f"samples with {path}: {count}; the robot has no such motor, it has {', '.join(robot.joints)}")
     for path, count in report["limited"].items():
-        notice(f"{path} was at a limit for {count} ticks")
+        notice(f"{path} was at a limit in {count} commands")
     for path, share in report["too_weak"].items():
         notice(f"{path} needed up to {share:.2f} times the effort that its motor has")
     spent = report["tick_s"]
-    notice(f"a tick took {1e3 * spent['median']:.2f} ms, 99% of them less than {1e3 * spent['p99']:.2f} ms")
+    notice(f"computing a command took {1e3 * spent['median']:.2f} ms (median; 99%: {1e3 * spent['p99']:.2f} ms)")

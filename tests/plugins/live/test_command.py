@@ -60,7 +60,7 @@ def lines(count, rate, start=0.0, name=JOINT, speed=0.1):
     [
         ("\ufeff" + lines(300, 250, name="SHORT") * 2, (), "600 samples: 1 restarted", 0.1 * 299 / 250),
         (lines(100, 50), (), "--sender-rate 50 follows them smoothly", 0.1 * 99 / 50),
-        (lines(20, 0.25, speed=1e-4), ("--seconds", "40"), "stamps are in seconds", 1e-4 * 40),
+        (lines(20, 0.25, speed=1e-4), ("--seconds", "40"), "have to be in seconds", 1e-4 * 40),
         ('{"t": 0, "joints": {"J": "1"}}\n{"t": true, "joints": {}}\n\udcff\n', (), "3 messages were left out", None),
         (lines(300, 250).replace("0.004,", "1e999,"), (), "1 not finite", 0.1 * 299 / 250),
     ],
