@@ -153,7 +153,7 @@ def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("live", __doc__, SAMPLES)
     parser.add_argument("--random", metavar="S", type=float, help="moves between random poses for so many seconds")
-    parser.add_argument("--mujoco", action="store_true", help="rigid bodies on motors that give, played by MuJoCo")
+    parser.add_argument("--mujoco", action="store_true", help="rigid bodies on compliant motors, played by MuJoCo")
     options = parser.parse_args(arguments)
     rows: list[Row] = []
     for path in options.shots:
