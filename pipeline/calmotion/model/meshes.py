@@ -76,8 +76,9 @@ class MeshQuality:
         repairs: What was repaired, as sentences.
         frequency_error: Estimated relative error of the first frequencies; None where it is not known.
         source: What the body's solid was made of, such as `visual surface`.
-        deflection_error: The same of deflections, to which stiff modes add little; None: twice that of frequencies.
         stiffness_factor: Of the stiffness of ever finer meshes over that of this one, by which its elements are softer.
+        deflection_error: Estimated relative error of deflections, to which stiff modes add little; None: twice that of
+            frequencies.
     """
 
     min_dihedral_deg: float
@@ -85,9 +86,9 @@ class MeshQuality:
     volume_error: float
     repairs: tuple[str, ...] = ()
     frequency_error: float | None = None
-    deflection_error: float | None = None
     stiffness_factor: float = 1.0
     source: str = ""
+    deflection_error: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

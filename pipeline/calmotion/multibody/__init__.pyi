@@ -19,6 +19,7 @@ from calmotion.multibody.model.joint_arrays import body_anchors as body_anchors
 from calmotion.multibody.model.model import Model as Model
 from calmotion.multibody.model.model import compile_model as compile_model
 from calmotion.multibody.model.model import moves_freely as moves_freely
+from calmotion.multibody.model.model import start_angles as start_angles
 from calmotion.multibody.model.system import POSITION_GAIN as POSITION_GAIN
 from calmotion.multibody.model.system import State as State
 from calmotion.multibody.model.topology import Tree as Tree

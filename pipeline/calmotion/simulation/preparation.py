@@ -14,7 +14,7 @@ from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.deflection import largest_deflection
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.failure import NOWHERE, Reason, SimulationFailure
-from calmotion.multibody.model.model import Model
+from calmotion.multibody.model.model import Model, start_angles
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.contacts import sample_world
@@ -97,8 +97,10 @@ def modes_of(prepared: Prepared, time: float = 0.0) -> tuple[Array, Array]:
             remedy="Ask for time 0.",
         )
     row = int(np.argmin(np.abs(prepared.grid.times - time)))
+    # closed chains may be closed in several ways: that of the pose as authored counts
+    start = start_angles(prepared.model, prepared.model.joint_angles(angles[row]))
     try:
-        return system_modes(prepared.model, prepared.model.joint_angles(angles[row]), prepared.world[row])
+        return system_modes(prepared.model, start, prepared.world[row])
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
 

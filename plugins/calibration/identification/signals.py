@@ -20,6 +20,7 @@ from calmotion.multibody import (
     natural_modes,
     reactions,
     rigid_state,
+    start_angles,
 )
 from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER, STRAIN, Channel, LowPass
 from calmotion.simulation import AT_REST, CompiledShot, ForwardRun, Prepared, over_grid, prepare, run_forward
@@ -207,7 +208,7 @@ def _begun(robot: Robot, prepared: Prepared, workspace: Workspace, angles: Array
     moved, before = np.zeros(len(start)), np.zeros(len(start))
     for _ in range(_TURNS):
         joints = model.joint_angles(command[None])
-        state, _ = equilibrium(model.system, rigid_state(model, joints[0]), joints[0], workspace)
+        state, _ = equilibrium(model.system, rigid_state(model, start_angles(model, joints[0])), joints[0], workspace)
         found = joint_values(model.system, model.motor, motors, state.u[None], joints)
         off = np.where(free, start - robot.offsets - model.motor_values(found)[0], 0.0)
         if np.all(np.abs(off) <= _NEAR):

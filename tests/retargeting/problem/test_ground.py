@@ -112,4 +112,6 @@ def test_of_stiff_rows_those_that_pull_most_are_part_of_the_inverse(posed, monke
     rows = np.array([np.where(locked, 0.0, row) for row in linear._stiff.values()])
     weight = limits.curvature(GROUND, acting[GROUND])[judged[0], 0]
     plain = linear.precondition(locked, None, limits, kept)
-    assert solved == pytest.approx(expected - plain(weight * rows.T @ (rows @ solved)), rel=1e-6)
+    assert solved == pytest.approx(
+        expected - plain(weight * rows.T @ (rows @ solved)), rel=1e-5
+    )  # its diagonal is 1e-9 larger

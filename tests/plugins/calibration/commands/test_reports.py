@@ -48,7 +48,9 @@ def test_a_calibration_says_what_the_recordings_tell_before_what_they_cost():
     }  # fmt: skip
     lines = printed(calibrate, report)
     assert lines[0] == "The recordings identify 1 of 2 parameters of the robot."
-    assert lines[1].startswith("marker /Arm/Hand: the difference of recording and robot falls from 0.8 mm to 0.2 mm")
+    assert lines[1].startswith(
+        "marker /Arm/Hand: the difference between recording and simulation falls from 0.8 mm to 0.2 mm"
+    )
     order = ["Parameters of the robot", "wrote mine.usda", "wrote mine_root.usda"]
     order += ["next: calmotion optimize mine_root.usda -o LAYER makes curves for this robot", "note: a note"]
     order += ["Parameters of the model and the measurement"]
