@@ -120,21 +120,21 @@ NOTED = {
         robot(extra='<tendon><fixed name="grip"><joint joint="hip" coef="1"/></fixed></tendon>'),
         "couples their joints: grip",
     ),
-    "ref": (robot(joint='ref="30"'), "subtract ref from a motion that counts as MuJoCo does: hip"),
-    "class_ref": (robot(extra='<default><joint ref="30"/></default>'), "subtract ref from a motion that counts as MuJoCo does: hip"),
+    "ref": (robot(joint='ref="30"'), "that counts as MuJoCo does: hip"),
+    "class_ref": (robot(extra='<default><joint ref="30"/></default>'), "that counts as MuJoCo does: hip"),
     "inner_class_ref": (
         robot(
             joint='class="arm"',
             extra='<default><joint ref="30"/><default class="arm"><joint damping="1"/></default></default>',
         ),
-        "subtract ref from a motion that counts as MuJoCo does: hip",
+        "that counts as MuJoCo does: hip",
     ),
     "childclass": (
         robot(
             body='<body childclass="c"><frame><body><joint name="toe"/></body></frame></body>',
             extra='<default><default class="c"><joint ref="1"/></default></default>',
         ),
-        "subtract ref from a motion that counts as MuJoCo does: toe",
+        "that counts as MuJoCo does: toe",
     ),
     "air": (robot(extra=OPTION.format('density="1.2"', "")), "air and liquids are not simulated: option"),
     "gravcomp": (robot(body='<body name="c" gravcomp="1"/>'), "in full, gravcomp is not read: c"),
