@@ -14,7 +14,7 @@ from .explanations.joints import Backlash, Ripple
 from .explanations.loops import Delay, Friction, ServoGains
 from .explanations.stream import Stream
 from .explanations.structure import Base, Links
-from .fitting import Fit, fit, independent, scores
+from .fitting import Fit, fit, scores
 from .formats import read_spectrum
 from .ringing import peaks, ringing
 from .situation import CLOSED, Situation
@@ -253,6 +253,3 @@ def of_spectrum(file: str) -> Diagnosis:
 def diagnosis_of(situation: Situation, progress: Callable[[float], None] | None = None) -> Diagnosis:
     """What explains the error of a situation."""
     return Comparison(situation, progress).diagnosis()
-
-
-__all__ = ["Cause", "Comparison", "Diagnosis", "diagnosis_of", "independent"]

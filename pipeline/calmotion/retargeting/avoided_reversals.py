@@ -10,6 +10,7 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Character
 from calmotion.model.run import RunSettings
+from calmotion.retargeting.problem.posing import refuse_continuous
 from calmotion.retargeting.problem.problem import Evaluation
 from calmotion.retargeting.problem.rigid_robot import RigidRobot
 from calmotion.retargeting.quantities.gear_play import gear_play, transmitted_by
@@ -33,14 +34,7 @@ def refuse_without_play(character: Character, options: RunSettings) -> None:
             found=0.0,
             remedy=f"Author it on the joints whose gears have play, or leave out {OPTION}",
         )
-    if options.adjoint == "continuous":
-        raise ShotError(
-            f"the continuous adjoint does not support {OPTION}",
-            path=character.path,
-            attribute="retarget.optimize.adjoint",
-            found=options.adjoint,
-            remedy="Use the discrete adjoint.",
-        )
+    refuse_continuous(options, character, OPTION)
 
 
 def play_of(character: Character) -> Array:

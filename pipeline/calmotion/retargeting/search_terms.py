@@ -14,6 +14,7 @@ from calmotion.model import Character, TermUse
 from calmotion.model.limits.bounds import Bounds, excesses
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.limits import LimitTerms
+from calmotion.retargeting.problem.posing import refuse_continuous
 from calmotion.retargeting.problem.problem import Evaluation
 from calmotion.retargeting.problem.robot import of_robot
 from calmotion.retargeting.quantities.base import Quantity
@@ -35,14 +36,8 @@ def refuse_terms(options: RunSettings, character: Character) -> None:
             "two terms of the search have one name", path=character.path, found=twice,
             remedy="Rename one of them, or disable one of their plugins.",
         )  # fmt: skip
-    if names and options.adjoint == "continuous":
-        raise ShotError(
-            f"the continuous adjoint does not support terms of plugins: {', '.join(names)}",
-            path=character.path,
-            attribute="retarget.optimize.adjoint",
-            found=options.adjoint,
-            remedy="Use the discrete adjoint.",
-        )
+    if names:
+        refuse_continuous(options, character, f"terms of plugins: {', '.join(names)}")
 
 
 def with_terms(at: Evaluation, character: Character, terms: Sequence[SearchTerm]) -> Evaluation:

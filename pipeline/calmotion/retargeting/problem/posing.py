@@ -134,6 +134,22 @@ def knot_spacing(character: Character, options: RunSettings) -> float | None:
     return options.knot_spacing or character.retarget.knot_spacing
 
 
+def refuse_continuous(options: RunSettings, character: Character, what: str) -> None:
+    """Refuse the continuous adjoint for what only the discrete one has.
+
+    Raises:
+        ShotError: It is asked for.
+    """
+    if options.adjoint == "continuous":
+        raise ShotError(
+            f"the continuous adjoint does not support {what}",
+            path=character.path,
+            attribute="retarget.optimize.adjoint",
+            found=options.adjoint,
+            remedy="Use the discrete adjoint.",
+        )
+
+
 def unknowns(
     character: Character, animation: Animation, grid: TimeGrid, options: RunSettings, offsets: Array | None = None
 ) -> Unknowns:
@@ -188,14 +204,8 @@ def unknowns(
         bounds = {name: bound for name, bound in bounds.items() if name not in TEMPO_LIMITS}
     bounds |= {name: bounds[name].narrowed(np.array(shares)) for name, shares in options.narrowed if name in bounds}
     continuous = options.adjoint == "continuous"
-    if continuous and ("effort" in bounds or grid.cyclic):
-        raise ShotError(
-            f"the continuous adjoint does not support {'cyclic shots' if grid.cyclic else 'limits of motor efforts'}",
-            path=character.path,
-            attribute="retarget.optimize.adjoint",
-            found=options.adjoint,
-            remedy="Use the discrete adjoint.",
-        )
+    if "effort" in bounds or grid.cyclic:
+        refuse_continuous(options, character, "cyclic shots" if grid.cyclic else "limits of motor efforts")
     return Unknowns(basis, motors, coupling, offsets, fixed, bounds, continuous)
 
 
