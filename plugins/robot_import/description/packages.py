@@ -39,9 +39,10 @@ def package_folder(name: str, path: str) -> str | None:
 
 def _package_name(manifest: Path) -> str | None:
     try:
-        return (xml.parse(manifest).getroot().findtext("name") or "").strip()
+        root = xml.parse(manifest).getroot()  # nosec B314  # expat limits the expansion of entities
     except (OSError, xml.ParseError):
         return None
+    return (root.findtext("name") or "").strip()
 
 
 def mesh_file(name: str, path: str, packages: Mapping[str, str]) -> str:
