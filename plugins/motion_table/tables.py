@@ -29,7 +29,7 @@ from calmotion.support import (
 
 from .units import TIME, are_units, named_unit, with_unit
 
-_OUTPUTS = (".x", ".y", ".z", ".error", ".rotation_error", ".input", ".output", ".effort")
+_OUTPUTS = (".error", ".rotation_error", ".input", ".output")  # beside paths of prims, in tables that --csv wrote
 _REMEDY = (
     "Write a column time_s in seconds, and one for each joint, named after it, in rad (or with a comment "
     "'# units: angle deg') or m"
@@ -151,7 +151,7 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
         if rows and len(rows[0]) == len(head) and are_units(rows[0]):
             head = [with_unit(name, cell) for name, cell in zip(head, rows[0], strict=True)]
             rows, lines = rows[1:], lines[1:]
-    if any(name.endswith(_OUTPUTS) for name in head):
+    if any(name.startswith("/") and name.endswith(_OUTPUTS) for name in head):
         raise ShotError(
             "this is a table that --csv wrote",
             path=path,

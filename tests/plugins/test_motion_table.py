@@ -148,6 +148,10 @@ def test_what_is_no_motion_is_refused(read, name):
     assert problem in refused.value.message() and "a.csv" in refused.value.message() and refused.value.remedy
 
 
+def test_joints_whose_names_end_like_columns_of_results_are_joints(read):
+    assert list(read("a.csv", table("time_s,hip.x,valve.output")).values) == ["hip.x", "valve.output"]
+
+
 def test_a_column_of_texts_is_left_out_as_the_error_says(read):
     content = "time_s,pan,state\n0,0,go\n.5,.1,go\n1,.3,on\n"
     with pytest.raises(ShotError, match="line 2") as refused:

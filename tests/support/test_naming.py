@@ -36,6 +36,11 @@ def test_nothing_is_suggested_where_no_name_is_like_it(found):
     assert nearest(found, JOINTS) == nearest(found, []) == ""
 
 
+def test_a_part_of_a_name_means_the_shortest_that_contains_it():
+    assert nearest("XM43", ["mx-64", "xm430-w350-r", "xm430-w210"]) == "Did you mean xm430-w210? "
+    assert nearest("43", ["xm430-w210"]) == ""
+
+
 def test_words_are_compared_without_case():
     assert nearest("Zvd", ["zv", "zvd"]) == "Did you mean zvd? "
 

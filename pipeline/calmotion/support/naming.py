@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 _PRIM_PATH = re.compile(r"(?<![\w.])/[A-Za-z_][\w./:]*\w")
 _ENCODED = re.compile(r"\btn__\w*")  # how converters to USD write a name that USD does not allow
 _LISTED = 3  # prims that a note names
+_PART = 3  # letters of a part of a name that tells which name is meant
 
 
 def distinct_names(paths: Sequence[str]) -> dict[str, str]:
@@ -51,7 +52,10 @@ def _like(found: str, names: Sequence[str], least: float = 0.6) -> str:
     from difflib import get_close_matches
 
     by_case = {name.casefold(): name for name in reversed(names)}
-    near = get_close_matches(found.casefold(), list(by_case), 1, least)
+    part = found.casefold()
+    near = get_close_matches(part, list(by_case), 1, least)
+    if not near and len(part) >= _PART:  # the beginning of a long name is not like the whole of it
+        near = sorted((name for name in by_case if part in name), key=len)
     return by_case[near[0]] if near else ""
 
 

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from calmotion.errors import ShotError
 from calmotion.usd.reading import read_shot
 from calmotion.usd.reading.unread import unread_attributes
 from pxr import Sdf, Usd, UsdPhysics
-from small_shots import ELBOW, FORE, UPPER, make_flexible, make_target, set_float, write_arm
+from small_shots import BASE, ELBOW, FORE, HAND, SHOULDER, UPPER, make_flexible, make_target, set_float, write_arm
 
 
 def notes(tmp_path, edit):
@@ -131,3 +132,24 @@ def test_tendons_and_forces_of_physx_are_told(tmp_path):
         f"{FORE}: PhysxForceAPI",
         f"{ELBOW}: PhysxTendonAxisRootAPI:cable",
     ]
+
+
+def test_a_body_that_is_switched_off_is_told_since_its_joints_hold_to_the_world(tmp_path):
+    def edit(stage):
+        stage.GetPrimAtPath(BASE).GetAttribute("physics:rigidBodyEnabled").Set(False)
+
+    character, _, _ = read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
+    assert [body.path for body in character.bodies] == [UPPER, FORE]
+    (note,) = [note for note in character.notes if "rigidBodyEnabled" in note]
+    assert note.startswith(f"{SHOULDER}: holds to the world in place of {BASE}")
+
+
+def test_a_target_on_a_body_that_is_switched_off_is_refused_with_the_body(tmp_path):
+    def edit(stage):
+        make_target(stage)
+        stage.GetPrimAtPath(FORE).GetAttribute("physics:rigidBodyEnabled").Set(False)
+
+    with pytest.raises(ShotError, match="switched off") as refused:
+        read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
+    assert (refused.value.path, refused.value.attribute) == (FORE, "physics:rigidBodyEnabled")
+    assert HAND in refused.value.found

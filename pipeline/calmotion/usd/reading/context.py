@@ -127,6 +127,13 @@ def carrying_body(prim: Usd.Prim) -> Usd.Prim:
     return prim
 
 
+def switched_off_body(prim: Usd.Prim) -> Usd.Prim | None:
+    """The body that a prim is or lies below where `physics:rigidBodyEnabled` switches it off; None otherwise."""
+    while prim and not is_applied(prim, RIGID_BODY):
+        prim = prim.GetParent()
+    return prim if prim and not is_rigid_body(prim) else None
+
+
 def refuse_without_transform(prim: Usd.Prim, what: str) -> None:
     """Refuse a prim that has no transform.
 

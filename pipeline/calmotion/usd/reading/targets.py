@@ -16,7 +16,7 @@ from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated import animation_codes, moves_on_body
-from calmotion.usd.reading.context import Reading, carrying_body, prims_of, refuse_without_transform
+from calmotion.usd.reading.context import Reading, carrying_body, prims_of, refuse_without_transform, switched_off_body
 from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
 
 if TYPE_CHECKING:
@@ -70,6 +70,14 @@ def _is_prim_path(path: str) -> bool:
 
 def _carrier(prim: Usd.Prim, what: str = "a target") -> str:
     body = carrying_body(prim)
+    if not body and (off := switched_off_body(prim)):
+        raise ShotError(
+            f"{what} is on a body that is switched off, and does not move",
+            path=off.GetPath(),
+            attribute="physics:rigidBodyEnabled",
+            found=f"False; it carries {prim.GetPath()}",
+            remedy="Set it to true, or move the target to a body that moves",
+        )
     if not body and what != "a target":
         raise ShotError(
             f"{what} must be on a body",

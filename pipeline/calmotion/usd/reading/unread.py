@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from calmotion.errors import ShotError
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
-from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
+from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of, switched_off_body
 from calmotion.usd.reading.joints.joint_prims import JointPrim
 
 if TYPE_CHECKING:
@@ -138,6 +138,7 @@ def tell_what_is_not_used(reading: Reading, bodies: Iterable[Usd.Prim], joints: 
             told.add((joint.prim_path, joint.drive))
             _tell_of_schemas(reading, joint.prim)
             _tell(reading, joint.prim, joint.drive, OF_JOINTS)
+            _tell_of_switched_off_bodies(reading, joint.prim)
 
 
 def _tell(reading: Reading, prim: Usd.Prim, drive: str, rows: Sequence[tuple[str, float, float, str]]) -> None:
@@ -145,6 +146,16 @@ def _tell(reading: Reading, prim: Usd.Prim, drive: str, rows: Sequence[tuple[str
         name = attribute.format(drive=drive)
         if any(not low <= value <= high for value in _authored(prim, name, reading.start)):
             reading.note(f"{prim.GetPath()}: {name} is not used: {why}")
+
+
+def _tell_of_switched_off_bodies(reading: Reading, joint: Usd.Prim) -> None:
+    for side in (0, 1):
+        for named in joint.GetRelationship(f"physics:body{side}").GetForwardedTargets():
+            if body := switched_off_body(reading.stage.GetPrimAtPath(named)):
+                reading.note(
+                    f"{joint.GetPath()}: holds to the world in place of {body.GetPath()}, which has no mass and does "
+                    "not move: its physics:rigidBodyEnabled is false"
+                )
 
 
 def _tell_of_schemas(reading: Reading, prim: Usd.Prim) -> None:
