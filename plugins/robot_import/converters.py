@@ -31,7 +31,8 @@ _BROKEN_OBJ = re.compile(r'Failed to convert mesh(?: "[^"]*" from|:) (.+?\.obj)(
 _PLACE = re.compile(r" \(line: \d+\)$")
 # of pictures and sensors, which change no motion, and of the converter's own code
 _NO_MATTER = re.compile("texture|was deprecated|(cameras|lights|sensors|keys) are not supported")
-_ADDED = re.compile("Unsupported transmission type '.*JOINTINPARENT'|Actuator '.*' is not converted")  # see `joints`
+# see `joints` and `ellipsoids`
+_ADDED = re.compile("Unsupported transmission type '.*JOINTINPARENT'|Actuator '.*' is not converted|mjGEOM_ELLIPSOID ")
 _BAD_WORDS = ("Failed to", "Cannot", "not found")  # of warnings after which a part of the robot is missing
 
 

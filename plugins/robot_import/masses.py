@@ -10,6 +10,7 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.model import Character
 from calmotion.usd import StageUnits, body_on, is_applied, is_rigid_body, joint_prims, prims_of
 
+from .ellipsoids import author_ellipsoids
 from .joints import Placement, author, author_actuators, author_frames
 from .options import RobotOptions, carried_by, geoms_of
 from .robot_motors import named
@@ -97,6 +98,7 @@ def _author_values(
             _author_joint(joints[prim.GetPath()], joint)
     author_actuators(stage, values, [joints.get(prim.GetPath()) for prim in bodies])
     author_frames(units, _placements(bodies, values["bodies"], joints))
+    author_ellipsoids(stage, units, bodies, values["ellipsoids"])
     return weightless
 
 

@@ -7,6 +7,7 @@ A converter writes what the file says. Masses that settings of the compiler chan
 from __future__ import annotations
 
 import json
+import math
 import sys
 from typing import Any
 
@@ -16,6 +17,7 @@ _GAINS = {mujoco.mjtGain.mjGAIN_FIXED: "fixed", mujoco.mjtGain.mjGAIN_AFFINE: "a
 _BIASES = {mujoco.mjtBias.mjBIAS_NONE: "none", mujoco.mjtBias.mjBIAS_AFFINE: "affine"}
 _DYNAMICS = {mujoco.mjtDyn.mjDYN_NONE: "none", mujoco.mjtDyn.mjDYN_INTEGRATOR: "integrator"}
 _OTHER = "user"
+_ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
 LEAST = 1e-12  # of masses and inertias of frames that move, which a flexible link or a fixed one may still have
 
 
@@ -42,7 +44,8 @@ def compiled(path: str) -> tuple[Any, Any]:
 
 
 def values(path: str) -> dict[str, Any]:
-    """Bodies in the order of the file, each with its joints; actuators by name, and the names of those that are off."""
+    """Bodies in the order of the file, each with its joints; actuators by name, and the names of those that are off;
+    ellipsoids, which the converter leaves out."""
     model, spec = compiled(path)
     bodies = []
     for body in range(1, model.nbody):
@@ -69,7 +72,21 @@ def values(path: str) -> dict[str, Any]:
     ]
     actuators = {name: _actuator(model, index) for index, name in enumerate(names)}
     totalled = spec.compiler.settotalmass > 0.0
-    return {"bodies": bodies, "actuators": actuators, "off": off, "totalled": totalled}
+    shapes = [_ellipsoid(model, geom) for geom in spec.geoms if model.geom_type[geom.id] == _ELLIPSOID]
+    return {"bodies": bodies, "actuators": actuators, "off": off, "totalled": totalled, "ellipsoids": shapes}
+
+
+def _ellipsoid(model: Any, geom: Any) -> dict[str, Any]:
+    """A geom of this shape, and what the file or a class states of its mass."""
+    return {
+        "body": int(model.geom_bodyid[geom.id]) - 1,
+        "position": model.geom_pos[geom.id].tolist(),
+        "rotation": model.geom_quat[geom.id].tolist(),
+        "half_axes": model.geom_size[geom.id].tolist(),
+        "mass": None if math.isnan(geom.mass) else float(geom.mass),
+        "density": float(geom.density),
+        "collides": bool(model.geom_contype[geom.id] or model.geom_conaffinity[geom.id]),
+    }
 
 
 def _joint(model: Any, joint: int) -> dict[str, Any]:

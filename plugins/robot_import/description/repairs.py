@@ -2,11 +2,13 @@
 
 Repaired are prefixes that nothing declares, a robot without a name, joints that follow (mimic) a later one or none, and
 OBJ meshes with points, normals or texture coordinates that no face, or not every face, refers to. A root that floats,
-or slides on a plane, becomes fixed: a shot moves a root by its transform.
+or slides on a plane, becomes fixed: a shot moves a root by its transform. Capsules, which newer URDFs have, become
+meshes.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import shutil
@@ -20,6 +22,8 @@ JointFrame = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]  # [
 _FOREIGN = "urn:undeclared:"
 _PREFIX = re.compile(r"(?:</?|\s)([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*(?=[\s/>=])")
 _ROOT = re.compile(r"<(robot|mujoco)(?=[\s/>])")
+_OF_CAPSULES = ("radius", "length")
+_SEGMENTS = 64  # around a capsule: its volume is 0.3% too small
 _KEPT = ("usemtl", "o", "g")  # lines of an OBJ that stay as they are
 
 
@@ -60,6 +64,9 @@ def faults(root: xml.Element, prefixes: Sequence[str]) -> tuple[str, ...]:
         found.append(f"meshes are named with {PACKAGE}/, a slash too many")
     if any(node.get("filename", "").startswith(MODEL) for node in root.iter("mesh")):
         found.append(f"folders of meshes that are named with {MODEL} are looked for as those of packages")
+    round_ended = [link.get("name", "") for link in root.findall("link") if any(_capsules(link))]
+    if round_ended:
+        found.append(f"capsules become meshes: {', '.join(round_ended)}")
     loose = [joint.get("name", "") for joint in root_joints(root)]
     if loose:
         found.append(
@@ -94,6 +101,7 @@ def repaired_copy(root: xml.Element, path: str, folder: str, mesh_file: Callable
         The copy, which names its meshes by their whole paths.
     """
     _leave_out_foreign(root)
+    _mesh_capsules(root, folder)
     for joint in root_joints(root):
         joint.set("type", "fixed")
     for joint in _followers_of_none(root):
@@ -112,6 +120,27 @@ def repaired_copy(root: xml.Element, path: str, folder: str, mesh_file: Callable
     copy = os.path.join(folder, os.path.basename(path))
     xml.ElementTree(root).write(copy, encoding="unicode")
     return copy
+
+
+def _capsules(node: xml.Element) -> Iterator[tuple[xml.Element, float, float]]:
+    """The geometry of each capsule below an element, with its radius and the length between its round ends [m]."""
+    for geometry in node.iter("geometry"):
+        capsule = geometry.find("capsule")
+        try:
+            radius, length = (float("nan" if capsule is None else capsule.get(name, "nan")) for name in _OF_CAPSULES)
+        except ValueError:
+            continue
+        if 0.0 < radius < math.inf and 0.0 < length < math.inf:
+            yield geometry, radius, length
+
+
+def _mesh_capsules(root: xml.Element, folder: str) -> None:
+    from trimesh.creation import capsule
+
+    for number, (geometry, radius, length) in enumerate(list(_capsules(root))):
+        file = os.path.abspath(os.path.join(folder, f"capsule_{number}.stl"))
+        capsule(length, radius, (_SEGMENTS, _SEGMENTS)).export(file)  # about the origin, along z
+        geometry[:] = [xml.Element("mesh", {"filename": file})]
 
 
 def _leave_out_foreign(root: xml.Element) -> None:

@@ -23,6 +23,8 @@ ROBOT = """<mujoco model="m">{head}<worldbody><body name="post"><geom type="box"
 <body name="hand" pos="0.4 0 0"><joint name="grip" type="slide" axis="1 0 0" range="-0.1 0.2" {grip}/>{hand}</body>
 </body></body></worldbody>{tail}</mujoco>"""
 BOX = '<geom type="box" size="0.2 0.01 0.01" pos="0.2 0 0" {}/>'
+ELLIPSOID = '<geom type="ellipsoid" size="0.2 0.02 0.03" pos="0.2 0 0" euler="0 20 0" {}/>'
+HEAVY = '<default><default class="heavy"><geom mass="0.7"/></default></default>'
 BALL = '<geom size="0.02" {}/>'
 
 
@@ -47,14 +49,13 @@ MASSES = {
     ),
     "shown_mass": robot(BOX.format('mass="0.1"') + BOX.format('mass="0.3" contype="0" conaffinity="0"')),
     "shell": robot(hand=BALL.format('density="700" shellinertia="true"')),
-    "class_mass": robot(
-        BOX.format('class="heavy"'), head='<default><default class="heavy"><geom mass="0.7"/></default></default>'
-    ),
+    "class_mass": robot(BOX.format('class="heavy"'), head=HEAVY),
     "childclass_density": robot(head='<default><geom density="300"/></default>', arm=BOX.format("")),
     "turned": robot(INERTIAL.format('diaginertia="0.001 0.002 0.0025" euler="0 30 40"')),
     "full": robot(INERTIAL.format('fullinertia="0.002 0.003 0.0035 0.0004 0.0002 -0.0003"')),
     "weightless_geom": robot(BOX.format('mass="0"') + BOX.format('mass="0.3"')),
     "in_frame": robot(f'<frame pos="0 0 0.1" euler="0 20 0">{BOX.format("")}</frame>'),
+    "ellipsoid": robot(ELLIPSOID.format('density="700"'), hand=ELLIPSOID.format('class="heavy"'), head=HEAVY),
     "visual_discarded": robot(
         BOX.format('mass="0.2" contype="0" conaffinity="0"'), head='<compiler discardvisual="true"/>'
     ),
@@ -127,6 +128,8 @@ def test_a_robot_in_two_files_has_the_masses_of_both(tmp_path):
         (BOX.format('mass="0.5"'), "", 0.5),
         (BOX.format('density="700"'), "", 0.112),
         (BOX.format(""), '<default><geom density="700"/></default>', 0.112),
+        (ELLIPSOID.format('density="700"'), "", 700.0 * 4.0 / 3.0 * np.pi * 0.2 * 0.02 * 0.03),
+        (ELLIPSOID.format('class="heavy"'), HEAVY, 0.7),
         (BOX.format('mass="0.5"'), '<compiler settotalmass="5.4"/>', 1.0),
         (INERTIAL.format('diaginertia="0.001 0.002 0.0025"'), '<compiler boundmass="1.5"/>', 1.5),
     ],

@@ -6,6 +6,7 @@ import os
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
+import numpy as np
 import pytest
 import trimesh
 from calmotion.errors import ShotError
@@ -99,6 +100,16 @@ def test_a_root_that_floats_becomes_fixed_but_no_other_joint(tmp_path, kind):
     inner = chain().replace('name="c" type="continuous"', f'name="c" type="{kind}"')
     with pytest.raises(ShotError, match=f"a {kind} joint is not supported"):
         read_description(str(written(tmp_path, inner)), {})
+
+
+def test_capsules_become_meshes_of_their_size(tmp_path):
+    capsule = '<link name="c"><visual><geometry><capsule radius="0.02" length="0.2"/></geometry></visual></link>'
+    description, root = copy_of(written(tmp_path, capsule), tmp_path / "copy")
+    assert any("capsules become meshes: c" in told for told in description.faults)
+    mesh = trimesh.load_mesh(root.find("link/visual/geometry/mesh").get("filename"))
+    assert mesh.bounds == pytest.approx(np.array([(-0.02, -0.02, -0.12), (0.02, 0.02, 0.12)]), abs=1e-8)
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(np.pi * 0.02**2 * 0.2 + 4 / 3 * np.pi * 0.02**3, rel=3e-3)
 
 
 def test_a_damaged_file_is_not_repaired():
