@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.recordings import ANGLE, UNITS
+from calmotion.recordings import ANGLE
 from calmotion.views import AFTER, BEFORE, INTENDED, LIMIT, SMALL, new_figure, save, short, tidy
 from matplotlib.figure import Figure
 
@@ -59,7 +59,7 @@ def plot_motion(diagnosis: Diagnosis) -> Figure:
         if diagnosis.fit is not None:
             explained = (s.error - diagnosis.fit.left)[rows] / s.weights[k]
             right.plot(sensor.times, explained, color=AFTER, lw=0.8, label="explained")
-        tidy(left, f"{sensor.kind} [{UNITS[sensor.kind]}]", short(sensor.path))
+        tidy(left, f"{sensor.kind} [{sensor.unit}]", short(sensor.path))
         tidy(right, f"error [{sensor.error_unit}]", f"{short(sensor.path)}: error")
     for axes in grid[0]:
         axes.legend(fontsize=SMALL, loc="upper right")

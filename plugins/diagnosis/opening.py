@@ -10,7 +10,7 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import ON_ERROR, PRESCRIBED, Motor
 from calmotion.multibody import SimulationFailure
-from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER, STRAIN, Channel, SensorRecording
+from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER, STRAIN, Channel, SensorRecording, unit_of
 from calmotion.simulation import CompiledShot
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.signal import butter, sosfiltfilt
@@ -234,11 +234,9 @@ def _sensors(
             notes.append(stale.format(channel.name))
         times, values, noise = _thinned(times, values, noise)
         index = list(names).index(channel.path) if channel.path in names else -1
-        unit = ""
-        if shot is not None and channel.kind == ANGLE and index >= 0:
-            unit = "m" if shot.character.motors[index].linear else "rad"
+        unit = unit_of(channel.kind, channel.path, shot.character.motors if shot is not None else ())
         columns = tuple(map(int, there))
-        found.append(Sensor(channel.kind, channel.path, index, times, values, max(noise, 1e-12), columns, unit))
+        found.append(Sensor(channel.kind, channel.path, index, times, values, max(noise, 1e-12), unit, columns))
     if not found:
         raise ShotError(
             "no channel of the recordings can be compared with the motion",

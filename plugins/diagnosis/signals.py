@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.recordings import ACCELEROMETER, ANGLE, UNITS
+from calmotion.recordings import ACCELEROMETER, ANGLE
 
 HEALTHY = 0.7  # ratio of critical damping of a loop that does not ring
 STRIBECK = 0.05  # speed over which the excess of friction at rest is gone [rad/s or m/s]
@@ -61,8 +61,8 @@ class Sensor:
         times: [s], shape [n].
         values: Shape [n, c].
         noise: Standard deviation [unit].
+        unit: Of its values.
         components: Which of x, y and z the columns of the values are, of markers and accelerometers.
-        unit: Of its values, where more is known of it than its kind says.
     """
 
     kind: str
@@ -71,8 +71,8 @@ class Sensor:
     times: Array
     values: Array
     noise: float
+    unit: str
     components: tuple[int, ...] = (0, 1, 2)
-    unit: str = ""
 
     @property
     def name(self) -> str:
@@ -82,7 +82,7 @@ class Sensor:
     @property
     def error_unit(self) -> str:
         """Unit of its errors: accelerations are integrated."""
-        return "m/s" if self.kind == ACCELEROMETER else self.unit or UNITS[self.kind]
+        return "m/s" if self.kind == ACCELEROMETER else self.unit
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.recordings import ANGLE, EFFORT, Channel, SensorRecording
+from calmotion.recordings import ANGLE, EFFORT, MARKER, Channel, SensorRecording, unit_of
 from calmotion.recordings.recording import turned_on
 
 TIMES = np.arange(200) / 100
@@ -25,3 +25,17 @@ def test_angles_within_a_range_and_slides_stay():
     steps = np.where(TIMES > 1.0, 2.5, 0.0)
     recording = SensorRecording("a.csv", "0", (Channel(ANGLE, "/R/j", TIMES, steps[:, None]),))
     assert turned_on(recording) is recording
+
+
+def test_units_are_those_of_the_joint_where_it_is_known():
+    class Slider:
+        path, linear = "/R/slide", True
+
+    class Hinge:
+        path, linear = "/R/hinge", False
+
+    motors = [Slider(), Hinge()]
+    assert [unit_of(ANGLE, motor.path, motors) for motor in motors] == ["m", "rad"]
+    assert [unit_of(EFFORT, motor.path, motors) for motor in motors] == ["N", "N m"]
+    assert unit_of(ANGLE, "/R/other", motors) == unit_of(ANGLE, "/R/hinge") == "rad or m"
+    assert unit_of(MARKER, "/R/hinge", motors) == "m"

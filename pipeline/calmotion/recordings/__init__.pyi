@@ -18,3 +18,4 @@ from calmotion.recordings.recording import Channel as Channel
 from calmotion.recordings.recording import LowPass as LowPass
 from calmotion.recordings.recording import RecordingRequest as RecordingRequest
 from calmotion.recordings.recording import SensorRecording as SensorRecording
+from calmotion.recordings.recording import unit_of as unit_of

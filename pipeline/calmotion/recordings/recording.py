@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calmotion.arrays import Array
 
+if TYPE_CHECKING:
+    from calmotion.model.motor import Motor
+
 # kinds of channels
 MARKER, ACCELEROMETER, ANGLE, EFFORT, STRAIN = "marker", "accelerometer", "angle", "effort", "strain"
 COMPONENTS = {MARKER: 3, ACCELEROMETER: 3, ANGLE: 1, EFFORT: 1, STRAIN: 1}
 UNITS = {MARKER: "m", ACCELEROMETER: "m/s^2", ANGLE: "rad or m", EFFORT: "N m or N", STRAIN: ""}
+
+
+def unit_of(kind: str, path: str, motors: Iterable[Motor] = ()) -> str:
+    """Unit of a channel; where the motor of its joint is not known, that of a joint that turns or that of a slider."""
+    linear = next((motor.linear for motor in motors if motor.path == path), None)
+    either = UNITS[kind].split(" or ")
+    return UNITS[kind] if linear is None or len(either) == 1 else either[linear]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import RunSettings
-from calmotion.recordings import UNITS, SensorRecording
+from calmotion.recordings import SensorRecording, unit_of
 from calmotion.simulation import CompiledShot
 
 from ..model.estimates import (
@@ -212,7 +212,8 @@ def _fits(
         channel = sensor.channel
         after = measurement.predicted(signals, sensor, y)
         before = measurement.predicted(nominal, sensor, of_nominal)
-        file, unit = recordings[sensor.recording].file, UNITS[channel.kind]
+        file = recordings[sensor.recording].file
+        unit = unit_of(channel.kind, channel.path, problem.shot.character.motors)
         off, fitted = channel.values - after, sensor.fitted
         fits.append(
             ChannelFit(
