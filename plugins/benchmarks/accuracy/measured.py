@@ -1,11 +1,11 @@
 """Against real machines: what calibrations from some recordings predict of the others.
 
-`calmotion bench measured FOLDER [--fit N] [--most N] [--csv FILE]` takes a folder with shots of one machine, NAME.usda,
-each with what was recorded of it, NAME.csv. The machine is calibrated from every N shots (default: 2) of different
-motions (names up to the last `_` tell motions apart), and the others are simulated with what was found. The table has
-the mean absolute error of the others for each fit, in rad or m; below it are the median and the largest, those of the
-shots as they are, and, for each parameter, how often the 95% interval of a fit contains the estimate of another fit
-that shares no recording with it. `--most` takes that many fits, spread over all of them.
+`calmotion bench measured FOLDER [--fit N] [--most N] [--parameters KIND ...] [--csv FILE]` takes a folder with shots of
+one machine, NAME.usda, each with what was recorded of it, NAME.csv. The machine is calibrated from every N shots
+(default: 2) of different motions (names up to the last `_` tell motions apart), and the others are simulated with what
+was found. The table has the mean absolute error of the others for each fit, in rad, m or N m; below it are the median
+and the largest, those of the shots as they are, and, for each parameter, how often the 95% interval of a fit contains
+the estimate of another fit that shares no recording with it. `--most` takes that many fits, spread over all of them.
 
 The error of a strain gauge, whose gain and free swing at the start are fitted, is the share of its signal's shake that
 is left. A folder with `beam.toml` (the entries of `two_mode_beam.Strip`) gets the same from an independent model of its
@@ -55,7 +55,7 @@ class Predicted:
 
     Attributes:
         fitted: Names of the shots.
-        error: Mean absolute error over the others [rad or m].
+        error: Mean absolute error over the others [rad, m, N m].
         nominal: The same of the shots as they are.
         estimates: As text.
     """
@@ -73,7 +73,7 @@ class Machine:
     takes: dict[str, tuple[CompiledShot, tuple[SensorRecording, ...]]]
 
     def error(self, name: str, estimates: Sequence[Estimate] = ()) -> float:
-        """Mean absolute error of the prediction of a recording [rad or m]; of a strain gauge the share of its shake.
+        """Mean absolute error of the prediction of a recording [rad, m, N m]; of a strain gauge the share of its shake.
 
         Args:
             name: Of the shot.
@@ -212,6 +212,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("folder", metavar="FOLDER", nargs="?", help="shots and recordings of one machine")
     parser.add_argument("--fit", type=int, default=2, metavar="N", help="shots that are fitted together (default: 2)")
     parser.add_argument("--most", type=int, metavar="N", help="fits, spread over all of them (default: all)")
+    parser.add_argument(
+        "--parameters", nargs="+", metavar="KIND", default=CalibrationSettings.parameters, help="as of calibrate"
+    )
     options = parser.parse_args(arguments)
     if options.folder is None:
         _cantilever(options)
@@ -219,7 +222,7 @@ def main(arguments: list[str] | None = None) -> int:
     machine = machine_in(Path(options.folder))
     names = list(machine.takes)
     nominal = {name: machine.error(name) for name in names}
-    settings = CalibrationSettings(priors={"clock_offset": CLOCK})
+    settings = CalibrationSettings(tuple(options.parameters), priors={"clock_offset": CLOCK})
     rows, fits = [], {}
     for own in choices(names, options.fit, options.most):
         fit = fits[own] = calibrate_shots([machine.takes[name] for name in own], settings, RunSettings())
