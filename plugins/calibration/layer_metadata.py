@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from calmotion.model import Character
-from calmotion.recordings import ANGLE, MARKER
+from calmotion.recordings import ANGLE, MARKER, STRAIN
 from calmotion.usd import to_doubles, to_strings
 from scipy.spatial.transform import Rotation
 
@@ -40,8 +40,8 @@ def metadata_of(character: Character, calibration: Calibration) -> dict[str, Any
 
 
 def _predictions(character: Character, calibration: Calibration) -> dict[str, float]:
-    """How far recordings were from their prediction, at the places that markers and encoders tell of [m]: root mean
-    square and largest, of the worst channel; nothing where there is none."""
+    """How far recordings were from their prediction: at the places that markers and encoders tell of, root mean square
+    and largest [m]; of strain gauges, the share of the shake. Each is of the worst channel, if there is any."""
     found = [(0.0, 0.0)]
     for fit in calibration.channels:
         kind, _, path = fit.name.partition(" ")
@@ -49,7 +49,10 @@ def _predictions(character: Character, calibration: Calibration) -> dict[str, fl
         arm = 1.0 if kind == MARKER else _arm(character, path) if kind == ANGLE else 0.0
         found.append((arm * (fit.validation_rms if held_out else fit.rms), arm * fit.largest))
     rms, largest = np.max(found, axis=0)
-    return {"prediction_rms_m": float(rms), "prediction_largest_m": float(largest)} if rms > 0.0 else {}
+    told = {"prediction_rms_m": float(rms), "prediction_largest_m": float(largest)} if rms > 0.0 else {}
+    gauges = [curve for curve in calibration.curves if curve.name.startswith(STRAIN)]
+    shares = [float(np.nanstd(own.measured - own.after) / np.nanstd(own.measured)) for own in gauges]
+    return told | ({"prediction_share": max(shares)} if shares else {})
 
 
 def _arm(character: Character, path: str) -> float:

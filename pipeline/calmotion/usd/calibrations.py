@@ -42,13 +42,23 @@ def known_factors(stage: Usd.Stage) -> KnownFactors:
     return KnownFactors(tuple(names), tuple(tuple(row) for row in total.tolist()))
 
 
-def predictions(stage: Usd.Stage) -> tuple[str, float, float] | None:
-    """How far recordings were from what the calibrated robot predicted of them: the strongest layer that tells it, root
-    mean square and largest [m]; None where none does."""
+def predictions(stage: Usd.Stage) -> str | None:
+    """How far recordings were from what the calibrated robot predicted of them, as a sentence for the user, from the
+    strongest layer that tells it; None where none does."""
     for layer in stage.GetLayerStack():
         if stages.role_of(layer) == stages.CALIBRATION:
             entry: Any = layer.customLayerData.get(stages.METADATA_KEY, {}).get("calibration", {})
             rms, largest = (float(entry.get(f"prediction_{what}_m", 0.0)) for what in ("rms", "largest"))
+            share = float(entry.get("prediction_share", 0.0))
+            begin = f"{layer.GetDisplayName()}: the calibrated model"
             if 0.0 < rms < np.inf and rms <= largest < np.inf:
-                return layer.GetDisplayName(), rms, largest
+                return (
+                    f"{begin} differed from its recordings by {1e3 * rms:.3g} mm (root mean square), "
+                    f"{1e3 * largest:.3g} mm at most; expect at least that in addition to the errors in this report"
+                )
+            if 0.0 < share < np.inf:
+                return (
+                    f"{begin} left {100.0 * share:.2g}% of the shake in its recordings; expect at least this share of "
+                    "the errors as animated in addition to the errors in this report"
+                )
     return None

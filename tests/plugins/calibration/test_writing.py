@@ -7,9 +7,10 @@ import pytest
 from calmotion import ShotError
 from calmotion.usd import stages
 from calmotion.usd.reading import read_shot
-from calmotion_plugins.calibration.model.estimates import Calibration, ChannelFit, Estimate
+from calmotion_plugins.calibration.model.estimates import Calibration, ChannelCurves, ChannelFit, Estimate
 from calmotion_plugins.calibration.writing import write_calibration
 from pxr import Sdf, Usd
+from scipy.spatial.transform import Rotation
 from small_shots import BASE, ELBOW, FORE, PLASTIC, SHOULDER, Scale, make_flexible, make_target, set_float, write_arm
 
 
@@ -205,3 +206,32 @@ def test_the_largest_torque_is_that_of_the_duty_cycle_and_of_the_drive_where_the
         found = read_shot(root)[0].motors[0]
         assert found.max_torque == pytest.approx(1.3 * own.max_torque, rel=1e-5)
         assert found.position_gain == pytest.approx(1.1 * own.position_gain, rel=1e-5)
+
+
+def told_of(shot, folder, **parts):
+    character, _, provenance = read_shot(shot)
+    calibration = dataclasses.replace(calibration_of(estimate("modulus", PLASTIC, 2e9, 2.3e9, 2e7)), **parts)
+    _, root = write_calibration(character, provenance, calibration, str(folder / "robot.usda"))
+    return [note for note in read_shot(root)[0].notes if "the calibrated model" in note], character
+
+
+def test_a_shot_tells_how_far_its_calibration_was_from_an_encoder_at_the_farthest_target(shot, tmp_path):
+    fit = ChannelFit("take.csv", f"angle {ELBOW}", "rad", 90, 10, 1e-3, 0.1, 0.01, 0.02, 0, 0.05)
+    (note,), character = told_of(shot, tmp_path, channels=(fit,))
+    ends = [
+        place.position + Rotation.from_quat(np.roll(place.rotation, -1)).apply(at.position)
+        for joint in character.joints if joint.path == ELBOW
+        for place, at in [(character.bodies[joint.body1].rest, joint.frame1)]
+        + [(character.bodies[target.body].rest, target.frame) for target in character.targets]
+    ]  # fmt: skip
+    arm = max(np.linalg.norm(end - ends[0]) for end in ends[1:])
+    assert f"by {20 * arm:.3g} mm (root mean square), {50 * arm:.3g} mm at most; expect at least that" in note
+
+
+def test_a_shot_tells_which_share_of_a_gauge_s_shake_its_calibration_left(shot, tmp_path):
+    times = np.linspace(0.0, 1.0, 200)[:, None]
+    swing, other = np.sin(40.0 * times), np.cos(55.0 * times)
+    curve = ChannelCurves("take.csv", f"strain {FORE}", "", times[:, 0], swing, swing, swing - 0.2 * other, times < 0)
+    (note,), _ = told_of(shot, tmp_path, curves=(curve,))
+    assert f"left {100 * 0.2 * other.std() / swing.std():.2g}% of the shake" in note
+    assert told_of(shot, tmp_path)[0] == []

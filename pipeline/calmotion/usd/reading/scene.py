@@ -85,11 +85,7 @@ def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
         ShotError: A value out of range.
     """
     if (told := predictions(reading.stage)) is not None:
-        layer, rms, largest = told
-        reading.notes.append(
-            f"{layer}: the calibrated model differed from its recordings by {1e3 * rms:.3g} mm (root mean square), "
-            f"{1e3 * largest:.3g} mm at most; expect at least that in addition to the errors in this report"
-        )
+        reading.notes.append(told)
     prim = reading.stage.GetPrimAtPath(root)
     while prim and not schemas.is_applied(prim, _SCHEMA):
         prim = prim.GetParent()
