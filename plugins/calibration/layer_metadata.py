@@ -50,9 +50,14 @@ def _predictions(character: Character, calibration: Calibration) -> dict[str, fl
         found.append((arm * (fit.validation_rms if held_out else fit.rms), arm * fit.largest))
     rms, largest = np.max(found, axis=0)
     told = {"prediction_rms_m": float(rms), "prediction_largest_m": float(largest)} if rms > 0.0 else {}
+    share = gauge_share(calibration)
+    return told | ({"prediction_share": share} if share else {})
+
+
+def gauge_share(calibration: Calibration) -> float:
+    """The share of the shake that a calibration leaves of the strain gauge that it predicts worst; 0 without gauges."""
     gauges = [curve for curve in calibration.curves if curve.name.startswith(STRAIN)]
-    shares = [float(np.nanstd(own.measured - own.after) / np.nanstd(own.measured)) for own in gauges]
-    return told | ({"prediction_share": max(shares)} if shares else {})
+    return max((float(np.nanstd(own.measured - own.after) / np.nanstd(own.measured)) for own in gauges), default=0.0)
 
 
 def _arm(character: Character, path: str) -> float:

@@ -9,14 +9,15 @@ the estimate of another fit that shares no recording with it. `--most` takes tha
 
 The error of a strain gauge, whose gain and free swing at the start are fitted, is the share of its signal's shake that
 is left. A folder with `beam.toml` (the entries of `two_mode_beam.Strip`) gets the same from an independent model of its
-strip too. Without a folder, the command compares a published cantilever with its finite elements.
+strip too, which also replays commands that were optimised for each fit. Without a folder, the command compares a
+published cantilever with its finite elements.
 """
 
 from __future__ import annotations
 
 import argparse
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -31,8 +32,10 @@ from calmotion_plugins.calibration import (
     Calibration,
     CalibrationSettings,
     Estimate,
+    Robot,
     Signals,
     calibrate_shots,
+    gauge_share,
     place_of,
     read_performed,
     robot_parameters,
@@ -43,6 +46,8 @@ from scipy.interpolate import CubicSpline
 
 from ..common.reporting import bench_parser, finish, keep, say
 from . import cantilever, two_mode_beam
+from .replays import Replayed, replayed
+from .two_mode_beam import Fitted
 
 CLOCK = 0.02  # standard deviation of the clocks, which begin with the commands [s]
 STEP = 4e-3  # of the predictions [s]
@@ -77,18 +82,10 @@ class Machine:
 
         Args:
             name: Of the shot.
-            estimates: Of the robot; a value of the shot is scaled or moved as that of the first shot of the fit was.
+            estimates: As of `robot`.
         """
         shot, recordings = self.takes[name]
-        values, given = {}, {item.name: item for item in estimates if item.of_robot}
-        for p in robot_parameters(shot, sorted({item.kind for item in given.values()})) if given else ():
-            item = given.get(p.name)
-            if item is not None:
-                moved = (
-                    item.value / item.nominal * p.nominal if p.logarithmic else p.nominal + item.value - item.nominal
-                )
-                values[p.kind, p.path, p.axis] = moved
-        signals = signals_of(robot_with(shot, values), RunSettings(step=STEP, integrator="bdf2"))
+        signals = signals_of(self.robot(name, estimates), RunSettings(step=STEP, integrator="bdf2"))
         off = []
         for recording in recordings:
             for channel in recording.channels:
@@ -100,6 +97,20 @@ class Machine:
                 else:
                     off.append(np.abs(signals.at(channel.kind, place, channel.times) - channel.values).ravel())
         return float(np.nanmean(np.concatenate(off)))
+
+    def robot(self, name: str, estimates: Sequence[Estimate] = ()) -> Robot:
+        """The robot of a shot with the estimates of a fit; a value of the shot is scaled or moved as that of the first
+        shot of the fit was."""
+        shot, _ = self.takes[name]
+        values, given = {}, {item.name: item for item in estimates if item.of_robot}
+        for p in robot_parameters(shot, sorted({item.kind for item in given.values()})) if given else ():
+            item = given.get(p.name)
+            if item is not None:
+                moved = (
+                    item.value / item.nominal * p.nominal if p.logarithmic else p.nominal + item.value - item.nominal
+                )
+                values[p.kind, p.path, p.axis] = moved
+        return robot_with(shot, values)
 
 
 def _left(signals: Signals, channel: Channel, place: Any, gain: float | None) -> float:
@@ -115,25 +126,40 @@ def _left(signals: Signals, channel: Channel, place: Any, gain: float | None) ->
     return float((off - free @ np.linalg.lstsq(free, off, rcond=None)[0]).std() / values.std())
 
 
-def beam_rows(folder: Path, machine: Machine, fits: Sequence[tuple[str, ...]]) -> list[Predicted]:
-    """What an independent two-mode beam predicts of the recordings of strips; none for another machine."""
+def beams(folder: Path, machine: Machine, fits: Iterable[tuple[str, ...]]) -> dict[tuple[str, ...], Fitted]:
+    """Of strips, the independent beam that fits the recordings of each fit; nothing of another machine."""
     file = folder / "beam.toml"
     if not file.is_file():
-        return []
+        return {}
     strip = two_mode_beam.Strip(**tomllib.loads(file.read_text(encoding="utf-8")))
-    readings = {}
-    for name, (shot, recordings) in machine.takes.items():
-        (track,), channel = shot.animation.current, recordings[0].channels[0]
-        hub = CubicSpline(shot.animation.frame_times, track.values)
-        inside = (channel.times >= 0.0) & (channel.times <= shot.animation.frame_times[-1])
-        times = channel.times[inside]
-        readings[name] = two_mode_beam.Reading(times, hub(times), channel.values[inside, 0])
+    return {own: two_mode_beam.fitted(strip, [reading_of(machine, name) for name in own]) for own in fits}
+
+
+def reading_of(machine: Machine, name: str) -> two_mode_beam.Reading:
+    """The first channel of a recording, with the motion of the hub."""
+    shot, recordings = machine.takes[name]
+    (track,), channel = shot.animation.current, recordings[0].channels[0]
+    hub = CubicSpline(shot.animation.frame_times, track.values)
+    inside = (channel.times >= 0.0) & (channel.times <= shot.animation.frame_times[-1])
+    times = channel.times[inside]
+    return two_mode_beam.Reading(times, hub(times), channel.values[inside, 0])
+
+
+def beam_row(machine: Machine, own: tuple[str, ...], beam: Fitted) -> Predicted:
+    """What a beam predicts of the other recordings."""
+    left = [two_mode_beam.predicted(beam, reading_of(machine, name)) for name in machine.takes if name not in own]
+    told = f"{beam.frequencies[0]:.3g} Hz, damping {beam.damping:.3g}, {beam.modulus:.3g} of the modulus"
+    return Predicted(f"beam: {', '.join(own)}", float(np.mean(left)), np.nan, told)
+
+
+def replays(machine: Machine, fits: Mapping[tuple[str, ...], Calibration], by: Mapping[Any, Fitted]) -> list[Replayed]:
+    """Commands of the shot with the largest motion that a fit has not seen, in the beam of its recordings."""
     rows = []
-    for own in fits:
-        found = two_mode_beam.fitted(strip, [readings[name] for name in own])
-        left = [two_mode_beam.predicted(found, reading) for name, reading in readings.items() if name not in own]
-        told = f"{found.frequencies[0]:.3g} Hz, damping {found.damping:.3g}, {found.modulus:.3g} of the modulus"
-        rows.append(Predicted(f"beam: {', '.join(own)}", float(np.mean(left)), np.nan, told))
+    for own, beam in by.items():
+        spans = {name: np.ptp(shot.animation.current[0].values) for name, (shot, _) in machine.takes.items()}
+        name = max((name for name in spans if name not in own), key=spans.__getitem__)
+        robot = machine.robot(name, fits[own].estimates).shot
+        rows.append(replayed(", ".join(own), name, robot, gauge_share(fits[own]), beam, STEP))
     return rows
 
 
@@ -236,13 +262,23 @@ def main(arguments: list[str] | None = None) -> int:
         rows.append(Predicted(", ".join(own), error, float(np.mean([nominal[name] for name in others])), told))
         say(f"{rows[-1].fitted}: {error:.4f} (as they are {rows[-1].nominal:.4f}); {told}")
         keep(options, Predicted, rows)
+    by = beams(Path(options.folder), machine, fits)
     errors, inside = [row.error for row in rows], covered(fits)
     as_they_are = list(nominal.values())
     rows += [
         Predicted("median", float(np.median(errors)), float(np.mean(as_they_are)), ""),
         Predicted("largest", max(errors), max(as_they_are), ""),
-        *beam_rows(Path(options.folder), machine, list(fits)),
+        *(beam_row(machine, own, beam) for own, beam in by.items()),
     ]
     lines = [f"in the 95% interval, {name}: {a} of {n}" for name, (a, n) in inside.items()]
-    finish(options, "Predictions of a real machine", rows, lines=lines, in_the_95_percent_interval=inside)
+    played = replays(machine, fits, by)
+    lines += [
+        f"commands of {row.shot}, optimised for the fit of {row.fitted} and replayed in the beam: "
+        f"{row.before_mm:.3g} to {row.after_mm:.3g} mm (told: {row.told_mm:.3g} mm)"
+        for row in played
+    ]
+    finish(
+        options, "Predictions of a real machine", rows, lines=lines, in_the_95_percent_interval=inside,
+        replays=[vars(row) for row in played],
+    )  # fmt: skip
     return 0

@@ -47,8 +47,9 @@ class Strip:
     corner: float
     filter_damping: float
 
-    def modes(self) -> tuple[Array, Array, Array]:
-        """Circular frequencies [rad/s], answers to the hub's acceleration, strains of both modes, shape [2] each."""
+    def modes(self) -> tuple[Array, Array, Array, Array]:
+        """Circular frequencies [rad/s], answers to the hub's acceleration, strains, and deflections of the end of both
+        modes, shape [2] each."""
         L = self.length
         stiffness = self.modulus * self.width * self.thickness**3 / 12.0
         K = stiffness / L**3 * np.array([[12.0, -6.0 * L], [-6.0 * L, 4.0 * L * L]])
@@ -62,7 +63,21 @@ class Strip:
         half = np.linalg.inv(np.linalg.cholesky(M))
         squares, vectors = np.linalg.eigh(half @ K @ half.T)
         shape = half.T @ vectors
-        return np.sqrt(squares), shape.T @ turned, np.array([2.0 / L, -2.0 / 3.0]) @ shape
+        return np.sqrt(squares), shape.T @ turned, np.array([2.0 / L, -2.0 / 3.0]) @ shape, shape[0]
+
+    def end(self, times: Array, hub: Array, damping: float) -> Array:
+        """Path of the end of the strip [m] while the hub turns from rest, shape [n].
+
+        Args:
+            times: Uniform [s], shape [n].
+            hub: Angle [rad], shape [n].
+            damping: Ratio of both modes.
+        """
+        path = (self.root + self.length) * hub
+        for w, turned, _, deflection in zip(*self.modes(), strict=True):
+            system = ([-turned, 0.0, 0.0], [1.0, 2.0 * damping * w, w * w])
+            path = path + deflection * lsim(system, hub - hub[0], times - times[0])[1]
+        return np.asarray(path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +110,7 @@ class Fitted:
 def _columns(strip: Strip, damping: float, reading: Reading) -> tuple[Array, Array]:
     """Answer to the hub's motion with a gain of 1, shape [n], and what is free: swings of the modes, and an offset."""
     times = reading.times - reading.times[0]
-    w, turned, strains = strip.modes()
+    w, turned, strains, _ = strip.modes()
     f, answer, free = 2.0 * np.pi * strip.corner, np.zeros(len(times)), []
     low_pass = [1.0, 2.0 * strip.filter_damping * f, f * f]
     for k in range(2):

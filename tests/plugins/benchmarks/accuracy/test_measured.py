@@ -60,7 +60,7 @@ def recorded(turn, seconds, factor=0.7, damping=0.05, gain=1.2):
 
     times, hub = motion(turn, seconds)
     spline = CubicSpline(times, hub)
-    w, turned, strains = dataclasses.replace(STRIP, modulus=factor * STRIP.modulus).modes()
+    w, turned, strains, _ = dataclasses.replace(STRIP, modulus=factor * STRIP.modulus).modes()
     f, z = 2.0 * np.pi * STRIP.corner, STRIP.filter_damping
 
     def rates(t, y):
@@ -78,3 +78,17 @@ def test_a_beam_of_two_modes_tells_modulus_damping_and_gain_of_a_strip_and_predi
     assert found.modulus == pytest.approx(0.7, rel=0.01) and found.damping == pytest.approx(0.05, rel=0.05)
     assert found.gain == pytest.approx(1.2, rel=0.02) and found.left < 0.02
     assert predicted(found, recorded(-0.8, 1.1)) < 0.03
+
+
+def test_the_end_of_a_beam_moves_as_its_equations_of_motion_say():
+    from scipy.integrate import solve_ivp
+
+    times, hub = motion(0.5, 0.6)
+    spline, (w, turned, _, deflections) = CubicSpline(times, hub), STRIP.modes()
+
+    def rates(t, y):
+        return np.concatenate([y[2:], -0.06 * w * y[2:] - w**2 * y[:2] - turned * spline(t, 2)])
+
+    found = solve_ivp(rates, (0.0, times[-1]), np.zeros(4), t_eval=times, rtol=1e-9, atol=1e-12, max_step=0.01)
+    end = (STRIP.root + STRIP.length) * hub + deflections @ found.y[:2]
+    assert np.abs(STRIP.end(times, hub, 0.03) - end).max() < 2e-3 * np.abs(deflections @ found.y[:2]).max()
