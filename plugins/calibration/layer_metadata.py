@@ -12,11 +12,13 @@ from scipy.spatial.transform import Rotation
 
 from .model.estimates import ENCODER_OFFSET, Calibration, Estimate
 
+NARROWER = 0.9  # standard deviation over that of the prior, from which on the recordings tell something
+
 
 def metadata_of(character: Character, calibration: Calibration) -> dict[str, Any]:
     """What the layer's metadata tell of a calibration of a character."""
     items = calibration.estimates
-    known = [k for k, item in enumerate(items) if item.of_robot and item.identifiable and _has_factor(item)]
+    known = [k for k, item in enumerate(items) if item.of_robot and _has_factor(item) and _is_narrower(item)]
     relative = np.array([1.0 if items[k].logarithmic else 1.0 / items[k].value for k in known])
     covariance = calibration.covariance[np.ix_(known, known)] * np.outer(relative, relative)
     return {
@@ -79,4 +81,14 @@ def _arm(character: Character, path: str) -> float:
 
 def _has_factor(item: Estimate) -> bool:
     """Whether a parameter can be drawn as a factor of its value: one about zero cannot."""
-    return item.axis < 0 and item.kind != ENCODER_OFFSET and item.value > 3.0 * item.standard_deviation
+    if item.axis >= 0 or item.kind == ENCODER_OFFSET:
+        return False
+    return item.logarithmic or item.value > 3.0 * item.standard_deviation
+
+
+def _is_narrower(item: Estimate) -> bool:
+    """Whether the recordings tell something about a parameter; of the others, `--robust` takes what the shot says."""
+    found, before = item.standard_deviation, item.prior
+    if item.logarithmic:
+        found, before = found / item.value, before / item.nominal
+    return found < NARROWER * before

@@ -85,10 +85,11 @@ def test_each_value_has_its_standard_deviation_and_the_layer_the_recordings(shot
     assert list(entry["recordings_sha256"]) == ["ab12"] and list(entry["parameters"])[-1] == "clock_offset take.csv"
 
 
-def test_robust_curves_get_the_covariance_of_what_is_identifiable(shot, tmp_path):
+def test_robust_curves_get_the_covariance_of_what_recordings_narrow_wide_as_it_is(shot, tmp_path):
     character, _, provenance = read_shot(shot)
-    lost = dataclasses.replace(ALL[1], identifiable=False)
-    made = calibration_of(ALL[0], lost, ALL[3], ALL[8], ALL[10])
+    lost = dataclasses.replace(ALL[1], standard_deviation=0.29 * ALL[1].value, identifiable=False)
+    wide = dataclasses.replace(ALL[3], standard_deviation=0.22 * ALL[3].value, identifiable=False)
+    made = calibration_of(ALL[0], lost, wide, ALL[8], ALL[10])
     _, root = write_calibration(character, provenance, made, str(tmp_path / "robot.usda"))
     known = read_shot(root)[0].retarget.uncertainty.calibrated
     assert known.names == (f"modulus {PLASTIC}", f"mass {BASE}", f"delay {SHOULDER}")
