@@ -1,6 +1,7 @@
 """Memory that is left: the least of what machine, container and process allow."""
 
 import math
+import platform
 import subprocess
 import sys
 
@@ -60,3 +61,27 @@ def test_without_a_limit_nothing_is_refused(monkeypatch):
     monkeypatch.setattr(memory, "address_limit", lambda: math.inf)
     memory.require_address_space(1e18, "a stage")
     assert not memory.was_short()
+
+
+FREED = """
+import numpy as np
+from calmotion.support.operating_system import return_freed_memory
+np.ones(5_000_000), np.ones(3_000_000)
+many = [np.ones(1_500_000) for _ in range(40)]
+kept = many[::8]
+del many
+{called}
+with open("/proc/self/statm") as file:
+    print(4096 * int(file.read().split()[1]))
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="of the memory of glibc")
+def test_freed_arrays_between_others_go_back_to_the_system():
+    """Five arrays of 12 MB of forty are left, which lie between the others."""
+
+    def resident(called):
+        program = [sys.executable, "-c", FREED.format(called=called)]
+        return int(subprocess.run(program, capture_output=True, text=True, check=True).stdout)
+
+    assert resident("return_freed_memory()") < resident("") - 200e6

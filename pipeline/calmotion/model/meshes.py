@@ -90,6 +90,11 @@ class MeshQuality:
     source: str = ""
     deflection_error: float | None = None
 
+    @property
+    def error_of_volume(self) -> float:
+        """Relative error of the stiffness by that of the volume: that of a rod goes with its section squared."""
+        return 2.0 * abs(self.volume_error)
+
 
 @dataclass(frozen=True, eq=False)
 class CutPatch:

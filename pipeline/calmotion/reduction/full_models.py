@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from calmotion.model.character import Body
 from calmotion.model.meshes import FEMesh
 from calmotion.reduction.cache import cache_key
+from calmotion.support.operating_system import return_freed_memory
 
 if TYPE_CHECKING:
     from calmotion.mesh.patches.interface_patches import AttachmentFrame
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 _KEPT = 60_000_000  # numbers in factors of full models, half a gigabyte
 _HANDED_ON = 20_000_000  # of those from a mesher to the reduction, while it makes others
-_AT_ONCE = 48_000  # nodes of full models that are worked on at the same time: some 1.2 gigabytes
+_AT_ONCE = 40_000  # nodes of full models that are worked on at the same time: some gigabyte
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +94,7 @@ class _Room:
         try:
             yield
         finally:
+            return_freed_memory()
             with self._changed:
                 self._taken -= nodes
                 self._changed.notify_all()

@@ -91,6 +91,12 @@ def peak_memory() -> float:
     return float(getattr(psutil.Process().memory_info(), "peak_wset", float("nan")))
 
 
+def return_freed_memory() -> None:
+    """Return freed memory to the system: glibc keeps arrays of up to 32 MB for the thread that asked for them."""
+    with contextlib.suppress(AttributeError, OSError, TypeError):  # another library of C has no such function
+        ctypes.CDLL(None).malloc_trim(0)
+
+
 def free_memory() -> float:
     """Memory of this machine that can be taken without swapping [bytes]."""
     import psutil

@@ -92,8 +92,8 @@ def measure(file: str, links: int, patience: float) -> RobotRow:
         except subprocess.TimeoutExpired:
             return RobotRow(name, told, verdict=f"not ended after {patience:g} s")
         except (json.JSONDecodeError, KeyError):
-            lines = [line for line in done.stderr.splitlines() if not line.startswith(("note:", "  "))]
-            return RobotRow(name, told, verdict=f"exit status {done.returncode}: {' '.join(lines[-3:])}")
+            said = [line for line in done.stderr.splitlines() if line.startswith("error:")] or [done.stderr[-200:]]
+            return RobotRow(name, told, verdict=f"exit status {done.returncode}: {said[0]}")
 
 
 def _row(name: str, links: str, found: dict[str, Any]) -> RobotRow:

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from calmotion.multibody.failure import Reason, SimulationFailure
+from calmotion.retargeting.solver import gauss_newton
 from calmotion.retargeting.solver.gauss_newton import Ends, Search, minimize
+from calmotion.retargeting.solver.limited_step import LimitedStep
 from calmotion.retargeting.solver.preconditioner import Sharpened
 from calmotion.retargeting.solver.recycling import Recycled
 
@@ -226,3 +228,47 @@ def test_a_better_preconditioner_is_made_where_systems_take_long():
     assert after.reason == before.reason == "converged"
     assert np.allclose(after.x, before.x, atol=1e-4) and after.products < 0.7 * before.products
     assert before.sharpened is None and len(after.sharpened.point) == 40
+
+
+@dataclass(frozen=True)
+class Limited(Point):
+    """A point under limits, which the steps of `Promised` keep."""
+
+    limits_act = True
+
+    def with_limits(self, limits):
+        return self
+
+
+class Promised(Problem):
+    """A problem under limits that is far more curved than its derivatives tell: steps have to be a share of them."""
+
+    def at(self, x, near=None):
+        self.calls += 1
+        return Limited(self, x.copy(), 0.5 * float(np.sum(self.residual(x) ** 2)))
+
+    def step(self, linear, *rest):
+        step = np.linalg.lstsq(linear.J, -self.residual(linear.x), rcond=None)[0]
+        promised = 0.5 * float(np.sum((linear.J @ step) ** 2))
+        return LimitedStep(self.longer * step, 1, lambda t: t * (2.0 - t) * promised, promised, None)
+
+
+def under_limits(monkeypatch, longer, gain, at_most=60):
+    problem = Promised(1)
+    problem.longer = longer
+    monkeypatch.setattr(gauss_newton, "limited_step", problem.step)
+    return minimize(problem, Search.start(np.zeros(5)), FREE, Ends(gain, at_most))
+
+
+def test_a_step_under_limits_begins_with_the_share_that_the_last_one_had(monkeypatch):
+    search = under_limits(monkeypatch, 20.0, 1e-3)
+    tried = np.diff([iterate.evaluations for iterate in search.history])
+    assert tried[0] >= 3 and np.mean(tried[1:]) < 2.5, tried
+
+
+def test_steps_under_limits_that_bring_less_than_they_promise_end_a_search(monkeypatch):
+    gain = 1e-3
+    few = under_limits(monkeypatch, 0.03, gain, 400)
+    brought = -np.diff([iterate.value for iterate in few.history])
+    assert few.reason == "no further decrease"
+    assert all(iterate.gain >= gain for iterate in few.history[-3:]) and brought[-2:].max() < gain <= brought[-4]

@@ -2,8 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from calmotion.errors import ShotError
+from calmotion.model import FEMesh, FEMeshes
+from calmotion.model.meshes import MeshQuality
 from calmotion.model.run import RunSettings
 from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
 from calmotion.simulation.compiled_shot import compile_shot
@@ -28,11 +31,14 @@ def with_mesh_errors(bodies, *errors):
 class Refining:
     """A reduction that notes which errors are wanted and gives the bodies as they are."""
 
-    def __init__(self, bodies):
-        self.given, self.wanted, self.released = bodies, None, False
+    def __init__(self, bodies, volume_errors=()):
+        self.given, self.wanted, self.released, self.most = bodies, None, False, None
+        qualities = [MeshQuality(20.0, 1e-4, error) for error in volume_errors or len(bodies) * [0.0]]
+        nothing = np.zeros((0, 3)), np.zeros((0, 4), np.int32)
+        self.meshes = FEMeshes(tuple(FEMesh(b, *nothing, quality) for b, quality in enumerate(qualities)))
 
     def with_finer_meshes(self, tolerance, wanted, max_nodes, progress):
-        self.wanted = dict(wanted)
+        self.wanted, self.most = dict(wanted), max_nodes
         return self
 
     def bodies(self, tolerance, progress=None):
@@ -111,6 +117,29 @@ def test_meshes_are_no_finer_than_the_modulus_is_known_unless_a_tolerance_is_ask
     allowed = mesh_budget.SHARE * 1e-5 / 0.1
     assert reduction.wanted[0] == pytest.approx(0.02) if tolerance is None else reduction.wanted[0] < allowed
     assert (1 in reduction.wanted) == (tolerance is not None and 1e-4 > 0.5 * allowed)
+
+
+@pytest.mark.parametrize("of_volume, refined", [(0.0, True), (0.02, True), (0.09, False)])
+def test_a_mesh_is_not_refined_for_its_volume_which_finer_elements_keep(arm, animation, bodies, of_volume, refined):
+    known = replace(arm, retarget=replace(arm.retarget, tolerance=None))
+    shot = compile_shot(known, animation, with_mesh_errors(bodies, 0.2, 1e-4))
+    reduction = Refining(list(shot.bodies), [of_volume, *(len(bodies) - 1) * [0.0]])
+    by_deflections(shot, reduction, RunSettings())
+    assert (reduction.wanted is not None) == refined
+    assert not refined or reduction.wanted[0] == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize("tolerance", [None, 1e-5])
+@pytest.mark.parametrize("nodes", [30_000, 40_000, 80_000])
+def test_meshes_have_as_many_nodes_as_2_gb_allow_and_more_where_a_tolerance_is_asked_for(
+    arm, animation, bodies, tolerance, nodes
+):
+    known = replace(arm, retarget=replace(arm.retarget, tolerance=None))
+    many = [replace(body, nodes=nodes) for body in with_mesh_errors(bodies, 0.2, 0.2)]
+    reduction = Refining(many)
+    by_deflections(compile_shot(known, animation, many), reduction, RunSettings(tolerance=tolerance))
+    most = 45_000 if tolerance is None else 100_000
+    assert reduction.most == (most if 1.4 * nodes <= most else None)
 
 
 def test_what_an_uncertain_modulus_does_counts_only_where_no_tolerance_is_asked_for(arm, animation, bodies):

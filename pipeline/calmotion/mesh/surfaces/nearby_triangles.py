@@ -11,6 +11,7 @@ from calmotion.support.compilation import kernel
 
 _CELLS = 64  # along the longest side of the surface
 _EDGE = 1e-9  # of an edge, by which a triangle is larger for rays: none must pass between two of them
+_ROUNDING = 1e-12  # of a squared distance, and of the size of the surface: what is farther than that is not closer
 _NO_AREA = 1e-13  # square of the sine of an angle below which a triangle is a line
 
 
@@ -29,8 +30,9 @@ class NearbyTriangles:
         low, high = points.min(axis=0) - reach, points.max(axis=0) + reach
         self._low, self._size = low, float((high - low).max()) / _CELLS
         self._count = np.maximum(np.ceil((high - low) / self._size).astype(np.int64), 1)
-        first = ((self._corners.min(axis=1) - reach - low) / self._size).astype(np.int64)
-        last = ((self._corners.max(axis=1) + reach - low) / self._size).astype(np.int64)
+        self._boxes = np.stack([self._corners.min(axis=1), self._corners.max(axis=1)], axis=1)
+        first = ((self._boxes[:, 0] - reach - low) / self._size).astype(np.int64)
+        last = ((self._boxes[:, 1] + reach - low) / self._size).astype(np.int64)
         first, last = np.clip(first, 0, self._count - 1), np.clip(last, 0, self._count - 1)
         self._start = np.zeros(int(np.prod(self._count)) + 1, np.int64)
         _list(first, last, self._count, self._start, np.zeros(0, np.int32))
@@ -43,7 +45,8 @@ class NearbyTriangles:
         found = np.full(points.shape, np.nan)
         near = np.ascontiguousarray(points)
         cells = self._cells(points)
-        _closest(near, cells, self._start, self._listed, self._corners, self.reach, np.zeros(3), found)
+        bounds = (self.reach, _ROUNDING * self._size * _CELLS)
+        _closest(near, cells, self._start, self._listed, self._corners, self._boxes, bounds, np.zeros(3), found)
         return found
 
     def faced(self, points: Array, directions: Array, skip: float) -> tuple[Array, Array]:
@@ -110,20 +113,26 @@ def _list(first: Indices, last: Indices, count: Indices, start: Indices, listed:
 
 @kernel
 def _closest(
-    points: Array, cell: Indices, start: Indices, listed: Indices, corners: Array, reach: float, p: Array,
-    found: Array,
+    points: Array, cell: Indices, start: Indices, listed: Indices, corners: Array, boxes: Array,
+    bounds: tuple[float, float], p: Array, found: Array,
 ) -> None:  # fmt: skip
+    """Closest points; the triangle of the last one, and boxes around triangles, tell early which are farther."""
+    last, (reach, rounding) = -1, bounds
     for k in range(len(points)):
         if cell[k] < 0:
             continue
         nearest = reach * reach
+        if last >= 0:
+            apart = _apart(points[k], boxes[last])  # the closest point of a sliver may be wrong, and out of its box
+            there = max(_squared_distance(points[k], corners[last], p), apart)
+            nearest = min(nearest, (1.0 + _ROUNDING) * there + rounding**2) if apart <= nearest else nearest
         for at in range(start[cell[k]], start[cell[k] + 1]):
-            closest_on_triangle(points[k], corners[listed[at]], p)
-            distance = 0.0
-            for i in range(3):
-                distance += (p[i] - points[k, i]) ** 2
+            triangle = listed[at]
+            if _apart(points[k], boxes[triangle]) > (1.0 + _ROUNDING) * nearest + rounding**2:
+                continue
+            distance = _squared_distance(points[k], corners[triangle], p)
             if distance <= nearest:
-                nearest = distance
+                nearest, last = distance, triangle
                 for i in range(3):
                     found[k, i] = p[i]
 
@@ -162,6 +171,25 @@ def _contains(corners: Array, n: Array, x: float, y: float, z: float) -> bool:
         if side < -_EDGE * (e0 * e0 + e1 * e1 + e2 * e2):
             return False
     return True
+
+
+@kernel
+def _apart(point: Array, box: Array) -> float:
+    """Squared distance of a point from a box, given by its lowest and its highest corner [m^2]."""
+    apart = 0.0
+    for i in range(3):
+        apart += max(box[0, i] - point[i], point[i] - box[1, i], 0.0) ** 2
+    return apart
+
+
+@kernel
+def _squared_distance(point: Array, corners: Array, out: Array) -> float:
+    """Of a point from a triangle [m^2]; the closest point is written into `out`."""
+    closest_on_triangle(point, corners, out)
+    distance = 0.0
+    for i in range(3):
+        distance += (out[i] - point[i]) ** 2
+    return distance
 
 
 @kernel

@@ -22,6 +22,8 @@ STEP_REDUCTIONS = 10  # most reductions of a step in one iteration
 FORCING_TERM = 0.01  # share of the decrease of an iteration at which conjugate gradients end
 UNPREDICTED_SHARE = 0.1  # of the gain that ends a search: systems may leave as much, which is not predicted then
 ACCEPTED_RATIO = 0.05  # smallest share of the predicted decrease for a step to be accepted
+SHORTER = 0.3  # factor of a step under limits that is not accepted; the next one begins as much longer
+STALLED = 3  # steps under limits in a row that promise the gain that matters and bring less: the model is of no use
 
 
 class Linear(LinearLimited, Protocol):
@@ -188,7 +190,7 @@ class _GaussNewton:
         self._evaluations, self._gradients, self._products = search.evaluations + 1, search.gradients, search.products
         self._at = problem.at(search.x, search.at)
         self._radius, self._recycled, self._history = search.radius, search.recycled, list(search.history)
-        self._sharpened = search.sharpened
+        self._sharpened, self._share, self._stalled = search.sharpened, 1.0, 0
         self._eager = self._sharpened is not None  # the first preconditioner has failed already
         if self._sharpened is not None and len(self._sharpened.point) != len(search.x):
             self._sharpened = None
@@ -218,7 +220,7 @@ class _GaussNewton:
             return "converged" if expected < self._ends.gain else "no further decrease"
         if self._onto_limits is not None and not limited:
             tightened = self._moved(tightened, *self._onto_limits(tightened))
-        self._at, self._radius = tightened, np.inf
+        self._at, self._radius, self._stalled = tightened, np.inf, 0
         return ""
 
     def _gain_of(self, decrease: float) -> float:
@@ -263,14 +265,16 @@ class _GaussNewton:
         return counts[-1] - counts[-2] if self._history else 0
 
     def _takes_limited(self, limited: LimitedStep) -> bool:
-        """Step under limits; the step is shortened until the simulation agrees with the model."""
-        at, t = self._at, 1.0
+        """Step under limits, shortened until the simulation agrees with the model; whether steps bring enough."""
+        at, t = self._at, min(self._share / SHORTER, 1.0)
         for _ in range(STEP_REDUCTIONS):
             there, predicted = self._evaluated(at.problem, at.x + t * limited.step, at), limited.predicted(t)
             if there is not None and predicted > 0.0 and at.merit - there.merit > ACCEPTED_RATIO * predicted:
-                self._at, self._radius = there, np.inf
-                return True
-            t *= 0.3
+                brought = at.gain(at.merit - there.merit, at.merit)
+                self._stalled = 0 if brought >= self._ends.gain else self._stalled + 1
+                self._at, self._radius, self._share = there, np.inf, t
+                return self._stalled < STALLED
+            t *= SHORTER
         return False
 
     def _in_trust_region(self, linear: Linear, gradient: Array) -> tuple[float, Callable[[], bool]]:

@@ -21,6 +21,8 @@ from calmotion.tolerance.step_error import StepRun, distance, simulate_at
 
 SHARE = 0.25  # of the tolerance, that the meshes may take
 MOST_NODES = 100_000  # of a mesh without which the tolerance is not kept, some two minutes on two slow cores
+UNASKED_NODES = 45_000  # where nobody asked for a tolerance: within 2 GB, where 100,000 nodes take 4.6 GB
+_GROWS = 1.4  # least factor of the nodes of a finer mesh that tells something, as of `MeshController`
 OF_UNCERTAINTY = 0.2  # of what is not known of a modulus: meshes and reductions are no finer where nobody asked for it
 _WORTH = 2.0  # of that: meshes with more are refined once more
 _MARGIN = 0.8  # of the wanted error: estimates of two meshes differ
@@ -65,14 +67,19 @@ def meshes_to_tolerance(
         return shot, reduction
     costs = {b: total / bound * error for b, error in known.items()}
     wanted = {}
+    assert reduction.meshes is not None
+    by_volume = {mesh.body: mesh.quality.error_of_volume for mesh in reduction.meshes.meshes}
+    unknown = {b: unknown_stiffness(shot.character, b, options.tolerance) for b in known}
+    most = UNASKED_NODES if any(unknown.values()) else MOST_NODES
     for b, share in _shares(costs, _MARGIN * allowed).items():
-        own, least = shot.bodies[b].mesh_error or 0.0, unknown_stiffness(shot.character, b, options.tolerance)
-        goal = max(own * share / costs[b], OF_UNCERTAINTY * least)
-        if goal < own and own > _WORTH * OF_UNCERTAINTY * least:
+        whole, least = shot.bodies[b].mesh_error or 0.0, unknown[b]
+        own = whole - by_volume[b]  # bisected elements have the volume that they had
+        goal = max(whole * share / costs[b], OF_UNCERTAINTY * least)
+        if goal < own and own > _WORTH * OF_UNCERTAINTY * least and _GROWS * shot.bodies[b].nodes <= most:
             wanted[b] = goal
     if not wanted:
         return shot, reduction
-    finer = reduction.with_finer_meshes(options.tolerance, wanted, MOST_NODES, progress)
+    finer = reduction.with_finer_meshes(options.tolerance, wanted, most, progress)
     reduction.release()
     made = finer.bodies(options.tolerance, progress=progress) if bodies is None else bodies(finer)
     return shot.with_bodies(made), finer
