@@ -17,9 +17,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from calmotion.arrays import Array
+from calmotion.arrays import Array, BoolArray
 from calmotion.multibody import PoseModel
 from scipy.linalg import block_diag, expm
+
+from .efforts import Efforts
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Weighting:
         penalty: Of a change of a command's rate [m s/rad], shape [m].
         closeness: Of the deviation of a command from the intended one [m/rad].
         frequencies: Factors of the frequencies of the robots that are thought possible.
+        limited: Motors whose efforts are kept within limits, shape [M]; None: none.
     """
 
     LEAST_DAMPING = 1e-3  # ratio of critical, so that what no motor reaches dies away in the sums
@@ -43,6 +46,7 @@ class Weighting:
     penalty: Array
     closeness: float
     frequencies: tuple[float, ...] = (1.0,)
+    limited: BoolArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +59,7 @@ class Gains:
         targets: Weighted motion of the targets by the state, shape [S 6 K, X].
         feedback, preview: Shapes [m, X] and [window, m, S n].
         robots: S.
+        efforts: Those of the motors with limits; None: none has.
     """
 
     pose: PoseModel
@@ -65,6 +70,7 @@ class Gains:
     feedback: Array
     preview: Array
     robots: int
+    efforts: Efforts | None = None
 
     def impulses(self, accelerations: Array, rates: Array, forces: Array, tick: float) -> Array:
         """Impulses of the intended motion on the modes of all robots, shape [T, S n].
@@ -124,7 +130,14 @@ def gains_at(pose: PoseModel, coupling: Array, weighting: Weighting) -> Gains:
     for _ in range(weighting.window):
         preview.append(answer @ ahead)
         ahead = closed.T @ ahead
-    return Gains(pose, transition, by_change, by_impulse, targets, feedback, np.array(preview), robots)
+    efforts = None
+    if weighting.limited is not None and np.any(weighting.limited):
+        rates = np.zeros((len(coupling) + n, size))
+        rates[: len(coupling), rate] = coupling
+        rates[len(coupling) + np.arange(n), speed[robots // 2 * n :][:n]] = 1.0
+        loop = closed, by_change, by_impulse, answer, value @ by_impulse
+        efforts = Efforts.of(pose, rates, h, weighting.limited, loop, weighting.window)
+    return Gains(pose, transition, by_change, by_impulse, targets, feedback, np.array(preview), robots, efforts)
 
 
 def riccati(transition: Array, by_change: Array, least: Array, penalty: Array) -> Array:

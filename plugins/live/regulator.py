@@ -6,8 +6,9 @@ import numpy as np
 from calmotion.arrays import Array, IntArray
 from calmotion.multibody import VelocityForces
 
+from .efforts import EffortLimits
 from .gains import Gains
-from .limits import MotorLimits
+from .limits import EFFORT, MotorLimits
 
 
 class Window:
@@ -56,21 +57,21 @@ class Regulator:
         coupling: Of all motors with those that may deviate, shape [M, m].
         deviating: The latter, shape [m].
         limits: Of all motors.
+        efforts: Their limits of effort.
 
     Attributes:
         command: Of the tick, shape [M].
-        efforts: Of the motors in the tick, as the linear model has them, shape [M].
     """
 
-    def __init__(self, coupling: Array, deviating: IntArray, limits: MotorLimits):
-        self._coupling, self._deviating, self._limits = coupling, deviating, limits
+    def __init__(self, coupling: Array, deviating: IntArray, limits: MotorLimits, efforts: EffortLimits):
+        self._coupling, self._deviating, self._limits, self._efforts = coupling, deviating, limits, efforts
         self._gains: Gains | None = None
 
     def begin(self, position: Array, gains: Gains) -> None:
         """Rest at a pose."""
         self._gains, self._x = gains, np.zeros(len(gains.transition))
         self.command, self._speed = np.array(position, float), np.zeros(len(position))
-        self.efforts = np.zeros(len(position))
+        self._efforts.begin()
 
     def use(self, gains: Gains) -> None:
         """Go on in the modes of another pose."""
@@ -84,26 +85,21 @@ class Regulator:
 
     def advance(self, window: Window) -> tuple[Array, IntArray]:
         """The commands of the next tick, shape [M], and what limits acted, see `MotorLimits.kept`."""
-        gains, h, m = self._gains, self._limits.tick, len(self._deviating)
+        gains, h, m, lead = self._gains, self._limits.tick, len(self._deviating), self._efforts.lead.copy()
         assert gains is not None
         impulses = gains.impulses(window.accelerations, window.rates, window.forces, h)
         wanted = -gains.feedback @ self._x
         wanted -= np.einsum("kmi,ki->m", gains.preview[: len(impulses)], impulses)
-        intended = (window.next - window.played) / h
+        if gains.efforts is not None:
+            wanted -= self._efforts.pull(gains.efforts, self._x, impulses, window)
+        intended = (window.next + self._efforts.lead - window.played - lead) / h
         asked = intended + self._coupling @ (self._x[m : 2 * m] + wanted)
         self._speed, acted = self._limits.kept(self.command, self._speed, asked)
         change = (self._speed - intended)[self._deviating] - self._x[m : 2 * m]
-        before = self._x
+        before, following = self._x, window.next + self._efforts.lead
         self._x = gains.transition @ self._x + gains.by_change @ change + gains.by_impulse @ impulses[0]
-        rates = self._rates(window.rates[0], gains, self._x)
-        accelerations = self._rates(window.accelerations[0], gains, (self._x - before) / h)
-        self.efforts = gains.pose.efforts(rates, accelerations, window.with_weight[0])
-        self._x[:m] = (self.command + h * self._speed - window.next)[self._deviating]
-        self.command = window.next + self._coupling @ self._x[:m]
-        return self.command, acted
-
-    def _rates(self, intended: Array, gains: Gains, x: Array) -> Array:
-        """Of all motors and of the amplitudes of the robot of the model in a state, shape [M + n]."""
-        m = len(self._deviating)
-        modal = x[2 * m :].reshape(2, gains.robots, -1)[1, gains.robots // 2]
-        return np.concatenate([intended + self._coupling @ x[m : 2 * m], modal])
+        if gains.efforts is not None:
+            self._efforts.tell(gains.efforts, before, self._x)
+        self._x[:m] = (self.command + h * self._speed - following)[self._deviating]
+        self.command = following + self._coupling @ self._x[:m]
+        return self.command, np.where(self._efforts.acted, EFFORT, acted)

@@ -16,6 +16,7 @@ from calmotion.model import PRESCRIBED, RunSettings, tolerance_of
 from calmotion.multibody import SimulationFailure, State, VelocityForces, pose_model
 from calmotion.simulation import CompiledShot, coupling_of, leaders, prepare
 
+from .efforts import EffortLimits
 from .gains import Gains, Weighting, gains_at
 from .limits import EFFORT, MotorLimits
 from .regulator import Regulator, Window
@@ -62,17 +63,16 @@ class Live:
         self._limits = MotorLimits.of(character, self.tick_s)
         self._deviating: IntArray = leaders(character)
         self._coupling = coupling_of(character, self._deviating)
-        self._weighting = self._weighting_of(shot)
         period = 1.0 / settings.sender_rate if settings.sender_rate else self.tick_s
         self._stream = Stream(self._limits, settings.lookahead, period)
         forces = VelocityForces(self.model, self.world)
         self._window = Window(self._window_ticks, self._limits, forces)
-        self._regulator = Regulator(self._coupling, self._deviating, self._limits)
+        self._efforts = EffortLimits(character.motors, self.tick_s, forces.known)
+        self._weighting = self._weighting_of(shot)
+        self._regulator = Regulator(self._coupling, self._deviating, self._limits, self._efforts)
         self._renewal = Renewal(self._gains, settings.background)
         self._closed = len(self.model.system.rows) > len(self.model.system.parent)
         self._delay = max((motor.delay for motor in character.motors if motor.model != PRESCRIBED), default=0.0)
-        most = np.array([motor.max_torque for motor in character.motors])
-        self._most = most if forces.known else np.full(len(most), np.inf)
         self.notes = notes_of(shot, forces)
         self.start = np.array([float(np.interp(0.0, track.times, track.values)) for track in shot.animation.current])
         self.reset(self.start)
@@ -171,9 +171,8 @@ class Live:
         if gains is not None:
             self._regulator.use(gains)
         commands, self._acted = self._regulator.advance(self._window)
-        needed = np.abs(self._regulator.efforts) / self._most
-        self._needed = np.maximum(self._needed, needed)
-        self._acted[needed > 1.0] = EFFORT
+        self._needed = np.maximum(self._needed, self._efforts.needed)
+        self._acted[self._efforts.needed > 1.0] = EFFORT
         self._counts.update(np.flatnonzero(self._acted >= 0).tolist())
         self._ticks += 1
         self._since += 1
@@ -261,6 +260,7 @@ class Live:
             LiveSettings.PENALTY * tolerance_of(shot.character, settings.tolerance) / (largest * self.tick_s),
             0.0,
             spread,
+            self._efforts.limited,
         )
 
     def _gains(self, position: Array) -> Gains:
@@ -271,9 +271,9 @@ class Live:
         moved = (weighting.targets[..., None] * pose.targets_by_input).reshape(-1, len(self.joints))
         lever = float(np.linalg.norm(moved, axis=0).max(initial=0.0))
         coarser = max(LiveSettings.FINEST * lever / tolerance, 1.0)
-        weighting = replace(
-            weighting, penalty=coarser * weighting.penalty, closeness=max(LiveSettings.CLOSE * lever, tolerance)
-        )
+        # what robots of different frequencies leave in common must not pay for motors that leave the linear model
+        close = max(LiveSettings.CLOSE, self.settings.uncertainty)
+        weighting = replace(weighting, penalty=coarser * weighting.penalty, closeness=max(close * lever, tolerance))
         return gains_at(pose, self._coupling, weighting)
 
     def _refuse_slow(self) -> None:

@@ -26,11 +26,11 @@ class LiveSettings:
     """
 
     ACCELERATION = 100.0  # of a motor without a limit, which is worth the tolerance [rad/s^2 or m/s^2]
-    PENALTY = 1.0  # of a deviating acceleration at its limit, in tolerances
+    PENALTY = 0.5  # of a deviating acceleration at its limit, in tolerances
     FINEST = 2e-4  # tolerance over the longest lever of a motor, below which errors of a linear model are followed
-    CLOSE = 2e-3  # error over that lever for which motors may deviate by a radian, where no target moves
+    CLOSE = 0.01  # error over that lever for which motors may deviate by a radian, where no target moves
     HIGHEST = 1 / 3  # frequency of a mode that commands can act on, of the rate
-    RENEWAL_S = 0.04  # between two renewals without a thread
+    RENEWAL_S = 0.02  # between two renewals without a thread
     SLOW_GAINS_S = 0.1  # processor time of a renewal that is told; poses turn by a tenth of a radian meanwhile
 
     rate: float = 250.0

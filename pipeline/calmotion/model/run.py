@@ -67,7 +67,7 @@ class RunSettings:
 
 LONG_SHOT = 30.0  # of a longer one, an inspection simulates its busiest part of this length [s]
 INTEGRATORS = ("bdf2", "newmark", "generalized-alpha", "rk4")
-SHAPERS = ("zv", "zvd", "zv2", "zvd2", "lowpass")  # input shapers and a filter
+SHAPERS = ("zv", "zvd", "ei", "mzv", "zv2", "zvd2", "ei2", "mzv2", "lowpass")  # input shapers and a filter
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ def simulate(
         integrator: `bdf2`, `newmark`, `generalized-alpha` or `rk4`; None: automatic.
         pre_roll: Time that eases into the motion, [s] or text with a unit; None: automatic.
         motors: `authored`: as the models of the motors say; `ideal`: joints follow their curves exactly.
-        shaper: Input shaper (`zv`, `zvd`, `zv2`, `zvd2`) or `lowpass` filter for the motors' tracks, to compare with.
+        shaper: One of `calmotion.model.SHAPERS` for the motors' tracks, to compare with.
         keep, leave_out: Kinds of simplification that are forbidden or forced (`bodies`, `turning`, `loops`, `modes`,
             `directions`, `elasticity`, `motors`, or `all`); the others follow from the tolerance.
         verify: Measure the error against a finer run as well.

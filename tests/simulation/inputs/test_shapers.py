@@ -36,6 +36,35 @@ def test_zvd_forgives_an_error_of_the_frequency_that_zv_does_not():
     assert zvd < 0.15 * zv
 
 
+def residual(kind, frequencies):
+    """Vibration that a shaper of an undamped mode of 1 Hz leaves on modes of other frequencies, over that without it."""
+    times, amplitudes = impulses(kind, np.ones(1), np.zeros(1))
+    return abs(np.exp(2j * np.pi * np.outer(frequencies, times)) @ amplitudes)
+
+
+def test_ei_leaves_its_tolerance_at_most_over_the_band_that_is_published():
+    """Singhose, Seering, Singer: 5% at the frequency, none on both sides, and at most 5% from 0.80 to 1.20 of it."""
+    assert residual("ei", [1.0])[0] == pytest.approx(0.05)
+    assert residual("ei", np.linspace(0.8012, 1.1988, 200)).max() < 0.0501
+    assert residual("ei", [0.79, 1.21]).min() > 0.05
+    assert residual("ei", np.linspace(0.85, 1.0, 200)).min() < 1e-3
+    assert residual("ei", [0.9, 1.1]).max() < residual("zvd", [0.9, 1.1]).max() + 0.03
+
+
+def test_mzv_cancels_its_mode_within_three_quarters_of_a_period_and_forgives_more_than_zv():
+    times, amplitudes = impulses("mzv", np.ones(1), np.zeros(1))
+    np.testing.assert_allclose(times, [0.0, 0.375, 0.75])
+    np.testing.assert_allclose(amplitudes, [1.0 - 2**-0.5, 2**0.5 - 1.0, 1.0 - 2**-0.5])
+    assert residual("mzv", [1.0])[0] < 1e-12
+    assert np.all(residual("mzv", [0.9, 1.1]) < residual("zv", [0.9, 1.1]))
+
+
+def test_with_damping_ei_and_mzv_leave_little_of_their_mode():
+    """Klipper's amplitudes for damped modes, which keep nearly what they keep without damping."""
+    assert left_over(*impulses("ei", FREQUENCIES, RATIOS), FREQUENCIES[0]) < 0.06
+    assert left_over(*impulses("mzv", FREQUENCIES, RATIOS), FREQUENCIES[0]) < 0.01
+
+
 @pytest.fixture
 def parts():
     grid = make_grid(FRAMES, 1 / 480, 0.0)

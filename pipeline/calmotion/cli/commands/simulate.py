@@ -22,7 +22,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--shaper",
         metavar="KIND",
-        help="for comparison, filter the motor curves: zv, zvd, zv2, zvd2 (input shapers) or lowpass",
+        help="for comparison, filter the motor curves: zv, zvd, ei or mzv (input shapers, with a 2 behind it for two modes) or lowpass",
     )
     run_options(command)
     simulation_options(

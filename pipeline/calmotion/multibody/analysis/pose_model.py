@@ -67,16 +67,6 @@ class PoseModel:
         """The matrix from amplitudes in another pose to those of the same deflections in this one, [n, n of other]."""
         return np.asarray(self.by_deflection @ other.deflections)
 
-    def efforts(self, rates: Array, accelerations: Array, forces: Array) -> Array:
-        """Of the motors [N m or N], shape [M].
-
-        Args:
-            rates, accelerations: Of the inputs and, behind them, of the amplitudes, shape [M + n].
-            forces: `VelocityForces.with_weight`, shape [N].
-        """
-        by_acceleration = np.concatenate([self.inertia, -self.by_acceleration.T], axis=1)
-        return np.asarray(by_acceleration @ accelerations + self.resistance @ rates + forces @ self.by_input)
-
 
 def pose_model(
     model: Model, values: Array, world: Array | None = None, highest: float = np.inf, near: State | None = None

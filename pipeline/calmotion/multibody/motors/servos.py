@@ -19,6 +19,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from calmotion.arrays import Array
 from calmotion.multibody.model.system import (
     BACK_EMF,
@@ -52,6 +54,11 @@ def _limited(x: float) -> tuple[float, float]:
     power = 1.0 + eighth * eighth
     root = power ** (-1.0 / 16.0)
     return x * root, root / power
+
+
+def unsaturated(share: Array) -> Array:
+    """The x with s(x) = share, for shares of the largest torque within -1 and 1."""
+    return np.asarray(share * (1.0 - share**16) ** (-1.0 / 16.0))
 
 
 @shared_kernel
