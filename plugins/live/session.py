@@ -271,9 +271,8 @@ class Live:
         moved = (weighting.targets[..., None] * pose.targets_by_input).reshape(-1, len(self.joints))
         lever = float(np.linalg.norm(moved, axis=0).max(initial=0.0))
         coarser = max(LiveSettings.FINEST * lever / tolerance, 1.0)
-        # what robots of different frequencies leave in common must not pay for motors that leave the linear model
-        close = max(LiveSettings.CLOSE, self.settings.uncertainty)
-        weighting = replace(weighting, penalty=coarser * weighting.penalty, closeness=max(close * lever, tolerance))
+        closeness = self.settings.closeness(lever, tolerance)
+        weighting = replace(weighting, penalty=coarser * weighting.penalty, closeness=closeness)
         return gains_at(pose, self._coupling, weighting)
 
     def _refuse_slow(self) -> None:

@@ -40,6 +40,18 @@ class LiveSettings:
     tolerance: float | None = None
     background: bool = True
 
+    def closeness(self, lever: float, tolerance: float) -> float:
+        """Error that a deviation of a command is worth [m/rad].
+
+        Robots whose frequencies differ by a share leave errors of that share in common, which must not pay for motors
+        that leave the linear model: without this, a G1 of 14 motors deviates by 1.7 rad, and errs more than uncalmed.
+
+        Args:
+            lever: The longest of the motors [m].
+            tolerance: [m].
+        """
+        return max(max(self.CLOSE, self.uncertainty) * lever, tolerance)
+
 
 def refuse_unfit(shot: CompiledShot, settings: LiveSettings) -> None:
     """Refuse what cannot be streamed to.

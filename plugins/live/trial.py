@@ -29,7 +29,7 @@ class Trial:
 
     Args:
         prepared: The robot and the motion that is intended, on a time grid.
-        frequencies: Those of the robot, over those of the model.
+        frequencies: Those of the robot, over those of the model. Its sag, which no command removes, is its own.
     """
 
     def __init__(self, prepared: Prepared, frequencies: float = 1.0):
@@ -40,9 +40,9 @@ class Trial:
         self._model: Model = replace(prepared.model, system=stiffer)
         self.curves = sample_curves(prepared.shot.animation.current, prepared.grid)
         angles, rates = self.curves.angles, self.curves.rates
-        rigid = rigid_motion(prepared.model, angles, rates, self._grid.h, self._world, False)
+        rigid = rigid_motion(self._model, angles, rates, self._grid.h, self._world, False)
         always = np.ones(len(self._grid.times), bool)
-        intended = static_motion(prepared.model, rigid, angles, always, self._world).target_positions
+        intended = static_motion(self._model, rigid, angles, always, self._world).target_positions
         self._intended = CubicSpline(self._grid.times, intended)
 
     def left(self, angles: Array, rates: Array, delay: float | None) -> tuple[float, Array]:
@@ -51,9 +51,13 @@ class Trial:
         Args:
             angles, rates: At the instants of the grid, shape [T, M].
         """
+        return self.compared(self.played(angles, rates), delay)
+
+    def played(self, angles: Array, rates: Array) -> Array:
+        """Places of the targets at the instants of the grid, shape [T, K, 3] [m]; commands as of `left`."""
         workspace = Workspace.for_system(self._model.system)
-        found = run_forward(self._model, workspace, angles, rates, self._grid.h, self._world)
-        return self.compared(found.target_positions, delay)
+        found: Array = run_forward(self._model, workspace, angles, rates, self._grid.h, self._world).target_positions
+        return found
 
     def compared(self, positions: Array, delay: float | None) -> tuple[float, Array]:
         """How far a motion of the targets is from the intended one.

@@ -3,10 +3,10 @@
 `calmotion bench live [SHOT ...]` plays the motion of each shot, or with `--random` moves between random poses, as a
 stream at 250 Hz with several look-aheads (shares of the longest period), and simulates the whole robot with the
 commands. Errors are root mean squares over all targets against the intended motion with the sag of each pose, delayed
-by the look-ahead; those of shapers with the delay that suits each best. `frequencies` scales those of the robot that
-is simulated: what is calmed knows the robot as it should be. With `--mujoco` the robot has rigid bodies, and MuJoCo
-plays the commands. Ticks are timed in processor time of their own thread, since others may use the machine; another
-thread renews the gains.
+by the look-ahead; those of shapers and filters with the delay that suits each best, for which `best` has all errors.
+`frequencies` scales those of the robot that is simulated: what is calmed knows the robot as it should be. With
+`--mujoco` the robot has rigid bodies, and MuJoCo plays the commands. Ticks are timed in processor time of their own
+thread, since others may use the machine; another thread renews the gains.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import RunSettings, Track
-from calmotion.simulation import CompiledShot, Curves, compile_shot, modes_of, prepare, shaped
+from calmotion.simulation import CompiledShot, Curves, TimeGrid, compile_shot, modes_of, prepare, shaped
 from calmotion_plugins.live import Live, LiveSettings, Trial
 from scipy.interpolate import CubicSpline
+from scipy.signal import butter, fftconvolve, sosfilt
 
 from ..common.reporting import bench_parser, finish, keep, say
 from ..common.shots import SAMPLES, load
@@ -32,8 +33,10 @@ RATE = 250.0  # of the stream [Hz]
 SHARES = (0.1, 0.2, 0.4, 0.8)  # of the longest period, as look-ahead
 FREQUENCIES = (0.9, 1.0, 1.1)
 UNCERTAIN = 0.1  # share of the frequencies, with 0.4 of the period
+CUTOFF = 0.5  # of the low-pass filter, over the lowest frequency
 Left = tuple[float, Array]  # a delay, and distances of targets
-KINDS = ("zv", "zvd", "zv2", "zvd2")
+KINDS = ("zv", "zvd", "ei", "mzv", "zv2", "zvd2", "ei2", "mzv2")
+FILTERS = ("gaussian", "low-pass")
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,7 @@ class Row:
         frequencies: Of the simulated robot, over those of the model.
         delay_s: [s].
         rms_mm, largest_mm: Error at the targets [mm].
+        best_mm: Root mean square with the delay that suits the method best on this robot [mm].
         tick_ms, tick_99_ms: Processor time of a tick: half and 99% of them are faster [ms]; zero of shapers.
         limited_percent: Share of ticks in which the motor that is most often at a limit is.
     """
@@ -55,6 +59,7 @@ class Row:
     delay_s: float
     rms_mm: float
     largest_mm: float
+    best_mm: float
     tick_ms: float = 0.0
     tick_99_ms: float = 0.0
     limited_percent: float = 0.0
@@ -77,23 +82,23 @@ def compare(
     for factor in frequencies:
         robot = Trial(prepared, factor)
 
-        def left(angles: Array, rates: Array, delay: float | None, robot: Trial = robot) -> Left:
+        def left(angles: Array, rates: Array, delay: float | None, robot: Trial = robot) -> tuple[Left, Left]:
+            """With a delay, and with the one that suits best."""
             if mujoco:
-                played = simulate_lumped(shot.character, grid.times, angles, 5.0 * MUJOCO_STEP)
-                found: Left = robot.compared(played.target_positions, delay)
+                played = simulate_lumped(shot.character, grid.times, angles, 5.0 * MUJOCO_STEP).target_positions
             else:
-                found = robot.left(angles, rates, delay)
-            return found
+                played = robot.played(angles, rates)
+            best: Left = robot.compared(played, None)
+            return best if delay is None else robot.compared(played, delay), best
 
-        yield _row(name, "as animated", factor, left(curves.angles, curves.rates, 0.0))
-        for kind in KINDS:
-            made: Curves = shaped(curves, grid, kind, *modes)
-            yield _row(name, kind, factor, left(made.angles, made.rates, None))
+        for method in ("as animated", *KINDS, *FILTERS):
+            made: tuple[Array, Array] = _other(method, curves, grid, modes)
+            yield _row(name, method, factor, *left(*made, 0.0 if method == "as animated" else None))
         for method, angles, rates, report, ticks in streams:
-            found, limited = left(angles, rates, report["latency_s"]), report["limited"].values()
+            limited = report["limited"].values()
             share_limited = 100.0 * max(limited, default=0) / report["ticks"]
             half, most = 1e3 * np.quantile(ticks, [0.5, 0.99])
-            row = _row(name, method, factor, found)
+            row = _row(name, method, factor, *left(angles, rates, report["latency_s"]))
             yield replace(row, tick_ms=half, tick_99_ms=most, limited_percent=share_limited)
 
 
@@ -143,10 +148,29 @@ def _ticks(shot: CompiledShot, settings: LiveSettings, motion: Callable[[float],
     return np.array(found)
 
 
-def _row(shot: str, method: str, frequencies: float, left: Left) -> Row:
+def _other(method: str, curves: Curves, grid: TimeGrid, modes: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Angles and rates of a shaper, or of a filter that knows no later sample."""
+    if method == "as animated":
+        return curves.angles, curves.rates
+    if method in KINDS:
+        made: Curves = shaped(curves, grid, method, *modes)
+        return made.angles, made.rates
+    lowest, first = float(modes[0][0]), curves.angles[0]
+    if method == "low-pass":
+        sections = butter(2, CUTOFF * lowest, fs=1.0 / grid.h, output="sos")
+        angles = first + sosfilt(sections, curves.angles - first, axis=0)
+    else:
+        # as late as `live` with 0.4 of the period
+        reach = max(round(0.4 / lowest / grid.h), 1)
+        kernel = np.exp(-0.5 * (2.5 * np.arange(-reach, reach + 1) / reach) ** 2)[:, None]
+        angles = first + fftconvolve(curves.angles - first, kernel / kernel.sum(), axes=0)[: len(grid.times)]
+    return angles, np.gradient(angles, grid.h, axis=0)
+
+
+def _row(shot: str, method: str, frequencies: float, left: Left, best: Left) -> Row:
     late, distances = left
-    rms = 1e3 * float(np.sqrt(np.mean(distances**2)))
-    return Row(shot, method, frequencies, late, rms, 1e3 * float(distances.max()))
+    rms, least = (1e3 * float(np.sqrt(np.mean(found**2))) for _, found in (left, best))
+    return Row(shot, method, frequencies, late, rms, 1e3 * float(distances.max()), least)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion.multibody import WORLD, Mechanism, PoseModel, pose_model
-from calmotion_plugins.live import Weighting, gains_at
+from calmotion_plugins.live import LiveSettings, Weighting, gains_at
 from calmotion_plugins.live.gains import riccati
 
 TICK = 1.0 / 250.0
@@ -33,9 +33,8 @@ def two_hinges():
 
 def weighting(window, motors, penalty=1e-5, **changes):
     """An acceleration of 1 rad/s^2 counts as `penalty` metres."""
-    return Weighting(
-        TICK, window, np.tile([1.0] * 3 + [0.0] * 3, (1, 1)), np.full(motors, penalty / TICK), 0.0, **changes
-    )
+    targets = np.tile([1.0] * 3 + [0.0] * 3, (1, 1))
+    return Weighting(TICK, window, targets, np.full(motors, penalty / TICK), **{"closeness": 0.0, **changes})
 
 
 def moves(seconds, motors, seed=0):
@@ -54,6 +53,11 @@ def moves(seconds, motors, seed=0):
 
 def played(gains, intended, window):
     """Deviation of the targets, shape [T, rows], where so many ticks of the motion are known ahead."""
+    return states(gains, intended, window) @ gains.targets.T
+
+
+def states(gains, intended, window):
+    """Of the regulator, shape [T, X]."""
     rates = np.gradient(intended, TICK, axis=0)
     accelerations = np.diff(intended, 2, axis=0, prepend=intended[:1], append=intended[-1:]) / TICK**2
     impulses = gains.impulses(accelerations, rates, np.zeros((len(rates), len(gains.pose.shapes))), TICK)
@@ -61,7 +65,7 @@ def played(gains, intended, window):
     for k in range(len(impulses)):
         known = impulses[k : k + window]
         change = -gains.feedback @ x - np.einsum("kmi,ki->m", gains.preview[: len(known)], known)
-        found.append(gains.targets @ x)
+        found.append(x)
         x = gains.transition @ x + gains.by_change @ change + gains.by_impulse @ impulses[k]
     return np.array(found)
 
@@ -142,6 +146,28 @@ def test_half_the_longest_period_leaves_at_most_twice_what_the_whole_future_does
     for window in (len(intended), half, half // 4):
         left.append(rms(played(gains_at(pose, rest, weighting(window, 2)), intended, window)))
     assert left[0] <= left[1] <= 2.0 * left[0] < left[2]
+
+
+def test_motors_more_than_targets_need_do_not_wander_where_frequencies_are_uncertain():
+    """Four hinges for one place in a plane: what no command removes on all robots must not pay for great deviations."""
+    arm, last = Mechanism(), WORLD
+    for k in range(4):
+        link = arm.body(f"{k}", 0.8, center=(0.15, 0, 0), inertia=(0.001, 0.01, 0.01), position=(0.3 * k, 0, 0))
+        joint = arm.joint("revolute", last, link, position=(0.3 * k, 0, 0), axis=(0, -1, 0))
+        arm.motor(joint, model="drive", position_gain=300.0 - 60.0 * k, velocity_gain=0.2)
+        last = link
+    arm.target(last, position=(1.2, 0, 0))
+    pose, intended = pose_model(arm.compile(), [0.5, -0.7, -0.6, 0.9]), 0.2 * moves(8.0, 4, seed=4)
+    lever = float(np.linalg.norm(pose.targets_by_input[0, :3], axis=0).max())
+    window, deviations, left = round(0.8 * np.pi / pose.omega[0] / TICK), [], []
+    for closeness in (2e-3 * lever, LiveSettings(uncertainty=0.1).closeness(lever, 1e-3)):
+        weights = weighting(window, 4, frequencies=(0.9, 1.0, 1.1), closeness=closeness)
+        x = states(gains_at(pose, np.eye(4), weights), intended, window)
+        deviations.append(np.abs(x[:, :4]).max())
+        left.append(rms(played(gains_at(pose, np.eye(4), weights), intended, window)))
+    unshaped = rms(played(gains_at(pose, np.eye(4), weighting(1, 4, penalty=1e6)), intended, 1))
+    assert deviations[1] < 0.25 < deviations[0], deviations
+    assert left[0] <= left[1] < 0.1 * unshaped, (left, unshaped)
 
 
 def left_on_another(factor, spread=(1.0,), lookahead=0.17, seed=0):
