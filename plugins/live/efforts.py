@@ -118,11 +118,13 @@ class EffortLimits:
 
     SHARE = 0.99  # of the largest effort, that is used
     BEYOND_REST = 0.05  # the same beyond what a pose at rest needs, where that is more
+    LONGEST_S = 20.0  # that is counted as held
+    PATIENCE_S = 1.0  # for which a motor is held; then what it may exert grows by its largest effort in such a time
 
     def __init__(self, motors: Sequence[Motor], tick: float, known: bool):
         most = np.array([motor.max_torque for motor in motors], float)
         self.limited: BoolArray = np.isfinite(most) & known
-        self._most = most[self.limited]
+        self._most, self._tick = most[self.limited], tick
         chosen = [motor for motor, limited in zip(motors, self.limited, strict=True) if limited]
         servos = np.array([motor.model == SERVO and motor.position_gain > 0.0 for motor in chosen], bool)
         gains = np.array([motor.position_gain for motor in chosen])
@@ -133,16 +135,17 @@ class EffortLimits:
 
     def begin(self) -> None:
         """Rest."""
-        self._multipliers = np.zeros((1, len(self._most)))
+        self._multipliers, self._held_s = np.zeros((1, len(self._most))), np.zeros(len(self._most))
         self.needed, self.lead, self.acted = *np.zeros((2, len(self.limited))), np.zeros(len(self.limited), bool)
 
-    def pull(self, efforts: Efforts, x: Array, impulses: Array, window: Intended) -> Array:
+    def pull(self, efforts: Efforts, x: Array, impulses: Array, window: Intended, holds: bool) -> Array:
         """The part of the change of rates that keeps the efforts, shape [m]; sets `lead` for the next tick.
 
         Args:
             x: State of the regulator, shape [X].
             impulses: Of the window, shape [W, S n].
             window: What is intended.
+            holds: Whether efforts are held; else they are looked at alone.
         """
         ticks, count = len(efforts.pulls), len(self._most)
         rest = (window.with_weight[:ticks] - window.forces[:ticks]) @ efforts.by_force.T
@@ -153,14 +156,17 @@ class EffortLimits:
             efforts.after, x, impulses, self._known,
         )  # fmt: skip
         most = np.maximum(self.SHARE * self._most, np.abs(rest) + self.BEYOND_REST * self._most)
+        most += np.maximum(self._held_s / self.PATIENCE_S - 1.0, 0.0) * self._most
         held = free
         start = np.zeros((ticks, count))
-        if np.any(np.abs(free) > most):
+        if holds and np.any(np.abs(free) > most):
             kept = self._multipliers[1 : ticks + 1]
             start[: len(kept)] = kept
             start = multipliers(efforts.response, free.ravel(), most.ravel(), start.ravel()).reshape(ticks, count)
             held = free - (efforts.response @ start.ravel()).reshape(ticks, count)
         self._multipliers = start
+        held_s = self._held_s + np.where(np.any(start != 0.0, axis=0), self._tick, -self._tick)
+        self._held_s = np.clip(held_s, 0.0, self.LONGEST_S)
         self.acted[self.limited] = start[0] != 0.0
         at = min(1, ticks - 1)
         shares = np.clip(np.stack([held[at], rest[at]]) / self._most, -self.SHARE, self.SHARE)

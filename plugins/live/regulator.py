@@ -8,6 +8,7 @@ from calmotion.multibody import VelocityForces
 
 from .efforts import EffortLimits
 from .gains import Gains
+from .guard import Guard
 from .limits import EFFORT, MotorLimits
 
 
@@ -58,13 +59,17 @@ class Regulator:
         deviating: The latter, shape [m].
         limits: Of all motors.
         efforts: Their limits of effort.
+        guard: When deviations are let go of.
 
     Attributes:
         command: Of the tick, shape [M].
     """
 
-    def __init__(self, coupling: Array, deviating: IntArray, limits: MotorLimits, efforts: EffortLimits):
-        self._coupling, self._deviating, self._limits, self._efforts = coupling, deviating, limits, efforts
+    def __init__(
+        self, coupling: Array, deviating: IntArray, limits: MotorLimits, efforts: EffortLimits, guard: Guard
+    ) -> None:
+        self._coupling, self._deviating, self._limits = coupling, deviating, limits
+        self._efforts, self._guard = efforts, guard
         self._gains: Gains | None = None
 
     def begin(self, position: Array, gains: Gains) -> None:
@@ -72,10 +77,12 @@ class Regulator:
         self._gains, self._x = gains, np.zeros(len(gains.transition))
         self.command, self._speed = np.array(position, float), np.zeros(len(position))
         self._efforts.begin()
+        self._guard.begin(len(self._x))
 
     def use(self, gains: Gains) -> None:
         """Go on in the modes of another pose."""
         assert self._gains is not None
+        self._guard.use(gains, self._gains)
         self._x, self._gains = gains.state_from(self._x, self._gains), gains
 
     @property
@@ -88,10 +95,13 @@ class Regulator:
         gains, h, m, lead = self._gains, self._limits.tick, len(self._deviating), self._efforts.lead.copy()
         assert gains is not None
         impulses = gains.impulses(window.accelerations, window.rates, window.forces, h)
+        self._guard.judge(gains, self._x, impulses[0], bool(np.any(impulses) or np.any(window.rates)))
         wanted = -gains.feedback @ self._x
         wanted -= np.einsum("kmi,ki->m", gains.preview[: len(impulses)], impulses)
         if gains.efforts is not None:
-            wanted -= self._efforts.pull(gains.efforts, self._x, impulses, window)
+            wanted -= self._efforts.pull(gains.efforts, self._x, impulses, window, not self._guard.lets_go)
+        if self._guard.lets_go:
+            wanted = self._guard.glide(self._x[:m], self._x[m : 2 * m])
         intended = (window.next + self._efforts.lead - window.played - lead) / h
         asked = intended + self._coupling @ (self._x[m : 2 * m] + wanted)
         self._speed, acted = self._limits.kept(self.command, self._speed, asked)

@@ -18,6 +18,7 @@ from calmotion.simulation import CompiledShot, coupling_of, leaders, prepare
 
 from .efforts import EffortLimits
 from .gains import Gains, Weighting, gains_at
+from .guard import Guard
 from .limits import EFFORT, MotorLimits
 from .regulator import Regulator, Window
 from .renewal import Renewal
@@ -69,7 +70,8 @@ class Live:
         self._window = Window(self._window_ticks, self._limits, forces)
         self._efforts = EffortLimits(character.motors, self.tick_s, forces.known)
         self._weighting = self._weighting_of(shot)
-        self._regulator = Regulator(self._coupling, self._deviating, self._limits, self._efforts)
+        self._guard = Guard(self.tick_s, tolerance_of(character, settings.tolerance))
+        self._regulator = Regulator(self._coupling, self._deviating, self._limits, self._efforts, self._guard)
         self._renewal = Renewal(self._gains, settings.background)
         self._closed = len(self.model.system.rows) > len(self.model.system.parent)
         self._delay = max((motor.delay for motor in character.motors if motor.model != PRESCRIBED), default=0.0)
@@ -202,6 +204,7 @@ class Live:
             "limited": {self.joints[k]: count for k, count in sorted(self._counts.items())},
             "too_weak": {self.joints[k]: float(self._needed[k]) for k in np.flatnonzero(self._needed > 1.0)},
             "largest_deviation": self._largest,
+            "let_go": self._guard.count,
             "renewal_s": self._gains_s,
             "renewals": self._renewal.done,
             "renewals_failed": self._renewal.failed,
