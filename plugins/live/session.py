@@ -16,12 +16,12 @@ from calmotion.model import PRESCRIBED, RunSettings, tolerance_of
 from calmotion.multibody import SimulationFailure, State, VelocityForces, pose_model
 from calmotion.simulation import CompiledShot, coupling_of, leaders, prepare
 
-from .efforts import EffortLimits
-from .gains import Gains, Weighting, gains_at
-from .guard import Guard
-from .limits import EFFORT, MotorLimits
-from .regulator import Regulator, Window
-from .renewal import Renewal
+from .regulation.efforts import EffortLimits
+from .regulation.gains import Gains, Weighting, gains_at
+from .regulation.guard import Guard
+from .regulation.limits import EFFORT, MotorLimits
+from .regulation.regulator import Regulator, Window
+from .regulation.renewal import Renewal
 from .settings import LiveSettings, notes_of, refuse_unfit
 from .stream import Stream
 

@@ -7,7 +7,7 @@ from collections import Counter, deque
 import numpy as np
 from calmotion.arrays import Array
 
-from .limits import MotorLimits, braking_speed
+from .regulation.limits import MotorLimits, braking_speed
 
 LATE, REPEATED, DISORDERED, NOT_FINITE = "late", "repeated", "disordered", "not finite"
 JUMP, RESTARTED, REPLACED = "jump", "restarted", "replaced"

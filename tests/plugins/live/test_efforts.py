@@ -12,7 +12,7 @@ from calmotion.simulation import Curves, compile_shot, rigid_motion, run_forward
 from calmotion.simulation.forward import PerformedCurves
 from calmotion.testing import small_shot
 from calmotion_plugins.live import Live, LiveSettings, Weighting, gains_at
-from calmotion_plugins.live.efforts import Efforts, efforts_ahead, multipliers
+from calmotion_plugins.live.regulation.efforts import Efforts, efforts_ahead, multipliers
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calmotion.multibody import WORLD, Mechanism, PoseModel, pose_model
 from calmotion_plugins.live import LiveSettings, Weighting, gains_at
-from calmotion_plugins.live.gains import riccati
+from calmotion_plugins.live.regulation.gains import riccati
 
 TICK = 1.0 / 250.0
 

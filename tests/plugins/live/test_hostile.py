@@ -8,8 +8,8 @@ from calmotion.model import RunSettings
 from calmotion.simulation import modes_of, prepare
 from calmotion.workflow import Shot
 from calmotion_plugins.live import Live, LiveSettings
-from calmotion_plugins.live.guard import Guard
 from calmotion_plugins.live.opening import compiled
+from calmotion_plugins.live.regulation.guard import Guard
 
 RATE = 250.0
 LONG = (("lamp", 3600.0), ("bartender", 3600.0))

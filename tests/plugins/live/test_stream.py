@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion_plugins.live import Stream
-from calmotion_plugins.live.limits import MotorLimits
+from calmotion_plugins.live.regulation.limits import MotorLimits
 
 TICK = 0.004
 
