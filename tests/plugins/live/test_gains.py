@@ -101,20 +101,23 @@ def test_commands_with_all_of_the_future_known_are_the_least_squares_solution(po
     np.testing.assert_allclose(found, best, atol=1e-5 * np.abs(best).max())
 
 
-def test_a_third_of_a_period_of_look_ahead_is_worth_nearly_all():
-    """Section 12: of a mode of 3 Hz 9.3, 2.4, 0.44, 0.06 mm are left with 0.05, 0.08, 0.12, 0.17 s; unshaped 289 mm."""
-    intended = moves(20.0, 1)
-    left = {}
-    for seconds in (0.05, 0.08, 0.12, 0.17):
-        window = round(seconds / TICK)
-        left[seconds] = rms(played(gains_at(hinge(), np.eye(1), weighting(window, 1)), intended, window))
-    unshaped = rms(played(gains_at(hinge(), np.eye(1), weighting(1, 1, penalty=1e6)), intended, 1))
-    shares = np.array([left[seconds] / unshaped for seconds in left])
-    published = np.array([9.3, 2.4, 0.44, 0.06]) / 289.0
-    assert np.all(np.diff(shares) < 0.0)
-    # other random moves than those of the page
-    assert np.all(shares < 1.5 * published), shares / published
-    assert shares[2] < 2e-3
+def test_what_look_ahead_is_worth_falls_as_published():
+    """Section 12: of a mode of 3 Hz 9.3, 2.4, 0.44, 0.06 mm are left with 0.05, 0.08, 0.12, 0.17 s; unshaped 289 mm.
+
+    How large an error is belongs to the page's own random moves; how it falls belongs to the hinge: the tip moves
+    backwards first with the zero z of (1 - c) s^2 + 2 D w s + w^2, and all but exp(-z t) is gone after a look-ahead t.
+    """
+    seconds, published = np.array([0.05, 0.08, 0.12, 0.17]), np.array([9.3, 2.4, 0.44, 0.06])
+    zero = np.roots([1.0 - 1.2, 2.0 * 0.01 * 6.0 * np.pi, (6.0 * np.pi) ** 2]).max()
+    for seed in range(3):
+        intended, left = moves(20.0, 1, seed), []
+        for window in np.round(seconds / TICK).astype(int):
+            left.append(rms(played(gains_at(hinge(), np.eye(1), weighting(window, 1, penalty=1e-6)), intended, window)))
+        unshaped = rms(played(gains_at(hinge(), np.eye(1), weighting(1, 1, penalty=1e6)), intended, 1))
+        falls = np.array(left[1:]) / left[:-1]
+        np.testing.assert_allclose(falls, published[1:] / published[:-1], rtol=0.1)
+        np.testing.assert_allclose(falls, np.exp(-zero * np.diff(np.round(seconds / TICK) * TICK)), rtol=0.1)
+        assert np.all(np.array(left) / unshaped < published / 289.0)
 
 
 def test_gains_for_several_robots_leave_less_on_one_that_is_slower():

@@ -37,7 +37,7 @@ def test_zvd_forgives_an_error_of_the_frequency_that_zv_does_not():
 
 
 def residual(kind, frequencies):
-    """Vibration that a shaper of an undamped mode of 1 Hz leaves on modes of other frequencies, over that without it."""
+    """Vibration of modes of other frequencies after a shaper for an undamped one of 1 Hz, over that without."""
     times, amplitudes = impulses(kind, np.ones(1), np.zeros(1))
     return abs(np.exp(2j * np.pi * np.outer(frequencies, times)) @ amplitudes)
 

@@ -22,7 +22,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--shaper",
         metavar="KIND",
-        help="for comparison, filter the motor curves: zv, zvd, ei or mzv (input shapers, with a 2 behind it for two modes) or lowpass",
+        help="for comparison, filter the motor curves: zv, zvd, ei or mzv (input shapers; zv2, ... for two modes), "
+        "or lowpass",
     )
     run_options(command)
     simulation_options(
