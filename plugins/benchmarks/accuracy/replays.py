@@ -55,5 +55,6 @@ def replayed(fitted: str, name: str, robot: CompiledShot, share: float, beam: Fi
     def largest(hub: Array) -> float:
         return 1e3 * float(np.abs(beam.strip.end(times, hub, beam.damping) - aim).max())
 
-    before, after = (1e3 * float(run.position_errors[rows].max()) for run in (result.before, result.after))
+    own = [k for k, target in enumerate(robot.character.targets) if target.position_weight > 0.0]  # others measure
+    before, after = (1e3 * float(run.position_errors[rows][:, own].max()) for run in (result.before, result.after))
     return Replayed(fitted, name, largest(intended), largest(calm), after + share * before)

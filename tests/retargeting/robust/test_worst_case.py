@@ -9,7 +9,7 @@ from calmotion.model import WeightTrack
 from calmotion.model.run import RunSettings
 from calmotion.model.uncertainty import RobustSettings, Scenario
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.retargeting.robust import retarget
+from calmotion.retargeting.robust import retarget, worst_case
 from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.robots import farthest
 from calmotion.retargeting.robust.scenarios import uncertain_parameters
@@ -153,3 +153,18 @@ def test_the_play_of_gears_counts(arm, started):
     found = searched((shot, *started[1:]), ALLOWED, dataclasses.replace(OPTIONS, avoid_reversals=1e-3))
     assert largest(started, found.tracks)[0] <= ALLOWED
     assert largest(started, found.tracks)[1] < largest(started, started[1])[1]
+
+
+def test_a_robot_without_derivatives_where_the_search_begins_is_left_out(started, monkeypatch):
+    posed, lost = worst_case._posed, started[2][1]
+
+    def with_smaller_steps(shot, options, tracks, scenarios):
+        at, fixed = posed(shot, options, tracks, scenarios)
+        for scenario, run in zip(scenarios, at.runs, strict=True):
+            if scenario is lost:
+                object.__setattr__(run.run.trajectory, "refined", (3,))
+        return at, fixed
+
+    monkeypatch.setattr(worst_case, "_posed", with_smaller_steps)
+    found = searched(started, ALLOWED)
+    assert [one.factors for one in found.scenarios] == [started[2][0].factors, started[2][2].factors]

@@ -94,11 +94,12 @@ class RetargetProblem:
         return Evaluation(self, x.copy(), tuple(runs))
 
     def tried(self, x: Array, near: Evaluation | None = None) -> Evaluation | None:
-        """As `at`; None where the curves cannot be simulated."""
+        """As `at`; None where the curves cannot be simulated, or only with smaller steps, which have no derivatives."""
         try:
-            return self.at(x, near)
+            found = self.at(x, near)
         except SimulationFailure:
             return None
+        return None if any(run.is_refined for run in found.runs) else found
 
     def for_robots(self, robots: Sequence[Robot]) -> RetargetProblem:
         """The same problem for several robots that perform the same curves, the nominal one first: the sum of their

@@ -79,6 +79,11 @@ class RobotRun:
     run: ForwardRun
     _linear: dict[int, LinearRobot] = field(default_factory=dict)  # the last one that was worked out, by its instant
 
+    @property
+    def is_refined(self) -> bool:
+        """Whether steps had to be divided, so that there are no derivatives."""
+        return bool(self.run.trajectory.refined)
+
     @cached_property
     def parts(self) -> tuple[Array, ...]:
         """Weighted errors, shape [T, 6 K], and further residuals."""

@@ -42,7 +42,7 @@ def farthest(
     shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], parameters: Sequence[Parameter], count: int,
     above: float = 0.0,
 ) -> tuple[Scenario, ...]:  # fmt: skip
-    """Random robots with the largest errors, which are not alike.
+    """Random robots with the largest errors, which are not alike, and perform the animation as well.
 
     Args:
         tracks: Curves.
@@ -58,7 +58,9 @@ def farthest(
         near = (np.linalg.norm(points[k] - points[j]) <= ALIKE * np.linalg.norm(points[j]) for j in picked)
         if len(picked) < count and found[k] > above and not any(near):
             picked.append(int(k))
-    return tuple(tried[k] for k in picked)
+    taken = [tried[k] for k in picked]
+    animated = errors_on(shot, options, {"": shot.animation.tracks}, taken)[""]
+    return tuple(one for one, off in zip(taken, animated, strict=True) if np.isfinite(off).all())
 
 
 def robots_of(

@@ -74,7 +74,7 @@ def least_maximum(
         shot: The shot as animated.
         options: Of the search, with its time step.
         tracks: Where it begins.
-        scenarios: The robots, the nominal one first.
+        scenarios: The robots, the nominal one first; those that have no derivatives where it begins are left out.
         allowed: Error that a target may have on the nominal robot [m], and its rotation as it weighs beside the
             position; where it begins with more, as much.
         progress: Called with a fraction and a message.
@@ -83,6 +83,9 @@ def least_maximum(
         SimulationFailure: A robot cannot be simulated.
     """
     own, (start, fixed) = LeastMaximum, _posed(shot, options, tracks, scenarios)
+    smooth = [one for k, one in enumerate(scenarios) if k == 0 or not start.runs[k].is_refined]
+    if len(smooth) < len(scenarios):
+        scenarios, (start, fixed) = smooth, _posed(shot, options, tracks, smooth)
     bound = bound_of(start, allowed)
     search, orders = Search.start(start.x, start), list(own.ORDERS)
     damping = whole = 0.0
