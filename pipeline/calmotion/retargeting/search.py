@@ -104,6 +104,8 @@ class RetargetSearch:
             self.took_over, self.search = begun is not self.search, begun
         resumed = self._resume()
         fixed = self.hold()
+        if last is not None and not resumed:
+            self._begin_within_limits(fixed)
         try:
             if not resumed and (not np.any(start) or self.animation.current is self.animation.tracks):
                 self.search = damping_homotopy(self.problem.at(start, self.input), fixed, self.frequency)
@@ -117,6 +119,14 @@ class RetargetSearch:
             interrupts.answer()
             self.interrupted = True
             self.progress(0.95, "interrupted: writing the best so far")
+
+    def _begin_within_limits(self, fixed: BoolArray) -> None:
+        """Begin with the limits that the start exceeds: another search has found that it is a minimum without them."""
+        at = self.problem.at(self.search.x, self.input)
+        tightened = None if at.limits_act else at.tightened()
+        if tightened is not None:
+            self.problem, x = onto_limits(tightened, fixed)
+            self.search = replace(self.search, x=x, at=at.of(self.problem))
 
     def record(self) -> SearchRecord:
         """The work so far, with the simulations of the input and of the result."""
@@ -145,7 +155,7 @@ class RetargetSearch:
         """Curves stay as they are before an instant."""
         if first < self.problem.first:
             # responses from a later instant on say nothing of the coefficients that are free from now on
-            self.search = replace(self.search, sharpened=None)
+            self.search = replace(self.search, sharpened=None, responses=None)
         self.problem = replace(self.problem, first=first)
 
     def locked_on(self, basis: OffsetBasis) -> BoolArray:

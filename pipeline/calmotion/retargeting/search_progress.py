@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -87,17 +88,21 @@ class SearchMemory:
         breaks, motors: Of its unknowns.
         recycled: Directions of its linear systems.
         sharpened: Preconditioner by the responses of the flexible robot, with their point; None where it had none.
+        responses: Derivatives under limits; None where it had none.
     """
 
     breaks: IntArray
     motors: IntArray
     recycled: Recycled
     sharpened: Sharpened | None
+    responses: Any
 
     @classmethod
     def of(cls, problem: RetargetProblem, search: Search) -> SearchMemory:
         """What the search of a problem leaves."""
-        return cls(problem.space.basis.breaks, problem.space.motors, search.recycled, search.sharpened)
+        return cls(
+            problem.space.basis.breaks, problem.space.motors, search.recycled, search.sharpened, search.responses
+        )
 
     def begun(self, problem: RetargetProblem, search: Search) -> Search:
         """A search that has not begun, with what fits its problem."""
@@ -106,4 +111,4 @@ class SearchMemory:
             return search
         if self.recycled.p.shape[1] != len(search.x):
             return search
-        return replace(search, recycled=self.recycled, sharpened=self.sharpened)
+        return replace(search, recycled=self.recycled, sharpened=self.sharpened, responses=self.responses)

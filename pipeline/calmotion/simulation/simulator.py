@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from calmotion.arrays import Array, IntArray
@@ -98,26 +100,33 @@ class LinearRun:
         return self._monodromy is None and can_be_blocked(self.linearization)
 
     def responses(
-        self, values: Array, rates: Array, begin: int, coupling: Array, component: IntArray, jacobian: Array
-    ) -> tuple[int, Array]:
-        """Changes of quantities by many curves at once.
+        self, values: Array, rates: Array, begin: int, coupling: Array, component: IntArray, jacobian: Array,
+        motors: Sequence[int] = (),
+    ) -> tuple[int, Array]:  # fmt: skip
+        """Changes of quantities and of efforts by many curves at once.
 
         Args:
             values, rates: Curves over n instants, before which they are zero, shape [n, F].
             begin: The first of these instants; from 1 on the curves are still zero there.
             coupling: Of each motor with each of m unknowns, shape [M, m]: each curve is tried with each of these.
             component, jacobian: The quantities, as of `block_tangent`.
+            motors: Whose efforts are wanted, shape [e].
 
         Returns:
             The first instant at which anything changes, and the changes from there to the last of these instants, shape
-            [begin + n - first, r, F m].
+            [begin + n - first, r + e, F m].
         """
         columns = [self._joint_columns(*curve, coupling) for curve in zip(values.T, rates.T, strict=True)]
         angles, speeds = (np.concatenate([column[k] for column in columns], axis=2) for k in (0, 1))
         acts = np.any(angles, axis=(1, 2)) | np.any(speeds, axis=(1, 2))
         first = max(self.linearization.windows()[0][0], begin + int(np.argmax(acts)))
         given = angles[first - begin :], speeds[first - begin :]
-        return first, block_tangent(self.linearization, first, *given, component, jacobian)
+        joints = np.flatnonzero(np.isin(self.model.motor, motors)).astype(np.int32)
+        found = block_tangent(self.linearization, first, *given, component, jacobian, joints)
+        if not len(joints):
+            return first, found
+        by_joint = self.model.motor_values(np.eye(len(self.model.motor))[joints]).T[list(motors)]
+        return first, np.concatenate([found[:, : len(component)], by_joint @ found[:, len(component) :]], axis=1)
 
     def _joint_columns(self, values: Array, rates: Array, coupling: Array) -> tuple[Array, Array]:
         """What the joints follow by one curve of shape [n] with each unknown, shape [n, J, m]."""

@@ -21,11 +21,15 @@ def test_each_direction_is_that_of_a_single_sweep(name):
     component = np.array([0, 3, 3], np.int32)
     jacobian = rng.normal(size=(len(TIMES), 3, case.system.size))
     first = int(np.argmax(TIMES > 0.1))
+    joints = np.arange(len(case.system.rows), dtype=np.int32)
     for chosen, begin in ((directions, 0), (late, first)):
         d_angle, d_rate = (np.stack([d[k][begin:] for d in chosen], axis=2) for k in (0, 1))
-        found = block_tangent(lin, begin, d_angle, d_rate, component, jacobian)
+        found = block_tangent(lin, begin, d_angle, d_rate, component, jacobian, joints)
+        found, efforts = found[:, :3], found[:, 3:]
         for q, direction in enumerate(chosen):
-            moved = tangent(lin, *direction)[0][:, component]
+            moved, transmitted = tangent(lin, *direction, efforts=True)
+            assert np.abs(efforts[..., q] - transmitted[begin:]).max() <= 1e-9 * np.abs(transmitted).max()
+            moved = moved[:, component]
             expected = np.einsum("nra,nra->nr", jacobian, moved)[begin:]
             assert np.abs(found[..., q] - expected).max() < 1e-12 * np.abs(jacobian * moved).sum(axis=2).max()
 

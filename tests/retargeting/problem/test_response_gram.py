@@ -33,7 +33,7 @@ def test_its_columns_are_the_products_of_the_residuals_part(problem):
 
 def test_dense_responses_are_the_products_of_single_directions(problem):
     instants = np.arange(3, len(problem.residuals), 7, dtype=np.int32)
-    dense = dense_responses(problem.sweeps.robots[0], problem.space, instants)
+    dense, _ = dense_responses(problem.sweeps.robots[0], problem.space, instants)
     d = np.random.default_rng(2).normal(size=problem.space.size)
     expected, _ = problem.jvp(d)
     found = (dense @ d).reshape(len(instants), -1)

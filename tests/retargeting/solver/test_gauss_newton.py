@@ -68,6 +68,9 @@ class Linear:
         self.problem.products = getattr(self.problem, "products", 0) + 1
         return self.J.T @ (self.J @ direction)
 
+    def by_responses(self, known=None):
+        return None
+
     def patience(self, sharpened):
         known = sharpened is not None and np.array_equal(sharpened.point, self.x)
         return None if known else getattr(self.problem, "pays_from", None)

@@ -19,10 +19,12 @@ from calmotion.multibody.linear_solver.step_matrix import StepMatrix, matrix_at
 from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.multibody.sensitivity.linearization import Linearization
 from calmotion.multibody.sensitivity.linearized_steps import LinearizedSteps
-from calmotion.multibody.sensitivity.sweep import SweepScratch, Window, allocate_sweep, parts_of
+from calmotion.multibody.sensitivity.sweep import SweepScratch, Window, allocate_sweep, effort_tangent, parts_of
 from calmotion.multibody.statics.regularized_statics import solve_statics
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import inlined_kernel, kernel
+
+_NONE = np.zeros(0, np.int32)
 
 
 @by_reference
@@ -158,6 +160,9 @@ def _solve_statics(system: System, matrix: StepMatrix, scratch: BlockScratch) ->
         for b in range(x.shape[0]):
             for i in range(6 + system.elastic[b]):
                 scratch.x[b, i, q] = x[b, i]
+        for j in range(lam.shape[0]):
+            for i in range(JOINT_ROWS):
+                scratch.lam[j, i, q] = lam[j, i]
 
 
 @inlined_kernel
@@ -208,10 +213,23 @@ def _remember(system: System, window: Window, n: int, scratch: BlockScratch) -> 
                 add(J[i, k], tmp[k], dth[b, i])
 
 
+@inlined_kernel
+def _effort(system: System, window: Window, n: int, joint: int, Jp: Array, scratch: BlockScratch, out: Array) -> None:
+    """Changes of what a joint transmits, shape [Q]."""
+    parent, single = system.side[joint, 0], scratch.single
+    for q in range(out.shape[0]):
+        for i in range(JOINT_ROWS):
+            single.lam[joint, i] = scratch.lam[joint, i, q]
+        if parent >= 0:
+            for a in range(6 + system.elastic[parent]):
+                single.x[parent, a] = scratch.x[parent, a, q]
+        out[q] = effort_tangent(system, joint, window.axes[n], window.lam[n], Jp, single.x, single.lam)
+
+
 @kernel
 def _block_tangent(
     system: System, window: Window, first: int, d_angle: Array, d_rate: Array, component: IntArray, jacobian: Array,
-    scratch: BlockScratch, out: Array,
+    joints: IntArray, scratch: BlockScratch, out: Array,
 ) -> None:  # fmt: skip
     """The instants of a window from `first` on; arguments as of `block_tangent`."""
     for n in range(max(first, window.first), window.last):
@@ -235,6 +253,8 @@ def _block_tangent(
             for a in range(6 + system.elastic[b]):
                 if jacobian[n, row, a] != 0.0:
                     add(jacobian[n, row, a], scratch.x[b, a], read)
+        for k in range(len(joints)):
+            _effort(system, window, n, joints[k], matrix.Jp, scratch, out[n - first, len(component) + k])
 
 
 def can_be_blocked(lin: Linearization) -> bool:
@@ -243,9 +263,11 @@ def can_be_blocked(lin: Linearization) -> bool:
 
 
 def block_tangent(
-    lin: Linearization, first: int, d_angle: Array, d_rate: Array, component: IntArray, jacobian: Array
-) -> Array:
-    """Changes of quantities that depend on the components' coordinates, along many changes of the joint angles.
+    lin: Linearization, first: int, d_angle: Array, d_rate: Array, component: IntArray, jacobian: Array,
+    joints: IntArray = _NONE,
+) -> Array:  # fmt: skip
+    """Changes of quantities that depend on the components' coordinates, along many changes of the joint angles, and of
+    what joints transmit.
 
     Args:
         lin: See `can_be_blocked`.
@@ -254,19 +276,20 @@ def block_tangent(
             that one on, shape [n, J, Q].
         component: On whose coordinates each quantity depends, shape [r].
         jacobian: Derivatives of the quantities by (R^T c, phi, u) of their component, shape [T, r, N].
+        joints: Whose efforts (`reactions.transmitted`) are wanted as well, shape [e].
 
     Returns:
-        Shape [n, r, Q].
+        Shape [n, r + e, Q].
     """
     system, count = lin.system, d_angle.shape[2]
-    bodies, size, joints = len(system.parent), system.size, len(system.rows)
+    bodies, size = len(system.parent), system.size
     scratch = BlockScratch(
         dX=np.zeros((3, bodies, size, count)),
         shift=np.zeros((3, bodies, 3, count)),
         velocity=np.zeros((3, bodies, size, count)),
         turn=np.zeros((3, bodies, 3, count)),
         x=np.zeros((bodies, size, count)),
-        lam=np.zeros((joints, JOINT_ROWS, count)),
+        lam=np.zeros((len(system.rows), JOINT_ROWS, count)),
         hV=np.zeros((bodies, size, count)),
         hA=np.zeros((bodies, size, count)),
         tmp=np.zeros((6, count)),
@@ -274,9 +297,9 @@ def block_tangent(
         solution=allocate_block_solution(system, count),
         single=allocate_sweep(system),
     )
-    out = np.empty((len(d_angle), len(component), count))
+    out = np.empty((len(d_angle), len(component) + len(joints), count))
     end = first + len(d_angle)
-    for held, window in parts_of(lin, *lin.windows()[0], False):
+    for held, window in parts_of(lin, *lin.windows()[0], len(joints) > 0):
         window = window._replace(last=min(window.last, end))
-        _block_tangent(held, window, first, d_angle, d_rate, component, jacobian, scratch, out)
+        _block_tangent(held, window, first, d_angle, d_rate, component, jacobian, joints, scratch, out)
     return out

@@ -135,6 +135,12 @@ class LimitTerms:
         """Whether a limit of a motor acts at any instant, at values of shape [T, M]."""
         return bool(np.any(self.curvature(quantity, v)[:, motor] > 0.0))
 
+    def bounded(self, quantity: str) -> tuple[int, ...]:
+        """Motors of which a quantity has limits."""
+        if (bound := self.bounds.get(quantity)) is None:
+            return ()
+        return tuple(np.flatnonzero(np.isfinite(bound.lower) | np.isfinite(bound.upper)).tolist())
+
     def kept(self, values: dict[str, Array]) -> bool:
         """Whether all limits are kept."""
         return self.excess(values) <= MARGIN

@@ -15,8 +15,9 @@ from calmotion.retargeting.problem.offset_space import DampedRegulariser, Offset
 from calmotion.retargeting.problem.response_gram import response_preconditioner
 from calmotion.retargeting.problem.responses import Responses
 from calmotion.retargeting.problem.rigid_robot import RigidRobot
-from calmotion.retargeting.problem.robot import of_robot
+from calmotion.retargeting.problem.robot import EFFORT, of_robot
 from calmotion.retargeting.problem.sweeps import Sweeps
+from calmotion.retargeting.solver.dense_preconditioner import DensePreconditioner
 from calmotion.retargeting.solver.few_rows import with_rows
 from calmotion.retargeting.solver.norm import Norm, SumOfSquares
 from calmotion.retargeting.solver.preconditioner import Preconditioner, RigidPreconditioner, Sharpened
@@ -37,6 +38,7 @@ class LinearProblem:
         limited: Values of their quantities there.
         continuous: Whether the gradient is that of the continuous adjoint.
         damping: Of steps, see `offset_space.DampedRegulariser`.
+        pull: What the gradient has beside that by the sweeps, shape [n]: of responses at another point.
     """
 
     space: OffsetSpace
@@ -49,6 +51,7 @@ class LinearProblem:
     limited: dict[str, Array]
     continuous: bool = False
     damping: float = 0.0
+    pull: Array | float = 0.0
     _stiff: dict[Place, Array] = field(default_factory=dict)  # rows that were worked out
 
     def over(self, space: OffsetSpace, x: Array, rigid: RigidRobot | None = None) -> LinearProblem:
@@ -73,7 +76,7 @@ class LinearProblem:
             pulled = self.sweeps.continuous_adjoint(pulls)
         else:
             pulled = self.sweeps.vjp(self.norm.gradient(self.residuals), pulls)
-        return pulled + self.space.penalty_gradient(self.x)
+        return pulled + self.space.penalty_gradient(self.x) + self.pull
 
     def jvp(self, direction: Array) -> tuple[Array, dict[str, Array]]:
         """Change of the weighted residuals along a direction, shape [S T, R], and of limited quantities."""
@@ -106,8 +109,32 @@ class LinearProblem:
         limits, values = limits or self.limits, values or self.limited
         weights = {} if limits is None else limits.curvatures(values)
         own = sharpened or self._preconditioner
-        own.factor(fixed, self._terms({name: w for name, w in weights.items() if np.any(w)}))
+        acting = {name: w for name, w in weights.items() if np.any(w)}
+        if isinstance(self.sweeps, Responses) and isinstance(own, DensePreconditioner):
+            curves = {name: w for name, w in acting.items() if name in self.space.splines}
+            own.factor(fixed, self._terms(curves), self.sweeps.roots(acting))
+            return own.solve
+        own.factor(fixed, self._terms(acting))
         return self._with_stiff_rows(own.solve, weights, limits, values, fixed)
+
+    def by_responses(self, known: Responses | None = None) -> LinearProblem | None:
+        """The same problem by the responses to all unknowns, with the gradient of the sweeps; None where there are
+        none.
+
+        Args:
+            known: Of another point, which are taken where they fit.
+        """
+        if isinstance(self.sweeps, Responses):
+            return self
+        robots = self.sweeps.robots
+        motors = () if self.limits is None else self.limits.bounded(EFFORT)
+        if known is None or not known.fits(robots, self.space, motors):
+            if not Responses.can_be(robots, self.space, motors):
+                return None
+            known = Responses(robots, self.space, motors)
+        exact = replace(self, continuous=False) if self.continuous else self
+        model = replace(exact, sweeps=known, _stiff={})
+        return replace(model, pull=exact.gradient - model.gradient)
 
     def patience(self, sharpened: Sharpened | None) -> int | None:
         """Number of products of one system from which `sharpened` pays; None where it is of no use here."""

@@ -20,7 +20,6 @@ from calmotion.retargeting.problem.limits import FIRST_PENALTY, LimitTerms
 from calmotion.retargeting.problem.linear_problem import LinearProblem
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
-from calmotion.retargeting.problem.responses import Responses
 from calmotion.retargeting.problem.rigid_robot import RigidRobot
 from calmotion.retargeting.problem.robot import EFFORT, Robot, RobotRun, of_robot
 from calmotion.retargeting.problem.sweeps import Sweeps
@@ -267,13 +266,11 @@ class Evaluation:
         """
         problem = self.problem
         robots = in_parallel(lambda run: run.linearized(problem.first), self.runs)
-        sweeps = Sweeps(robots, problem.space)
-        if problem.by_responses and Responses.can_be(robots, problem.space):
-            sweeps = Responses(robots, problem.space, problem.rigid.response.inertia)
-        return LinearProblem(
-            problem.space, problem.norm, problem.rigid, sweeps, self.x, self.residuals, self.acting,
-            self.limited if self.limits_act else {}, problem.continuous, problem.damping,
+        linear = LinearProblem(
+            problem.space, problem.norm, problem.rigid, Sweeps(robots, problem.space), self.x, self.residuals,
+            self.acting, self.limited if self.limits_act else {}, problem.continuous, problem.damping,
         )  # fmt: skip
+        return (linear.by_responses() or linear) if problem.by_responses else linear
 
 
 def with_first_penalty(at: Evaluation, tolerance: float) -> Evaluation:

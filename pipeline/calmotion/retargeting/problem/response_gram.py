@@ -86,16 +86,22 @@ def response_gram(robots: Sequence[LinearRobot], space: OffsetSpace) -> Array:
     return gram
 
 
-def dense_responses(robot: LinearRobot, space: OffsetSpace, instants: IntArray) -> NDArray[np.float32]:
-    """Changes of the weighted residuals by the unknowns at some instants, shape [t, K, 6, n]."""
+def dense_responses(
+    robot: LinearRobot, space: OffsetSpace, instants: IntArray, motors: Sequence[int] = ()
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Changes by the unknowns of the weighted residuals at some instants, shape [t, K, 6, n], and of the efforts of
+    some motors at all instants, shape [T, e, n]."""
     places = _varying(robot)
+    count = np.count_nonzero(places)
     changes = np.zeros((len(instants), *places.shape, space.size), np.float32)
-    for part in _responses(robot, space):
+    efforts = np.zeros((len(robot.at.errors), len(motors), space.size), np.float32)
+    for part in _responses(robot, space, motors):
         after = np.flatnonzero(instants >= part.first)
         begun = np.zeros((len(after), *places.shape, part.changes.shape[2]), np.float32)
-        begun[:, places] = part.changes[instants[after] - part.first]
+        begun[:, places] = part.changes[instants[after] - part.first, :count]
         changes[after[:, None], :, :, np.arange(part.unknowns.start, part.unknowns.stop)] = np.moveaxis(begun, 3, 1)
-    return changes
+        efforts[part.first :, :, part.unknowns] = part.changes[:, count:]
+    return changes, efforts
 
 
 def response_bands(robots: Sequence[LinearRobot], space: OffsetSpace, lasting: int | None = None) -> Array:
@@ -167,20 +173,20 @@ class _Responses:
         return part.reshape(-1, self.changes.shape[2]).astype(float)
 
 
-def _responses(robot: LinearRobot, space: OffsetSpace) -> list[_Responses]:
-    """The responses to all unknowns, in blocks."""
+def _responses(robot: LinearRobot, space: OffsetSpace, efforts: Sequence[int] = ()) -> list[_Responses]:
+    """The responses to all unknowns, in blocks; with those of the efforts of some motors."""
     component, jacobian = _rows(robot)
     motors, basis = len(space.motors), space.basis
     values, rates = basis.values.tocsc(), basis.rates.tocsc()
     step = _step(space)
     # of zeros that nobody writes, before the first instant of a block, the system holds no memory: half of all
-    rows = jacobian.shape[:2]
+    rows = len(jacobian), len(component) + len(efforts)
     held = np.zeros((-(-basis.count // step), rows[0] * rows[1] * step * motors), np.float32)
 
     def made(k: int) -> _Responses:
         start, stop = k * step, min((k + 1) * step, basis.count)
         curves = values[:, start:stop].toarray(), rates[:, start:stop].toarray()
-        first, found = robot.linear.responses(*curves, 0, space.coupling, component, jacobian)
+        first, found = robot.linear.responses(*curves, 0, space.coupling, component, jacobian, efforts)
         changes = held[k, : rows[0] * rows[1] * found.shape[2]].reshape(*rows, -1)[first:]
         changes[:] = found
         return _Responses(slice(start * motors, stop * motors), first, changes)

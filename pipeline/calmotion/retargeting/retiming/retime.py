@@ -1,7 +1,7 @@
 """Offsets and tempo together.
 
 A search finds the offsets that calm the robot at the tempo of its rigid robot, without the limits that a tempo keeps.
-The tempo follows anew with room for what the offsets add, and these are moved to it, until the curves keep the limits.
+Where its curves exceed them, further searches begin from these and keep them.
 """
 
 from __future__ import annotations
@@ -12,12 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from calmotion.arrays import Array
-from calmotion.errors import ShotError
-from calmotion.model import Result, Track
-from calmotion.model.curves import Sample, commanded_curves, retimed, with_contacts_at
+from calmotion.model import Character, Result
+from calmotion.model.curves import commanded_curves, retimed, with_contacts_at
 from calmotion.model.limits.use import LimitUse
 from calmotion.model.result import Retimed
 from calmotion.model.run import RunSettings
@@ -29,7 +27,7 @@ from calmotion.retargeting.retiming.settings import refuse_tempo
 from calmotion.retargeting.retiming.tempo import FoundTempo, TempoInput, find_tempo
 from calmotion.retargeting.to_tolerance import continued, optimize_to_tolerance
 from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.simulation.inputs.tempo import TEMPO_LIMITS, MotorEfforts, TempoLimits
+from calmotion.simulation.inputs.tempo import TEMPO_LIMITS
 from calmotion.simulation.simulate import Progress, simulate_shot
 from calmotion.tolerance.motors.animation_limits import tempo_limits
 from calmotion.tolerance.pod_subspace import ReferenceRun
@@ -42,7 +40,7 @@ ROUNDS = 3  # searches at most that leave limits to the tempo
 LIMITED_SEARCHES = 4  # at most that keep all limits by themselves
 KEPT, BETWEEN = 1e-6, 5e-4  # shares of a limit by which it counts as kept: by a tempo, and between a search's instants
 ROOM = 5e-3  # share of a limit by which the tempo stays further within it once offsets are known
-MOST_ROOM = 0.05  # share of a limit, beyond which a search that keeps it is better than more room
+MOST_ROOM = 0.0  # share of a limit, beyond which a search that keeps it is better than more room
 FINE = 32  # instants of a frame at which curves are compared with their limits
 
 
@@ -65,30 +63,11 @@ def optimize_with_tempo(
     if found.map is None:
         result = optimize_to_tolerance(shot, replace(options, retime=None), progress, checkpoint, known, memory)
         return replace(result, retimed=Retimed(shot.animation, shot.character, found.report))
-    searches = _Searches(options, progress, checkpoint)
-    performance, limits = _Performance.of(shot, given, found), given.limits
+    searches, performance = _Searches(options, progress, checkpoint), _Performance.of(shot, given, found)
     kept = False
-    for _ in range(ROUNDS):
-        if found.excess > NOTICED:  # where nothing may be slower, a search has to keep the limits
-            break
+    if found.excess <= NOTICED:  # where nothing may be slower, limits are no longer left to the tempo
         done = searches.searched(performance.shot, limited_by_tempo=True)
-        performance, used = performance.with_curves(done), performance.used(done)
-        over = _excess(used)
-        kept = over <= KEPT
-        # commands far ahead of their motors: bending them a little costs less than time
-        if done.interrupted or kept or over > MOST_ROOM:
-            break
-        progress(0.0, "choosing the tempo for the curves that were found")
-        limits = _narrowed(limits, used)
-        try:
-            other = find_tempo(
-                replace(given, limits=limits, efforts=performance.efforts(done)), settings, shot.character.path
-            )
-        except ShotError:  # pinned times leave no room
-            break
-        uniform, bound = found.report.uniform_added, found.report.lower_bound
-        found = replace(other, report=replace(other.report, uniform_added=uniform, lower_bound=bound))
-        performance = performance.moved(done, found)
+        kept, performance = _excess(performance.used(done)) <= 0.0, performance.with_curves(done)
     if not (kept or searches.interrupted):
         _search_within_limits(performance, searches)
     tracks = found_tracks(searches.done, performance.shot.animation)
@@ -135,8 +114,8 @@ class _Searches:
 
 def _search_within_limits(performance: _Performance, searches: _Searches) -> None:
     """Search with all limits. Those that curves exceed between the instants of a search are narrowed by the excess."""
-    character = performance.shot.character
-    shot, shares = performance.shot, {name: np.ones(len(character.motors)) for name in TEMPO_LIMITS}
+    shot = performance.shot
+    shares = {name: np.ones(len(shot.character.motors)) for name in TEMPO_LIMITS}
     for _ in range(LIMITED_SEARCHES):
         done = searches.searched(shot, narrowed=tuple((name, tuple(share.tolist())) for name, share in shares.items()))
         used = performance.used(done)
@@ -166,31 +145,17 @@ def _excess(used: dict[str, Array]) -> float:
     return max(float(np.max(share, initial=0.0)) for share in used.values()) - 1.0
 
 
-def _narrowed(limits: TempoLimits, used: dict[str, Array]) -> TempoLimits:
-    """Limits that leave room for what offsets add to the rates of the animation; what efforts are beside those of the
-    rigid robot, the efforts have.
-
-    Args:
-        used: Shares of the limits that curves reached.
-    """
-    shares = {name: np.maximum(share, 1.0) if name != "effort" else 1.0 for name, share in used.items()}
-    return TempoLimits(**{name: (1.0 - ROOM) * getattr(limits, name) / share for name, share in shares.items()})
-
-
 @dataclass(frozen=True, eq=False)
 class _Performance:
     """A shot at a tempo.
 
     Attributes:
-        made: The shot at its own tempo.
-        given: What the tempo of its rigid robot follows from.
-        tempo, retimed: Of the performance.
-        shot: The performance.
+        character: Of the shot as it was made.
+        retimed: The performance.
+        shot: The same to be searched.
     """
 
-    made: CompiledShot
-    given: TempoInput
-    tempo: TimeMap
+    character: Character
     retimed: Retimed
     shot: CompiledShot
 
@@ -201,20 +166,11 @@ class _Performance:
         frames = np.arange(found.frames, dtype=np.float64) * given.frame
         performed = retimed(made.animation, tempo, frames)
         performance = Retimed(performed, with_contacts_at(made.character, tempo), found.report)
-        return cls(made, given, tempo, performance, made.at(performance))
+        return cls(made.character, performance, made.at(performance))
 
     def with_curves(self, result: Result) -> _Performance:
         """The shot with the curves of a result, from which another search begins."""
         return replace(self, shot=self.shot.with_tracks(found_tracks(result, self.shot.animation)))
-
-    def moved(self, result: Result, found: FoundTempo) -> _Performance:
-        """The shot at another tempo, with the offsets of a result where the animation is at the same time."""
-        other = _Performance.of(self.made, self.given, found)
-        frames = other.retimed.animation.frame_times
-        before = self.tempo.performed(other.tempo.animated(frames))
-        offsets = self._curves(result)(before, 0) - self._curves(None)(before, 0)
-        values = other._curves(None)(frames, 0) + offsets
-        return replace(other, shot=other.shot.with_tracks([Track(frames, column) for column in values.T]))
 
     def used(self, result: Result) -> dict[str, Array]:
         """Largest values of what a tempo limits, as shares of the limits, by name, shape [M] each.
@@ -222,9 +178,10 @@ class _Performance:
         Curves are compared on finer instants than those of the search.
         """
         assert result.after is not None
-        limits, frames = tempo_limits(self.made.character), self.retimed.animation.frame_times
+        limits, animation = tempo_limits(self.character), self.retimed.animation
+        frames = animation.frame_times
         times = np.linspace(0.0, frames[-1], FINE * (len(frames) - 1) + 1)
-        curves = self._curves(result)
+        curves = commanded_curves(self.character, replace(animation, current=animation.tracks), result)
         values = [curves(times, 1), curves(times, 2), curves(times, 3), self._efforts(result)]
         return {
             name: np.max(np.abs(v), axis=0, initial=0.0) / getattr(limits, name)
@@ -235,7 +192,7 @@ class _Performance:
         """Efforts in a result, and as ever shorter steps would have them, shape [n, M]."""
         assert result.after is not None
         own = result.after.motion.motor_efforts[result.after.motion.judged]
-        if not np.any(np.isfinite(self.given.limits.effort)) or result.interrupted:
+        if not np.any(np.isfinite(tempo_limits(self.character).effort)) or result.interrupted:
             return own
         shot = self.with_curves(result).shot
         half, quarter = (self._efforts_at(shot, share * result.step_s, result.pre_roll_s) for share in (0.5, 0.25))
@@ -247,21 +204,3 @@ class _Performance:
         options = RunSettings(step=step, pre_roll=pre_roll)
         motion = simulate_shot(shot, options, lambda fraction, message: None).before.motion
         return motion.motor_efforts[motion.judged]
-
-    def efforts(self, result: Result) -> MotorEfforts | None:
-        """Those of the rigid robot, and what the motion of a result takes beside them, by the square of the tempo."""
-        efforts, times = self.given.efforts, self.given.times
-        if efforts is None:
-            return None
-        assert result.after is not None
-        motion, h = result.after.motion, 1e-6
-        stretch = self.tempo.stretch(times)[:, None]
-        slope = (self.tempo.stretch(times + h) - self.tempo.stretch(times - h))[:, None] / (2.0 * h)
-        told = efforts.at_rest + efforts.by_square / stretch**2 - efforts.by_change * slope / stretch**3
-        taken = CubicSpline(motion.times, motion.motor_efforts)(self.tempo.performed(times))
-        return replace(efforts, by_square=efforts.by_square + (taken - told) * stretch**2)
-
-    def _curves(self, result: Result | None) -> Sample:
-        """The motors' curves in a result, or as they were animated."""
-        animation = self.retimed.animation
-        return commanded_curves(self.made.character, replace(animation, current=animation.tracks), result)

@@ -27,13 +27,16 @@ class DensePreconditioner:
         self._matrix = for_each_motor(penalty, motors)
         self._matrix += gram
 
-    def factor(self, fixed: BoolArray, terms: list[tuple[csr_matrix, Array]] | None = None) -> None:
+    def factor(
+        self, fixed: BoolArray, terms: list[tuple[csr_matrix, Array]] | None = None, rows: Array | None = None
+    ) -> None:
         """Factorise with the unknowns where `fixed` (shape [P * m], bool) is true excluded.
 
         Args:
             terms: As of `BandedPreconditioner.factor`.
+            rows: Further ones, of which the squares are added, shape [r, P * m].
         """
-        matrix = self._matrix.copy()
+        matrix = self._matrix.copy() if rows is None else self._matrix + rows.T @ rows
         if terms:
             add_terms(matrix, self._shape, terms)
         matrix[fixed, :] = 0.0

@@ -21,6 +21,7 @@ RECYCLED_PAIRS = 24  # directions that are kept for the next system
 STEP_REDUCTIONS = 10  # most reductions of a step in one iteration
 FORCING_TERM = 0.01  # share of the decrease of an iteration at which conjugate gradients end
 UNPREDICTED_SHARE = 0.1  # of the gain that ends a search: systems may leave as much, which is not predicted then
+TRUSTED = 0.8, 1.25  # shares of the predicted decrease with which derivatives of another point are kept
 ACCEPTED_RATIO = 0.05  # smallest share of the predicted decrease for a step to be accepted
 SHORTER = 0.3  # factor of a step under limits that is not accepted; the next one begins as much longer
 STALLED = 3  # steps under limits in a row that promise the gain that matters and bring less: the model is of no use
@@ -41,6 +42,10 @@ class Linear(LinearLimited, Protocol):
 
     def sharpened(self) -> Sharpened:
         """A better preconditioner, from what is known here."""
+
+    def by_responses(self, known: Any = None) -> Any:
+        """The same with derivatives that are a matrix, in its `sweeps`, which may be that `known` of a point nearby:
+        hundreds of products cost no more than one here. None where there is none."""
 
 
 class Evaluated(Protocol):
@@ -113,6 +118,7 @@ class Search:
         recycled: Search directions of earlier linear systems.
         sharpened: Preconditioner that was made on the way; None for the first one. Its point is of another size where
             the unknowns have changed since.
+        responses: Derivatives as a matrix, of steps under limits; None where there were none.
         history: Iterates so far, first the start.
         evaluations, gradients, products: Counts.
         reason: Why it ended; empty while it runs.
@@ -129,6 +135,7 @@ class Search:
     products: int = 0
     reason: str = ""
     at: Any = None
+    responses: Any = None
 
     @classmethod
     def start(cls, x: Array, at: Any = None) -> Search:
@@ -190,7 +197,7 @@ class _GaussNewton:
         self._evaluations, self._gradients, self._products = search.evaluations + 1, search.gradients, search.products
         self._at = problem.at(search.x, search.at)
         self._radius, self._recycled, self._history = search.radius, search.recycled, list(search.history)
-        self._sharpened, self._share, self._stalled = search.sharpened, 1.0, 0
+        self._sharpened, self._responses, self._share, self._stalled = search.sharpened, search.responses, 1.0, 0
         self._eager = self._sharpened is not None  # the first preconditioner has failed already
         if self._sharpened is not None and len(self._sharpened.point) != len(search.x):
             self._sharpened = None
@@ -198,7 +205,7 @@ class _GaussNewton:
     def state(self, reason: str) -> Search:
         """What the search has, from which another one may resume."""
         found = self._at.x, self._radius, self._recycled, self._sharpened, tuple(self._history)
-        return Search(*found, self._evaluations, self._gradients, self._products, reason, self._at)
+        return Search(*found, self._evaluations, self._gradients, self._products, reason, self._at, self._responses)
 
     def iterate(self) -> str:
         """One step; why there is none, else nothing."""
@@ -249,33 +256,35 @@ class _GaussNewton:
 
     def _under_limits(self, linear: Linear) -> tuple[float, Callable[[], bool]]:
         """The decrease that the model with limits predicts, and a function that takes its step, if it decreases."""
-        patience = linear.patience(self._sharpened)
-        if patience is not None and self._last_products() > patience:
-            self._sharpened = linear.sharpened()
-        limited = limited_step(
-            linear, self._fixed, FORCING_TERM, self._enough, self._ends.products, self._sharpened
-        )  # fmt: skip
-        self._products += limited.products
+        ends = FORCING_TERM, self._enough, self._ends.products
+        if (model := linear.by_responses(self._responses)) is not None:
+            fresh, self._responses = model.sweeps is not self._responses, model.sweeps
+            limited = limited_step(model, self._fixed, *ends, is_matrix=True)
+        else:
+            last = [0, *(iterate.products for iterate in self._history)][-2:]
+            if (patience := linear.patience(self._sharpened)) is not None and last[-1] - last[0] > patience:
+                self._sharpened = linear.sharpened()
+            fresh, limited = True, limited_step(linear, self._fixed, *ends, self._sharpened)
+            self._products += limited.products
         self._at = self._at.with_limits(limited.limits)
-        return limited.predicted(1.0), partial(self._takes_limited, limited)
+        return limited.predicted(1.0), partial(self._takes_limited, limited, fresh)
 
-    def _last_products(self) -> int:
-        """Products of the last linear system."""
-        counts = [0, *(iterate.products for iterate in self._history)]
-        return counts[-1] - counts[-2] if self._history else 0
-
-    def _takes_limited(self, limited: LimitedStep) -> bool:
-        """Step under limits, shortened until the simulation agrees with the model; whether steps bring enough."""
+    def _takes_limited(self, limited: LimitedStep, fresh: bool) -> bool:
+        """Step under limits, shortened until the simulation agrees with the model; whether steps bring enough. Where
+        derivatives are not `fresh` but of another point, and predict a step badly, the next one has its own."""
         at, t = self._at, min(self._share / SHORTER, 1.0)
-        for _ in range(STEP_REDUCTIONS):
+        for _ in range(STEP_REDUCTIONS if fresh else 1):
             there, predicted = self._evaluated(at.problem, at.x + t * limited.step, at), limited.predicted(t)
-            if there is not None and predicted > 0.0 and at.merit - there.merit > ACCEPTED_RATIO * predicted:
+            ratio = -np.inf if there is None or not predicted > 0.0 else (at.merit - there.merit) / predicted
+            if not TRUSTED[0] < ratio < TRUSTED[1]:
+                self._responses = None
+            if ratio > ACCEPTED_RATIO:
                 brought = at.gain(at.merit - there.merit, at.merit)
                 self._stalled = 0 if brought >= self._ends.gain else self._stalled + 1
                 self._at, self._radius, self._share = there, np.inf, t
                 return self._stalled < STALLED
             t *= SHORTER
-        return False
+        return not fresh
 
     def _in_trust_region(self, linear: Linear, gradient: Array) -> tuple[float, Callable[[], bool]]:
         """The decrease that is predicted in the trust region, and a function that takes the step, if it is worth it.

@@ -23,6 +23,8 @@ from calmotion.retargeting.solver.truncated_cg import conjugate_gradients
 Values = dict[str, Array]
 
 NEWTON_ITERATIONS = 20  # most Newton iterations
+STALLED, PATIENCE = 0.8, 3  # limits cannot be kept where so many updates in a row each leave more than this share
+OF_A_MATRIX = 200  # the same where derivatives are a matrix: limits come to act one after the other
 PRODUCTS_OVER_ONE_SYSTEM = 8  # most products of all iterations, over those of one
 LONGEST_STEP = 4.0  # longest step of a line search, over the Newton step
 
@@ -52,6 +54,9 @@ class Limits(Protocol):
 
     def curvature(self, name: str, v: Array) -> Array:
         """Second derivative of the terms where they act, shape of v."""
+
+    def excess(self, values: Values) -> float:
+        """Largest excess of a limit."""
 
     def updated(self, values: Values) -> Self | None:
         """With new multipliers after a minimum; None where all limits are kept."""
@@ -96,6 +101,10 @@ class LinearLimited(Protocol):
     @property
     def regulariser(self) -> Regulariser:
         """Of the unknowns; it may hold steps back."""
+
+    @property
+    def pull(self) -> Array | float:
+        """What the gradient has beside that of `jvp`, shape [n]."""
 
     def jvp(self, direction: Array) -> tuple[Array, Values]:
         """Change of the residuals and of the limited quantities along a direction of shape [n]."""
@@ -142,33 +151,39 @@ class LimitedModel:
 
     def objective(self, point: ModelPoint) -> float:
         """The objective, without the terms of the limits."""
-        return self.linear.norm.value(point.residuals) + self.linear.regulariser.penalty_value(
-            self.linear.x + point.step
-        )
+        linear = self.linear
+        errors = linear.norm.value(point.residuals) + float(np.sum(linear.pull * point.step))
+        return errors + linear.regulariser.penalty_value(linear.x + point.step)
 
     def merit(self, point: ModelPoint) -> float:
         """The objective and the terms of the limits."""
         return self.objective(point) + self.limits.value(point.values)
 
+    def acting(self, point: ModelPoint) -> list[bytes]:
+        """Which limits act, as something that can be compared."""
+        return [np.packbits(self.limits.curvature(name, v) > 0.0).tobytes() for name, v in point.values.items()]
+
     def gradient(self, point: ModelPoint) -> Array:
         """Gradient of the merit, shape [n]."""
         pulls = {name: self.limits.gradient(name, v) for name, v in point.values.items()}
-        regularized = self.linear.regulariser.penalty_gradient(self.linear.x + point.step)
-        return self.linear.vjp(self.linear.norm.gradient(point.residuals), pulls) + regularized
+        return self.linear.vjp(self.linear.norm.gradient(point.residuals), pulls) + self._besides(point)
 
     def slope(self, point: ModelPoint, direction: ModelPoint) -> float:
         """Slope of the merit along a direction."""
-        regularized = self.linear.regulariser.penalty_gradient(self.linear.x + point.step)
         errors = self.linear.norm.gradient(point.residuals)
-        slope = float(np.sum(errors * direction.residuals)) + float(direction.step @ regularized)
+        slope = float(np.sum(errors * direction.residuals)) + float(direction.step @ self._besides(point))
         return slope + sum(
             float(np.sum(self.limits.gradient(name, v) * direction.values[name])) for name, v in point.values.items()
         )
 
+    def _besides(self, point: ModelPoint) -> Array:
+        """The part of the gradient that is neither by residuals nor by limits, shape [n]."""
+        return self.linear.regulariser.penalty_gradient(self.linear.x + point.step) + self.linear.pull
+
 
 def limited_step(
     linear: LinearLimited, fixed: BoolArray, share: float, enough: float, max_products: int,
-    sharpened: Sharpened | None = None,
+    sharpened: Sharpened | None = None, is_matrix: bool = False,
 ) -> LimitedStep:  # fmt: skip
     """The minimum of the model at the point that was linearised.
 
@@ -178,23 +193,27 @@ def limited_step(
         share, enough: As `truncated_cg.conjugate_gradients` takes them.
         max_products: Most products of one solution.
         sharpened: Preconditioner; None for that of the problem.
+        is_matrix: Whether derivatives are a matrix. Multipliers then wait until it is settled which limits act:
+            updates before that made the penalty grow until steps were short.
     """
     model = LimitedModel(linear)
     start = point = model.start
-    gained, products = 0.0, 0
-    for _ in range(NEWTON_ITERATIONS):
+    gained, products, left, stalled = 0.0, 0, np.inf, 0
+    for _ in range(OF_A_MATRIX if is_matrix else NEWTON_ITERATIONS):
         gradient = np.where(fixed, 0.0, model.gradient(point))
         direction, used = _newton_direction(model, point, gradient, fixed, (share, enough, max_products), sharpened)
         products += used
         t = _line_search(model, point, direction)
-        before = model.merit(point)
+        before, acted = model.merit(point), model.acting(point)
         point = point.moved(direction, t)
         decrease = before - model.merit(point)
         gained += decrease
         if products > PRODUCTS_OVER_ONE_SYSTEM * max_products:
             break
-        if decrease <= max(enough, share * gained):
-            if (updated := model.limits.updated(point.values)) is None:
+        if decrease <= max(enough, share * gained) and (not is_matrix or not used or model.acting(point) == acted):
+            stalled = stalled + 1 if (excess := model.limits.excess(point.values)) > STALLED * left else 0
+            left, updated = excess, model.limits.updated(point.values)
+            if updated is None or stalled >= PATIENCE:
                 break
             model = LimitedModel(linear, updated)
 
