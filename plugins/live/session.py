@@ -70,7 +70,7 @@ class Live:
         self._window = Window(self._window_ticks, self._limits, forces)
         self._efforts = EffortLimits(character.motors, self.tick_s, forces.known)
         self._weighting = self._weighting_of(shot)
-        self._guard = Guard(self.tick_s, tolerance_of(character, settings.tolerance))
+        self._guard = Guard(self.tick_s)
         self._regulator = Regulator(self._coupling, self._deviating, self._limits, self._efforts, self._guard)
         self._renewal = Renewal(self._gains, settings.background)
         self._closed = len(self.model.system.rows) > len(self.model.system.parent)

@@ -17,7 +17,6 @@ class Guard:
 
     Args:
         tick: [s].
-        tolerance: Error that is worth an effort [m].
 
     Attributes:
         lets_go: Whether deviations glide to zero.
@@ -28,9 +27,10 @@ class Guard:
     REST_S = 2.0  # after which a robot at rest has no use for deviations
     GLIDES = 8.0  # rate at which deviations decay [1/s]
     NONE = 1e-11  # deviation that is gone [rad or m]
+    HARM = 2e-3  # error that is let be, over the longest lever: commands also move ahead of a motion
 
-    def __init__(self, tick: float, tolerance: float):
-        self._tick, self._least = tick, (0.5 * tolerance) ** 2
+    def __init__(self, tick: float):
+        self._tick = tick
         self.begin(0)
 
     def begin(self, size: int) -> None:
@@ -50,13 +50,15 @@ class Guard:
             impulse: Of the tick, shape [S n].
             moves: Whether anything in the window does.
         """
-        deviations = np.abs(x[: 2 * gains.by_change.shape[1]]).max(initial=0.0)
+        motors = gains.by_change.shape[1]
+        deviations = np.abs(x[: 2 * motors]).max(initial=0.0)
         rows = np.array_split(gains.targets, gains.robots)[gains.robots // 2]
         found = np.array([np.sum((rows @ state) ** 2) for state in (x, self._passing)])
         self._errors += self._tick / self.MEMORY_S * (found - self._errors)
         self._passing = gains.transition @ self._passing + gains.by_impulse @ impulse
         self._rested_s = 0.0 if moves else self._rested_s + self._tick
-        harms = self._errors[0] > self._errors[1] + self._least
+        lever = np.sum(rows[:, :motors] ** 2, axis=0).max(initial=0.0)
+        harms = self._errors[0] > self._errors[1] + self.HARM**2 * lever
         self.lets_go = bool(deviations > self.NONE and (self.lets_go or harms or self._rested_s > self.REST_S))
         self._errors *= not self.lets_go
         self.count += self.lets_go
