@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
+from calmotion.model import MassProperties
 from calmotion.model.curves import commanded_curves, held_curve
 from calmotion.model.limits.use import LimitUse
+from calmotion.model.result import Retimed
 from calmotion.model.run import RunSettings
 from calmotion.model.tempo import TempoSettings
 from calmotion.retargeting.retiming.retime import optimize_with_tempo, told_between
@@ -104,6 +106,21 @@ def test_both_motions_have_the_elastic_coordinates_of_the_last_search(arm, anima
     found = optimize_with_tempo(shot, replace(RETIMED, step=None, tolerance=1e-3), ignore_progress)
     before, after = ([u.shape for u in run.motion.elastic] for run in (found.before, found.after))
     assert before == after and before[0][1] < len(shot.bodies[0].stiffness)
+
+
+@pytest.mark.parametrize("retime", [None, TempoSettings(slowest=1.5)])
+def test_motors_that_are_far_too_slow_end_within_their_limits_as_near_as_on_rigid_links(arm, animation, bodies, retime):
+    """A fifth of the speed that the animation needs: neither bent curves nor the largest stretch make up for it."""
+    slow, options = limited(arm, animation, bodies, "velocity", 0.2), replace(OPTIONS, retime=retime)
+    found = optimize_with_tempo(compile_shot(slow, animation, bodies), options, ignore_progress)
+    mass = MassProperties(0.17, np.array([0.16, 0.0, 0.0]), 1e-3 * np.eye(3))
+    links = tuple(replace(body, flexible=None, mass=body.mass or mass) for body in slow.bodies)
+    forced = optimize_with_tempo(compile_shot(replace(slow, bodies=links), animation), options, ignore_progress)
+    performed = found.retimed or Retimed(animation, slow, None)
+    assert exceeded(compile_shot(slow, animation, bodies), replace(found, retimed=performed), "velocity") <= 1.001
+    assert not any(use.excess > 1e-3 for use in found.limits)
+    assert not found.improved and largest(found) > float(found.before.position_errors.max())
+    assert largest(found) < 1.1 * largest(forced)
 
 
 def test_what_curves_exceed_between_instants_is_told():
