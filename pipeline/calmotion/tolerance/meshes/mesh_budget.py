@@ -21,7 +21,7 @@ from calmotion.tolerance.step_error import StepRun, distance, simulate_at
 
 SHARE = 0.25  # of the tolerance, that the meshes may take
 MOST_NODES = 100_000  # of a mesh without which the tolerance is not kept, some two minutes on two slow cores
-UNASKED_NODES = 30_000  # where nobody asked for a tolerance: within 2 GB, where links of 45,000 nodes took 3.2 GB
+UNASKED_NODES = 30_000  # where nobody asked for a tolerance: two links took 2.3 GB, with 45,000 nodes 3.2 GB
 _GROWS = 1.4  # least factor of the nodes of a finer mesh that tells something, as of `MeshController`
 OF_UNCERTAINTY = 0.2  # of what is not known of a modulus: meshes and reductions are no finer where nobody asked for it
 _WORTH = 2.0  # of that: meshes with more are refined once more
