@@ -159,7 +159,8 @@ def replays(machine: Machine, fits: Mapping[tuple[str, ...], Calibration], by: M
         spans = {name: np.ptp(shot.animation.current[0].values) for name, (shot, _) in machine.takes.items()}
         name = max((name for name in spans if name not in own), key=spans.__getitem__)
         robot = machine.robot(name, fits[own].estimates).shot
-        rows.append(replayed(", ".join(own), name, robot, gauge_share(fits[own]), beam, STEP))
+        sensors = {path for one in machine.takes[name][1] for c in one.channels for path in (c.path, c.to)}
+        rows.append(replayed(", ".join(own), name, robot, gauge_share(fits[own]), beam, STEP, sensors))
     return rows
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import RunSettings
 from calmotion.retargeting import optimize_shot
-from calmotion.simulation import CompiledShot
+from calmotion.simulation import CompiledShot, compile_shot
 
 from .two_mode_beam import Fitted
 
@@ -32,7 +33,9 @@ class Replayed:
     told_mm: float
 
 
-def replayed(fitted: str, name: str, robot: CompiledShot, share: float, beam: Fitted, step: float) -> Replayed:
+def replayed(
+    fitted: str, name: str, robot: CompiledShot, share: float, beam: Fitted, step: float, sensors: Collection[str]
+) -> Replayed:  # fmt: skip
     """Optimise a shot for a calibrated robot, and replay both commands in the beam.
 
     Args:
@@ -41,10 +44,13 @@ def replayed(fitted: str, name: str, robot: CompiledShot, share: float, beam: Fi
         share: That the calibration left of the shake in its recordings.
         beam: Fitted on the same recordings.
         step: Of the simulations [s].
+        sensors: Paths of targets where sensors are, which do not count.
 
     Raises:
         ShotError: The shot cannot be optimised.
     """
+    targets = [replace(own, position_weight=float(own.path not in sensors)) for own in robot.character.targets]
+    robot = compile_shot(replace(robot.character, targets=tuple(targets)), robot.animation, robot.bodies)
     result = optimize_shot(robot, RunSettings(step=step), lambda fraction, message: None)
     assert result.after is not None
     motion = result.after.motion
@@ -55,6 +61,6 @@ def replayed(fitted: str, name: str, robot: CompiledShot, share: float, beam: Fi
     def largest(hub: Array) -> float:
         return 1e3 * float(np.abs(beam.strip.end(times, hub, beam.damping) - aim).max())
 
-    own = [k for k, target in enumerate(robot.character.targets) if target.position_weight > 0.0]  # others measure
+    own = [k for k, target in enumerate(targets) if target.position_weight > 0.0]
     before, after = (1e3 * float(run.position_errors[rows][:, own].max()) for run in (result.before, result.after))
     return Replayed(fitted, name, largest(intended), largest(calm), after + share * before)
