@@ -26,7 +26,7 @@ def hostile(start, ticks, seed=5):
         chance, late = random.random(), random.normal()
         sample = np.where(random.random(len(start)) < 0.01, np.nan, value)
         yield k / RATE + (1e-3 * late if chance < 0.95 else -0.02), None if chance < 0.1 else sample
-    for k in range(ticks, ticks + round(9.0 * RATE)):
+    for k in range(ticks, ticks + round(15.0 * RATE)):
         yield k / RATE, value
 
 
