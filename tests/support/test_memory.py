@@ -76,6 +76,7 @@ with open("/proc/self/statm") as file:
 """
 
 
+@pytest.mark.posix
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="of the memory of glibc")
 def test_freed_arrays_between_others_go_back_to_the_system():
     """Five arrays of 12 MB of forty are left, which lie between the others."""
