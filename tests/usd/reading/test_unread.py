@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.usd.reading import read_shot
+from calmotion.usd.reading.context import switched_off_body
 from calmotion.usd.reading.unread import unread_attributes
 from pxr import Sdf, Usd, UsdPhysics
 from small_shots import BASE, ELBOW, FORE, HAND, SHOULDER, UPPER, make_flexible, make_target, set_float, write_arm
@@ -153,3 +154,13 @@ def test_a_target_on_a_body_that_is_switched_off_is_refused_with_the_body(tmp_pa
         read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
     assert (refused.value.path, refused.value.attribute) == (FORE, "physics:rigidBodyEnabled")
     assert HAND in refused.value.found
+
+
+def test_a_part_of_a_body_that_is_no_body_itself_is_not_told(tmp_path):
+    def edit(stage):
+        hand = stage.GetPrimAtPath(HAND)
+        UsdPhysics.RigidBodyAPI.Apply(hand).CreateRigidBodyEnabledAttr(False)
+
+    character, _, _ = read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
+    assert len(character.bodies) == 3 and not any("rigidBodyEnabled" in note for note in character.notes)
+    assert switched_off_body(Usd.Stage.Open(str(tmp_path / "arm.usda")).GetPrimAtPath(HAND)) is None

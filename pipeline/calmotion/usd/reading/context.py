@@ -128,10 +128,13 @@ def carrying_body(prim: Usd.Prim) -> Usd.Prim:
 
 
 def switched_off_body(prim: Usd.Prim) -> Usd.Prim | None:
-    """The body that a prim is or lies below where `physics:rigidBodyEnabled` switches it off; None otherwise."""
+    """The body that a prim is or lies below where no body carries it, since `physics:rigidBodyEnabled` switches it off;
+    None otherwise."""
+    if carrying_body(prim):
+        return None
     while prim and not is_applied(prim, RIGID_BODY):
         prim = prim.GetParent()
-    return prim if prim and not is_rigid_body(prim) else None
+    return prim or None
 
 
 def refuse_without_transform(prim: Usd.Prim, what: str) -> None:

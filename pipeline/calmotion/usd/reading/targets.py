@@ -70,7 +70,7 @@ def _is_prim_path(path: str) -> bool:
 
 def _carrier(prim: Usd.Prim, what: str = "a target") -> str:
     body = carrying_body(prim)
-    if not body and (off := switched_off_body(prim)):
+    if off := switched_off_body(prim):
         raise ShotError(
             f"{what} is on a body that is switched off, and does not move",
             path=off.GetPath(),
