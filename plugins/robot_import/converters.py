@@ -33,7 +33,8 @@ _PLACE = re.compile(r" \(line: \d+\)$")
 _NO_MATTER = re.compile("texture|was deprecated|(cameras|lights|sensors|keys) are not supported")
 # see `joints` and `ellipsoids`
 _ADDED = re.compile("Unsupported transmission type '.*JOINTINPARENT'|Actuator '.*' is not converted|mjGEOM_ELLIPSOID ")
-_BAD_WORDS = ("Failed to", "Cannot", "not found")  # of warnings after which a part of the robot is missing
+# of warnings after which a part of the robot is missing
+_BAD_WORDS = ("Failed to", "Cannot", "not found", "Invalid input_path")
 
 
 class BrokenMeshes(ShotError):
@@ -137,7 +138,7 @@ def convert(description: Description, output: str, python: str) -> tuple[str, tu
         raise ShotError(
             "a part of the robot cannot be converted",
             path=description.shown,
-            found="; ".join(lost[:3]),
+            found="; ".join(dict.fromkeys(lost[:3])) + (f"; {len(lost) - 3} more" if len(lost) > 3 else ""),
             remedy="Correct the file: meshes are .stl, .obj or .dae, and their names relative to it",
         )
     told = Counter(_PLACE.sub("", line) for line in warnings)

@@ -54,9 +54,11 @@ def test_warnings_are_told_and_lost_parts_refused(script, tmp_path):
     ]
     harmless = script(f"{WRITE}\nfor text in {said}: print('[Warning] [some.module.function] ' + text)")
     assert convert(robot, str(tmp_path / "out"), str(harmless))[1] == ("capsule: Invalid (2 times)",)
-    lossy = script(f"{WRITE}\nprint('[Warning] [some.module.function] Failed to convert mesh: m.dae', file=sys.stderr)")
-    with pytest.raises(ShotError, match="Failed to convert mesh"):
-        convert(robot, str(tmp_path / "out2"), str(lossy))
+    for number, lost in enumerate(["Failed to convert mesh: m.dae", "Invalid input_path: m.dae could not be parsed"]):
+        lossy = script(f"{WRITE}\nfor k in range(5): print('[Warning] [a.b.c] {lost}', file=sys.stderr)")
+        with pytest.raises(ShotError, match=lost) as refused:
+            convert(robot, str(tmp_path / f"lost{number}"), str(lossy))
+        assert refused.value.found.count("m.dae") == 1 and refused.value.found.endswith("2 more")
 
 
 @pytest.mark.parametrize(
