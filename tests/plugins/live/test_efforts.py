@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.model import Rotor
-from calmotion.multibody import WORLD, Mechanism, Workspace, pose_model
+from calmotion.multibody import Workspace
 from calmotion.simulation import Curves, compile_shot, rigid_motion, run_forward
 from calmotion.simulation.forward import PerformedCurves
 from calmotion.testing import small_shot
@@ -15,6 +15,7 @@ from calmotion_plugins.live import Live, LiveSettings, Weighting, gains_at
 from calmotion_plugins.live.regulation.efforts import Efforts, efforts_ahead, multipliers
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
+from two_hinges import two_hinges
 
 TICK, TICKS = 1.0 / 250.0, 30
 
@@ -22,14 +23,7 @@ TICK, TICKS = 1.0 / 250.0, 30
 @pytest.fixture(scope="module")
 def arm():
     """Two links on drives, whose first motor has a limit: gains with a window of 0.12 s."""
-    arm = Mechanism()
-    upper = arm.body("upper", 1.2, center=(0.25, 0, 0), inertia=(0.001, 0.03, 0.03))
-    fore = arm.body("fore", 0.8, center=(0.2, 0, 0), inertia=(0.001, 0.012, 0.012), position=(0.5, 0, 0))
-    for parent, child, place in ((WORLD, upper, 0.0), (upper, fore, 0.5)):
-        joint = arm.joint("revolute", parent, child, position=(place, 0, 0), axis=(0, -1, 0))
-        arm.motor(joint, model="drive", position_gain=300.0, velocity_gain=0.2)
-    arm.target(fore, position=(0.9, 0, 0))
-    pose, targets = pose_model(arm.compile(), [0.3, -0.8]), np.tile([1.0] * 3 + [0.0] * 3, (1, 1))
+    pose, targets = two_hinges(), np.tile([1.0] * 3 + [0.0] * 3, (1, 1))
     weighting = Weighting(TICK, TICKS, targets, np.full(2, 1e-4 / TICK), 1e-2, limited=np.array([True, False]))
     return gains_at(pose, np.eye(2), weighting)
 

@@ -7,6 +7,7 @@ import pytest
 from calmotion.multibody import WORLD, Mechanism, PoseModel, pose_model
 from calmotion_plugins.live import LiveSettings, Weighting, gains_at
 from calmotion_plugins.live.regulation.gains import riccati
+from two_hinges import two_hinges
 
 TICK = 1.0 / 250.0
 
@@ -17,18 +18,6 @@ def hinge(frequency=3.0, ratio=0.01, coupling=1.2):
     rows[0, 0] = 1.0
     damping, push = np.array([[2.0 * ratio * omega[0]]]), np.array([[-coupling]])
     return PoseModel(omega, damping, push, np.zeros((1, 1)), rows, rows, *[np.eye(1)] * 5, np.eye(2))
-
-
-def two_hinges():
-    """Two links on drives: two modes, of 3.6 and 11 Hz."""
-    arm = Mechanism()
-    upper = arm.body("upper", 1.2, center=(0.25, 0, 0), inertia=(0.001, 0.03, 0.03))
-    fore = arm.body("fore", 0.8, center=(0.2, 0, 0), inertia=(0.001, 0.012, 0.012), position=(0.5, 0, 0))
-    for parent, child, place in ((WORLD, upper, 0.0), (upper, fore, 0.5)):
-        joint = arm.joint("revolute", parent, child, position=(place, 0, 0), axis=(0, -1, 0))
-        arm.motor(joint, model="drive", position_gain=300.0, velocity_gain=0.2)
-    arm.target(fore, position=(0.9, 0, 0))
-    return pose_model(arm.compile(), [0.3, -0.8])
 
 
 def weighting(window, motors, penalty=1e-5, **changes):

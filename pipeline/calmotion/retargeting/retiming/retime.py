@@ -36,10 +36,8 @@ from calmotion.tolerance.simulation import found_tracks
 from calmotion.tolerance.step_choice import chooses_step
 from calmotion.tolerance.step_error import order_of
 
-ROUNDS = 3  # searches at most that leave limits to the tempo
 LIMITED_SEARCHES = 4  # at most that keep all limits by themselves
-KEPT, BETWEEN = 1e-6, 5e-4  # shares of a limit by which it counts as kept: by a tempo, and between a search's instants
-ROOM = 5e-3  # share of a limit by which the tempo stays further within it once offsets are known
+BETWEEN = 5e-4  # share of a limit by which it counts as kept between the instants of a search
 FINE = 32  # instants of a frame at which curves are compared with their limits
 
 
