@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.model import Character, Result, Simulation, measure_of
 from calmotion.views import AFTER, BEFORE, CHANGE, LIMIT, SMALL, TEXT, new_figure, sample_motion, short, tidy, titles
 from matplotlib.axes import Axes
@@ -84,6 +85,7 @@ def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> 
     names = titles([motor.path for motor in character.motors])
     figure = new_figure(WIDTH, 0.6 + 1.75 * len(motors))
     grid = figure.subplots(len(motors), columns, sharex=True, squeeze=False)
+    times, changes = changes_of(result)
     for row, m in zip(grid, motors, strict=True):
         motor = character.motors[m]
         measure = measure_of(motor)
@@ -96,11 +98,8 @@ def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> 
         draw_limits(row[0], measure.factor * np.array([joint.lower, joint.upper]), measure.unit)
         if result.after is None:
             continue
-        rows = result.after.motion.judged
-        after = result.after.motion
-        before = sample_motion(result.before.motion, after.times[rows])
-        change = measure.factor * (after.motor_values[rows, m] - before.motor_values[:, m])
-        row[1].plot(after.times[rows], change, color=CHANGE, linewidth=1.5)
+        change = measure.factor * changes[:, m]
+        row[1].plot(times, change, color=CHANGE, linewidth=1.5)
         row[1].axhline(0.0, color=LIMIT, linewidth=0.7)
         changed = f"{short(motor.path)}: changed by at most {np.abs(change).max():.3g} {measure.unit}"
         tidy(row[1], f"change [{measure.unit}]", changed)
@@ -110,6 +109,23 @@ def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> 
     for axes in grid[-1]:
         axes.set_xlabel("time [s]", fontsize=SMALL)
     return figure
+
+
+def changes_of(result: Result) -> tuple[Array, Array]:
+    """Times [s], shape [n], and what the optimiser adds to each motor [rad or m], shape [n, M]; empty before it."""
+    if result.after is None:
+        return np.empty(0), np.empty((0, result.before.motion.motor_values.shape[1]))
+    after, rows = result.after.motion, result.after.motion.judged
+    before = sample_motion(result.before.motion, after.times[rows])
+    return after.times[rows], after.motor_values[rows] - before.motor_values
+
+
+def most_changed(character: Character, result: Result) -> list[int]:
+    """All motors, those with the largest changes [deg or mm] first; without an optimisation as the robot has them."""
+    largest = np.abs(changes_of(result)[1]).max(axis=0, initial=0.0)
+    factors = np.array([measure_of(motor).factor for motor in character.motors])
+    order: list[int] = np.argsort(-factors * largest, kind="stable").tolist()
+    return order
 
 
 def draw_limits(axes: Axes, limits: np.ndarray, unit: str) -> None:

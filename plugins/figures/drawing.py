@@ -10,7 +10,7 @@ from calmotion.model import Animation, Character, Result, SystemModes
 from calmotion.views import save
 from matplotlib.figure import Figure
 
-from .curves import plot_convergence, plot_errors, plot_motors
+from .curves import most_changed, plot_convergence, plot_errors, plot_motors
 from .filmstrip import draw_filmstrip
 from .robustness import plot_robustness
 from .spectra import plot_spectra
@@ -31,8 +31,9 @@ def plots_of(
     if character.targets:
         yield "errors", "Errors over time", plot_errors(character, result)
         yield "spectra", "Spectra of the errors", plot_spectra(character, result, modes)
-    for page, first in enumerate(range(0, len(character.motors), MOTORS_ON_A_PAGE), start=1):
-        motors = range(first, min(first + MOTORS_ON_A_PAGE, len(character.motors)))
+    order = most_changed(character, result)
+    for page, first in enumerate(range(0, len(order), MOTORS_ON_A_PAGE), start=1):
+        motors = order[first : first + MOTORS_ON_A_PAGE]
         yield "motors" if page == 1 else f"motors_{page}", "Motors", plot_motors(character, result, motors)
     if len(result.search.steps) > 1:
         yield "convergence", "The search", plot_convergence(result)

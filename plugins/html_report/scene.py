@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +28,7 @@ LARGEST = 4_000_000  # letters of a scene, so that a page stays below 8 MB
 POSITION, ROTATION = 2e-6, 4e-6  # units in which motions are kept [m], [rad]
 SHAPES = 6  # deflections of a body that are kept, the largest ones
 SEEN = 2e-5  # size of a deflection below which it is not kept [m]
+DIRECTIONS = np.stack(np.meshgrid(*3 * [np.linspace(-1.0, 1.0, 5)]), axis=-1).reshape(-1, 3)
 SURFACE = 2.0**-15  # of the extent of a surface: unit of its points
 
 
@@ -94,13 +96,15 @@ def _described(
 
 
 def _view(character: Character, result: Result, reference: Motion, runs: list[Motion]) -> dict[str, Any]:
-    """From where the scene is seen, the sphere that has to be in the picture, and the floor."""
+    """From where the scene is seen, the points that have to be in the picture, about their center, and the floor."""
     view = choose_viewpoint(character, result.skins, runs[0])
     cloud = framed(view, character, result.skins, runs)
     center = 0.5 * (cloud.min(axis=0) + cloud.max(axis=0))
+    outermost = np.unique(np.argmax((cloud - center) @ DIRECTIONS.T, axis=0))
     return {
         "center": center.tolist(),
         "radius": max(float(np.linalg.norm(cloud - center, axis=1).max()), 1e-3),
+        "outermost": (cloud[outermost] - center).tolist(),
         "toward_eye": view.toward_eye.tolist(),
         "up": view.up.tolist(),
         # scenery has a floor of its own
@@ -133,15 +137,25 @@ def _surfaces(
     drawn = [(b, s, surface) for b, body in enumerate(character.bodies) for s, surface in enumerate(body.surfaces)]
     drawn += [(-1, 0, surface) for surface in character.scenery]
     drawn = [row for row in drawn if row[2].drawn]
-    share = min(detail.triangles / max(sum(len(surface.triangles) for *_, surface in drawn), 1), 1.0)
+    most = evenly([len(surface.triangles) for *_, surface in drawn], detail.triangles)
     bases = {b: _basis(result, b, motions) for b in {b for b, *_ in drawn if b >= 0}}
     entries = []
     for b, s, surface in drawn:
         modes = modes_of(result.skins[b], s) if b >= 0 else None
         basis = bases.get(b)
         fields = None if modes is None or basis is None else modes @ basis[1]
-        entries.append({"body": b} | _surface(surface, fields, share, packing))
+        entries.append({"body": b} | _surface(surface, fields, most, packing))
     return entries, {b: found[0] for b, found in bases.items() if found is not None}
+
+
+def evenly(sizes: Sequence[int], total: int) -> int:
+    """The size to which the larger ones are cut so that all are not more than `total`; small ones stay whole."""
+    left = total
+    for others, size in zip(range(len(sizes), 0, -1), sorted(sizes), strict=True):
+        if size * others > left:
+            return left // others
+        left -= size
+    return max(sizes, default=0)
 
 
 def _basis(result: Result, body: int, motions: list[Motion]) -> tuple[list[Array], Array] | None:
@@ -161,8 +175,8 @@ def _basis(result: Result, body: int, motions: list[Motion]) -> tuple[list[Array
     return ([rows[:, kept] for rows in coordinates], directions[:, kept]) if kept.any() else None
 
 
-def _surface(surface: SurfaceMesh, fields: Array | None, share: float, packing: Packing) -> dict[str, Any]:
-    kept, triangles = thinned(surface.points, surface.triangles, int(share * len(surface.triangles)))
+def _surface(surface: SurfaceMesh, fields: Array | None, most: int, packing: Packing) -> dict[str, Any]:
+    kept, triangles = thinned(surface.points, surface.triangles, most)
     copies, triangles, normals = split_at_creases(surface.points[kept], triangles)
     points, unit = surface.points[kept][copies], SURFACE * max(float(np.ptp(surface.points, axis=0).max()), 1e-6)
     entry = {

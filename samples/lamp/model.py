@@ -84,8 +84,8 @@ def joints(tracks: Mapping[str, Sequence[float]]) -> tuple[JointSpec, ...]:
 
 def scenery() -> tuple[Part, ...]:
     """The desk and a sheet of paper on it. Not a body, no physics."""
-    top = skin([Section(-0.03, 0.50, 0.60), Section(-0.0005, 0.50, 0.60)], sides=8, squareness=12.0).moved(
+    top = skin([Section(-0.03, 0.50, 0.60), Section(-0.0005, 0.50, 0.60)], sides=4, squareness=12.0).moved(
         (0.25, 0.0, 0.0)
     )
-    sheet = skin([Section(0.0, 0.105, 0.148), Section(0.001, 0.105, 0.148)], sides=8, squareness=16.0)
+    sheet = skin([Section(0.0, 0.105, 0.148), Section(0.001, 0.105, 0.148)], sides=4, squareness=16.0)
     return (Part("Top", top, "Oak"), Part("Sheet", sheet.moved((0.36, -0.12, 0.0)), "Paper"))

@@ -177,3 +177,15 @@ def test_robustness_is_drawn_as_shares_of_robots_beside_the_error_of_the_model(f
     assert points == {60.0, 1.0, 2.0}
     result = dataclasses.replace(synthetic.result(), robustness=found)
     assert "robustness.png" in [Path(path).name for path in draw(tmp_path, result, {"figures.plot": {"dpi": 60}})]
+
+
+def test_the_motors_that_change_most_come_first():
+    result = synthetic.result()
+    rows = result.after.motion.judged
+    moved = result.after.motion.motor_values.copy()
+    moved[rows, -1] += 1.0
+    after = dataclasses.replace(result.after, motion=dataclasses.replace(result.after.motion, motor_values=moved))
+    character, count = synthetic.character(), moved.shape[1]
+    order = figures.curves.most_changed(character, dataclasses.replace(result, after=after))
+    assert order[0] == count - 1 and sorted(order) == list(range(count))
+    assert figures.curves.most_changed(character, dataclasses.replace(result, after=None)) == list(range(count))

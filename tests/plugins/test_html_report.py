@@ -167,6 +167,27 @@ def test_a_fine_surface_gets_as_many_triangles_as_are_asked_for(count):
     np.testing.assert_array_equal(points[same][whole], points[triangles])
 
 
+@pytest.mark.parametrize(
+    ("sizes", "total", "most"),
+    [([12, 12, 5000, 900], 2000, 1076), ([12, 40], 2000, 40), ([8, 8, 8], 12, 4), ([], 5, 0)],
+)
+def test_only_the_finest_surfaces_are_thinned(sizes, total, most):
+    assert scene.evenly(sizes, total) == most
+    assert sum(min(size, most) for size in sizes) <= total
+
+
+def test_the_whole_motion_is_in_the_picture_and_fills_it(chromium, optimized):
+    chromium.open(optimized)
+    for turn, lift, width, height in ((0.0, 0.3, 560, 460), (1.0, -0.4, 370, 310), (2.5, 1.2, 560, 460)):
+        largest = chromium.value(
+            f"(() => {{ player.turn = {turn}; player.lift = {lift}; player.aim({width}, {height}); "
+            "player.camera.updateMatrixWorld(); return Math.max(...player.scene.outermost.map(p => { const q = "
+            "new THREE.Vector3(...p).add(player.center).project(player.camera); "
+            "return Math.max(Math.abs(q.x), Math.abs(q.y)); })); })()"
+        )
+        assert 0.8 < largest <= 1.0
+
+
 def test_a_figure_keeps_its_lines_labels_limits_and_marks():
     figure = Figure()
     upper, lower = figure.subplots(2, 1, sharex=True)
