@@ -179,13 +179,15 @@ def test_robustness_is_drawn_as_shares_of_robots_beside_the_error_of_the_model(f
     assert "robustness.png" in [Path(path).name for path in draw(tmp_path, result, {"figures.plot": {"dpi": 60}})]
 
 
-def test_the_motors_that_change_most_come_first():
-    result = synthetic.result()
-    rows = result.after.motion.judged
-    moved = result.after.motion.motor_values.copy()
-    moved[rows, -1] += 1.0
-    after = dataclasses.replace(result.after, motion=dataclasses.replace(result.after.motion, motor_values=moved))
-    character, count = synthetic.character(), moved.shape[1]
-    order = figures.curves.most_changed(character, dataclasses.replace(result, after=after))
-    assert order[0] == count - 1 and sorted(order) == list(range(count))
-    assert figures.curves.most_changed(character, dataclasses.replace(result, after=None)) == list(range(count))
+def test_the_motors_that_change_most_come_first(figures):
+    character, result = synthetic.character(), synthetic.result()
+    three = dataclasses.replace(character, motors=3 * character.motors[:1])
+
+    def with_motors(simulation, factors):
+        values = simulation.motion.motor_values[:, :1] + np.outer(np.arange(len(simulation.motion.times)), factors)
+        return dataclasses.replace(simulation, motion=dataclasses.replace(simulation.motion, motor_values=values))
+
+    before = with_motors(result.before, [0.0, 0.0, 0.0])
+    moved = dataclasses.replace(result, before=before, after=with_motors(result.after, [1e-3, -1.0, 0.5]))
+    assert figures.curves.most_changed(three, moved) == [1, 2, 0]
+    assert figures.curves.most_changed(three, dataclasses.replace(moved, after=None)) == [0, 1, 2]
