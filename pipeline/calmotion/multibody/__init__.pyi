@@ -25,6 +25,7 @@ from calmotion.multibody.model.system import State as State
 from calmotion.multibody.model.topology import Tree as Tree
 from calmotion.multibody.model.topology import span_tree as span_tree
 from calmotion.multibody.motors.drives import joint_values as joint_values
+from calmotion.multibody.motors.inverse import rotor_efforts as rotor_efforts
 from calmotion.multibody.motors.servos import unsaturated as unsaturated
 from calmotion.multibody.parallel import in_parallel as in_parallel
 from calmotion.multibody.runs import LinearizedRun as LinearizedRun

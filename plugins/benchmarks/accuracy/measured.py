@@ -9,7 +9,8 @@ the estimate of another fit that shares no recording with it. `--most` takes tha
 
 The error of a strain gauge, whose gain and free swing at the start are fitted, is the share of its signal's shake that
 is left. A folder with `beam.toml` (the entries of `two_mode_beam.Strip`) gets the same from an independent model of its
-strip too, which also replays commands that were optimised for each fit. Without a folder, the command compares a
+strip too, which also replays commands that were optimised for each fit. Rigid arms with ideal motors get it from
+classic identification, a linear regression of efforts. Without a folder, the command compares a
 published cantilever with its finite elements.
 """
 
@@ -45,7 +46,7 @@ from calmotion_plugins.calibration import (
 from scipy.interpolate import CubicSpline
 
 from ..common.reporting import bench_parser, finish, keep, say
-from . import cantilever, two_mode_beam
+from . import cantilever, inverse_dynamics, two_mode_beam
 from .replays import Replayed, replayed
 from .two_mode_beam import Fitted
 
@@ -103,7 +104,8 @@ class Machine:
         shot of the fit was."""
         shot, _ = self.takes[name]
         values, given = {}, {item.name: item for item in estimates if item.of_robot}
-        for p in robot_parameters(shot, sorted({item.kind for item in given.values()})) if given else ():
+        kinds, motors = sorted({item.kind for item in given.values()}), [motor.path for motor in shot.character.motors]
+        for p in robot_parameters(shot, kinds, efforts=motors) if given else ():
             item = given.get(p.name)
             if item is not None:
                 moved = (
@@ -150,6 +152,21 @@ def beam_row(machine: Machine, own: tuple[str, ...], beam: Fitted) -> Predicted:
     left = [two_mode_beam.predicted(beam, reading_of(machine, name)) for name in machine.takes if name not in own]
     told = f"{beam.frequencies[0]:.3g} Hz, damping {beam.damping:.3g}, {beam.modulus:.3g} of the modulus"
     return Predicted(f"beam: {', '.join(own)}", float(np.mean(left)), np.nan, told)
+
+
+def regressions(machine: Machine, fits: Iterable[tuple[str, ...]]) -> list[Predicted]:
+    """What classic identification predicts of the other recordings of rigid arms with ideal motors; else nothing."""
+    if not all(inverse_dynamics.serves(shot.character) for shot, _ in machine.takes.values()):
+        return []
+    moved = {name: inverse_dynamics.moved(*take) for name, take in machine.takes.items()}
+    rows = []
+    for own in fits:
+        first, _ = machine.takes[own[0]]
+        for bodies, what in ((False, "inertia, friction and offset of each motor"), (True, "masses too")):
+            x = inverse_dynamics.identified(first.character, [moved[name] for name in own], bodies)
+            off = [np.abs(np.concatenate(moved[name].off(x))).mean() for name in machine.takes if name not in own]
+            rows.append(Predicted(f"regression: {', '.join(own)}", float(np.mean(off)), np.nan, what))
+    return rows
 
 
 def replays(machine: Machine, fits: Mapping[tuple[str, ...], Calibration], by: Mapping[Any, Fitted]) -> list[Replayed]:
@@ -255,7 +272,7 @@ def main(arguments: list[str] | None = None) -> int:
         fit = fits[own] = calibrate_shots([machine.takes[name] for name in own], settings, RunSettings())
         others = [name for name in names if name not in own]
         told = ", ".join(
-            f"{item.name.partition(' ')[0]} {item.value:.3g} ± {item.standard_deviation:.2g}"
+            f"{item.kind} {item.path.rpartition('/')[2]} {item.value:.3g} ± {item.standard_deviation:.2g}"
             for item in fit.estimates
             if item.of_robot
         )
@@ -270,6 +287,7 @@ def main(arguments: list[str] | None = None) -> int:
         Predicted("median", float(np.median(errors)), float(np.mean(as_they_are)), ""),
         Predicted("largest", max(errors), max(as_they_are), ""),
         *(beam_row(machine, own, beam) for own, beam in by.items()),
+        *regressions(machine, fits),
     ]
     lines = [f"in the 95% interval, {name}: {a} of {n}" for name, (a, n) in inside.items()]
     played = replays(machine, fits, by)

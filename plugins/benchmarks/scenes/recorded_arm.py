@@ -114,10 +114,9 @@ def _reference(robot: Robot) -> Signals:
     def limit(one: Array, other: Array) -> Array:
         return np.asarray(other[::2] + (other[::2] - one) / 3.0)
 
-    return Signals(
-        coarse.times, limit(coarse.positions, fine.positions), limit(coarse.rotations, fine.rotations),
-        limit(coarse.angles, fine.angles), limit(coarse.efforts, fine.efforts), coarse.gravity, coarse.offsets,
-    )  # fmt: skip
+    names = ("positions", "rotations", "angles", "efforts")
+    limits = {name: limit(getattr(coarse, name), getattr(fine, name)) for name in names}
+    return replace(coarse, **limits, _splines={})
 
 
 def _halved(robot: Robot, options: RunSettings) -> tuple[Signals, Signals]:

@@ -99,7 +99,7 @@ def calibrate_shots(
         if not recordings:
             raise ShotError("there are no recordings", path=shot.character.path, remedy="Name one with --recording")
     known = CLOCK_OFFSET in settings.priors  # then time 0 is the first frame, within this standard deviation
-    takes, factors = takes_of([shot for shot, _ in performed], settings)
+    takes, factors = takes_of(performed, settings)
     options, nominal = all_simulable(takes, options)
     all_recordings = [recording for _, recordings in performed for recording in recordings]
     sensors: list[Sensor] = []

@@ -6,13 +6,13 @@ sense, nominal + spread x otherwise. The prior of x is the standard normal distr
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.model import DRIVE, PRESCRIBED, SERVO, Motor
+from calmotion.model import DRIVE, PRESCRIBED, Motor
 from calmotion.retargeting import payload_bodies
 from calmotion.simulation import CompiledShot
 from calmotion.support import nearest
@@ -60,6 +60,8 @@ LOGARITHMIC = (
     MODULUS, DAMPING, DENSITY, MASS, POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION,
     LOAD_FRICTION, MAX_TORQUE,
 )  # fmt: skip
+
+OF_ROTOR = (ARMATURE, FRICTION, VISCOUS_FRICTION, LOAD_FRICTION)  # what the effort of an ideal motor tells
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,10 @@ class Parameter:
 
 
 def robot_parameters(
-    shot: CompiledShot, wanted: Sequence[str] = DEFAULT, priors: Mapping[str, float] | None = None
+    shot: CompiledShot,
+    wanted: Sequence[str] = DEFAULT,
+    priors: Mapping[str, float] | None = None,
+    efforts: Collection[str] = (),
 ) -> tuple[Parameter, ...]:
     """The parameters of a robot, and, with each modulus, the grading of the stiffness of its modes.
 
@@ -121,6 +126,7 @@ def robot_parameters(
         wanted: Kinds, each by itself or as `KIND:PATTERN` for paths that fit a pattern; a kind that the robot does not
             have gives nothing, a pattern that fits nothing is refused.
         priors: Standard deviations by kind, over `PRIORS`.
+        efforts: Paths of motors whose efforts are measured: those of ideal motors tell their rotors.
 
     Raises:
         ShotError: There is no such kind, a pattern fits nothing, or there is no parameter at all.
@@ -130,9 +136,9 @@ def robot_parameters(
     found: dict[str, Parameter] = {}
     for text in wanted:
         kind, _, pattern = text.partition(":")
-        own = [p for p in _of_kind(shot, kind, pattern, given[kind]) if fnmatchcase(p.path, pattern or "*")]
+        own = [p for p in _of_kind(shot, kind, pattern, given[kind], efforts) if fnmatchcase(p.path, pattern or "*")]
         if pattern and not own:
-            paths = sorted({p.path for p in _of_kind(shot, kind, "*", given[kind])})
+            paths = sorted({p.path for p in _of_kind(shot, kind, "*", given[kind], efforts)})
             raise ShotError(
                 f"no parameter of the robot fits the pattern of {kind}",
                 path=shot.character.path,
@@ -184,7 +190,7 @@ def refuse_unknown(wanted: Sequence[str], priors: Mapping[str, float]) -> None:
             )
 
 
-def _of_kind(shot: CompiledShot, kind: str, pattern: str, prior: float) -> list[Parameter]:
+def _of_kind(shot: CompiledShot, kind: str, pattern: str, prior: float, efforts: Collection[str]) -> list[Parameter]:
     """All parameters of a kind; masses of bodies within a chain only where a pattern asks for them."""
     character = shot.character
     spread = float(np.log1p(prior)) if kind in LOGARITHMIC else prior
@@ -218,16 +224,21 @@ def _of_kind(shot: CompiledShot, kind: str, pattern: str, prior: float) -> list[
         return rows
     # calm:motor:... of a joint is that of all its axes, so that a value of one axis has no place
     alone = [motor for motor in character.motors if motor.path == motor.prim_path]
-    return [row for motor in alone for row in _of_motor(motor, kind, spread)]
+    return [row for motor in alone for row in _of_motor(motor, kind, spread, motor.path in efforts)]
 
 
-def _of_motor(motor: Motor, kind: str, spread: float) -> list[Parameter]:
-    """The parameter of a kind of one motor, where it has it: a guess of it must be in the shot, but for a delay."""
+def _of_motor(motor: Motor, kind: str, spread: float, measured: bool) -> list[Parameter]:
+    """The parameter of a kind of one motor, where it has it: a guess of it must be in the shot, but for a delay.
+
+    Args:
+        measured: Whether its effort is, which tells the rotor of an ideal motor.
+    """
     angle, effort = ("m", "N") if motor.linear else ("rad", "N m")
     if kind == ENCODER_OFFSET:
         own = 1e-3 if motor.linear and spread == PRIORS[ENCODER_OFFSET] else spread
         return [Parameter(kind, motor.path, 0.0, own, angle, logarithmic=False)]
-    if motor.model == PRESCRIBED or motor.follows is not None:
+    ideal = motor.model == PRESCRIBED
+    if motor.follows is not None or (ideal and not (measured and kind in OF_ROTOR)):
         return []
     if kind == DELAY:
         return [Parameter(kind, motor.path, motor.delay, spread, "s", logarithmic=False, lower=0.0)]
@@ -241,7 +252,6 @@ def _of_motor(motor: Motor, kind: str, spread: float) -> list[Parameter]:
         LOAD_FRICTION: (motor.rotor.law.share, ""),
         MAX_TORQUE: (motor.max_torque, effort),
     }[kind]
-    of_rotor = kind not in (POSITION_GAIN, VELOCITY_GAIN)
-    if (of_rotor and motor.model != SERVO) or motor.model not in (DRIVE, SERVO):
+    if kind not in (POSITION_GAIN, VELOCITY_GAIN) and motor.model == DRIVE:
         return []
     return [Parameter(kind, motor.path, own_value, spread, unit)] if 0.0 < own_value < np.inf else []

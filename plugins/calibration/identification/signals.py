@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import PRESCRIBED, Animation, Character, RunSettings, curve_of
+from calmotion.model import PRESCRIBED, Animation, Character, Rotor, RunSettings, curve_of
 from calmotion.multibody import (
     NOWHERE,
     Model,
@@ -20,6 +20,7 @@ from calmotion.multibody import (
     natural_modes,
     reactions,
     rigid_state,
+    rotor_efforts,
     start_angles,
 )
 from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER, STRAIN, Channel, LowPass
@@ -45,7 +46,8 @@ class Signals:
         positions: Of the targets [m], world, shape [T, K, 3].
         rotations: Rotation matrices of the targets, shape [T, K, 3, 3].
         angles: Of the motors' joints [rad or m], shape [T, M].
-        efforts: Of the motors [N m or N], shape [T, M].
+        efforts: Of the motors on their rotors [N m or N], those of ideal motors included, shape [T, M].
+        loads: The same without the rotors of ideal motors.
         gravity: [m/s^2], world, shape [3].
         offsets: Of the motors' encoders [rad or m], shape [M].
         modes: Frequencies [Hz] and damping ratios of the lowest natural modes where it begins, shape [2, n].
@@ -56,6 +58,7 @@ class Signals:
     rotations: Array
     angles: Array
     efforts: Array
+    loads: Array
     gravity: Array
     offsets: Array
     modes: Array = field(default_factory=lambda: np.zeros((2, 0)))
@@ -169,7 +172,7 @@ def signals_of(
     if start is not None:
         angles = _begun(robot, prepared, workspace, angles, start, begin)
     run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, integrator=options.scheme)
-    return _measured(robot, prepared, run)
+    return with_rotors(_measured(robot, prepared, run), robot)
 
 
 def _measured(robot: Robot, prepared: Prepared, run: ForwardRun) -> Signals:
@@ -181,11 +184,21 @@ def _measured(robot: Robot, prepared: Prepared, run: ForwardRun) -> Signals:
     if len(lost):  # a body that is bent so far that its frame at the target has no direction
         raise SimulationFailure(float(prepared.grid.times[lost[0]]), NOWHERE, Reason.DIVERGED)
     matrices = Rotation.from_quat(rotations.reshape(-1, 4)[:, [1, 2, 3, 0]]).as_matrix()
+    loads = model.motor_values(found.efforts)
     return Signals(
         prepared.grid.times, run.target_positions, matrices.reshape(*rotations.shape[:2], 3, 3),
-        model.motor_values(values), model.motor_values(found.efforts), np.asarray(character.gravity, float),
+        model.motor_values(values), loads, loads, np.asarray(character.gravity, float),
         robot.offsets, _modes(model, run.commands[0]),
     )  # fmt: skip
+
+
+def with_rotors(signals: Signals, robot: Robot) -> Signals:
+    """The same motion with efforts on the rotors of a robot's ideal motors, which no simulation has to know."""
+    motors, efforts = robot.shot.character.motors, signals.loads.copy()
+    for k, motor in enumerate(motors):
+        if motor.model == PRESCRIBED and motor.follows is None and motor.rotor != Rotor():
+            efforts[:, k] = rotor_efforts(motor.rotor, signals.times, signals.angles[:, k], efforts[:, k])
+    return replace(signals, efforts=efforts, _splines={})
 
 
 def _modes(model: Model, commands: Array) -> Array:

@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from calmotion.arrays import Array
+from calmotion.arrays import Array, BoolArray
 from calmotion.errors import ShotError
-from calmotion.model import RunSettings
+from calmotion.model import PRESCRIBED, RunSettings
 from calmotion.multibody import IMPLICIT, SimulationFailure
-from calmotion.recordings import ANGLE
+from calmotion.recordings import ANGLE, EFFORT, SensorRecording
 from calmotion.simulation import MAX_STEP, CompiledShot, failure_error, prepare
 
 from ..model.estimates import GEAR_STIFFNESS, MODULUS, POSITION_GAIN
 from .motor_groups import grouped
-from .parameters import Parameter, robot_parameters
+from .parameters import OF_ROTOR, Parameter, robot_parameters
 from .recordings.sensors import Sensor
 from .robots import robot_at, robot_with
 from .signals import Signals, ends_at_rest, signals_of
@@ -53,20 +53,30 @@ class Take:
     moves: bool = False
 
     @property
+    def moving(self) -> BoolArray:
+        """Which parameters the motion depends on, shape [n]: all but those of rotors of ideal motors."""
+        ideal = {motor.path for motor in self.shot.character.motors if motor.model == PRESCRIBED}
+        return np.array([not (p.kind in OF_ROTOR and p.path in ideal) for p in self.parameters], bool)
+
+    @property
     def end(self) -> float:
         """Of the shot [s]."""
         return float(self.shot.animation.frame_times[-1])
 
 
-def takes_of(shots: Sequence[CompiledShot], settings: CalibrationSettings) -> tuple[list[Take], tuple[str, ...]]:
+def takes_of(
+    performed: Sequence[tuple[CompiledShot, Sequence[SensorRecording]]], settings: CalibrationSettings
+) -> tuple[list[Take], tuple[str, ...]]:
     """The shots with the parameters of the robot, and the motors whose position gains differ from shot to shot.
 
     Raises:
         ShotError: The shots have other parameters than the first one: they are not of one robot.
     """
     takes: list[Take] = []
-    for shot in shots:
-        parameters = robot_parameters(shot, settings.parameters, settings.priors)
+    channels = [channel for _, recordings in performed for recording in recordings for channel in recording.channels]
+    efforts = {channel.path for channel in channels if channel.kind == EFFORT}
+    for shot, _ in performed:
+        parameters = robot_parameters(shot, settings.parameters, settings.priors, efforts)
         if settings.by_motor_type:
             parameters = grouped(parameters, shot.character)
         # what a robot does that is stopped amid a motion is not known

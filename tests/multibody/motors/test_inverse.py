@@ -7,7 +7,7 @@ import pytest
 from arms import chain, compiled
 from calmotion.model import Motor
 from calmotion.model.motor import Quadratic, Rotor
-from calmotion.multibody.motors.inverse import inverse_commands
+from calmotion.multibody.motors.inverse import inverse_commands, rotor_efforts
 from motor_runs import pitch, run
 
 H = 1e-3
@@ -50,6 +50,20 @@ def test_motors_on_the_commands_do_what_ideal_ones_do(kind, more):
     lagging, _ = performed(giving, CURVE)
     off = np.abs(followed - intended).max()
     assert off < 2e-3 < 0.1 * np.abs(lagging - intended).max()
+
+
+@pytest.mark.parametrize("kind", [SERVO, LOADED], ids=["servo", "friction by load"])
+def test_efforts_on_the_rotors_of_ideal_motors_are_those_of_servos_that_do_the_same(kind):
+    character = chain(1, driven=(0,), length=0.4, mass=0.8)
+    motor = replace(character.motors[0], position_gain=150.0, velocity_gain=12.0, damping_on="error", **kind)
+    ideal = compiled(character)
+    loads = ideal.motor_values(run(ideal, CURVE, np.gradient(CURVE, H, axis=0), H)[1].efforts)
+    commands = inverse_commands((motor,), TIMES, CURVE, loads)
+    giving = compiled(replace(character, motors=(motor,)))
+    done = giving.motor_values(run(giving, commands, np.gradient(commands, H, axis=0), H)[1].efforts)[:, 0]
+    found = rotor_efforts(motor.rotor, TIMES, CURVE[:, 0], loads[:, 0])
+    off, rubs = (np.abs(done - other)[5:-5].mean() for other in (found, loads[:, 0]))
+    assert off < 0.02 * np.abs(done).mean() and off < 0.1 * rubs
 
 
 def test_late_motors_are_commanded_earlier_ideal_ones_what_they_do_and_no_motor_more_than_it_has():

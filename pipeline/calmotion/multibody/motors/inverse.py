@@ -37,12 +37,26 @@ def inverse_commands(motors: Sequence[Motor], times: Array, values: Array, effor
     return commands
 
 
+def rotor_efforts(own: Rotor, times: Array, turned: Array, efforts: Array) -> Array:
+    """What a motor exerts on its rotor [N m or N], shape [T]: what the joint takes, and what turns and rubs the rotor.
+
+    Args:
+        own: The rotor; its back-EMF is none of these.
+        times: Equidistant [s], shape [T].
+        turned: Angle of the rotor [rad or m], shape [T].
+        efforts: That move the joint so [N m or N], shape [T].
+    """
+    h = float(times[1] - times[0])
+    speed = np.gradient(turned, h)
+    found = efforts + own.armature * np.gradient(speed, h) + own.viscous_friction * speed
+    return np.asarray(found + _friction(own, efforts, found, speed))
+
+
 def _command(motor: Motor, times: Array, value: Array, effort: Array) -> Array:
     own, h = motor.rotor if motor.model == SERVO else Rotor(), float(times[1] - times[0])
     turned = value + effort / own.gear_stiffness
     speed = np.gradient(turned, h)
-    wanted = effort + own.armature * np.gradient(speed, h) + (own.viscous_friction + own.back_emf) * speed
-    wanted = wanted + _friction(own, effort, wanted - own.back_emf * speed, speed)
+    wanted = rotor_efforts(own, times, turned, effort) + own.back_emf * speed
     if motor.model == SERVO:
         wanted = np.clip(wanted, -_TORQUE_SHARE * motor.max_torque, _TORQUE_SHARE * motor.max_torque)
     lag = motor.velocity_gain / motor.position_gain
