@@ -1,7 +1,7 @@
 # make demo     optimise the bartender sample, and print the errors before and after
 # make test     lint, format, types, documentation and tests
 # make test-lowest    the tests with the lowest supported versions of the dependencies (needs Python 3.11)
-# make release-check  these, and with the newest versions as well; the result goes into docs/installation.md
+# make release-check  these, and with the newest versions as well; the result goes into docs/evidence/systems.md
 # make test-portable  the tests as on other processors, with meshes made anew and other numbers of threads
 # make docs     the documentation, in build/docs
 # make fuzz     ten minutes of damage to each of shots, meshes, motions, manifests, settings and caches

@@ -1,7 +1,7 @@
 """The whole suite with the lowest and with the newest versions of all dependencies, before a release.
 
 `make release-check`; `release_check.py TESTS ...` for a part of the suite. The rows of the table in
-docs/installation.md are written anew; those of a part say so. The exit status is 1 where a test failed.
+docs/evidence/systems.md are written anew; those of a part say so. The exit status is 1 where a test failed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "installation.md"
+PAGE = ROOT / "docs" / "evidence" / "systems.md"
 BEGIN, END = "<!-- release-check: begin -->", "<!-- release-check: end -->"
 HEAD = "| versions | Python | of | passed | failed | skipped | on |\n| --- | --- | --- | --- | --- | --- | --- |\n"
 PYTHONS = ("3.14", "3.13", "3.12", "3.11")  # of which the newest versions are run with the first that is here

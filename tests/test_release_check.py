@@ -1,4 +1,4 @@
-"""What `make release-check` found stands in docs/installation.md."""
+"""What `make release-check` found stands in docs/evidence/systems.md."""
 
 import runpy
 import sys
@@ -20,7 +20,7 @@ def test_the_rows_of_the_page_are_those_of_the_last_run(script, repository, tmp_
     assert (counts.passed, counts.failed, counts.skipped) == (4, 3, 3)
     row = script["row"]("lowest", Path(sys.executable), counts)
     assert "numpy 2." in row and "| 4 | 3 | 3 |" in row
-    page = (repository / "docs" / "installation.md").read_text(encoding="utf-8")
+    page = (repository / "docs" / "evidence" / "systems.md").read_text(encoding="utf-8")
     once = script["written"](page, [row])
     assert row in once and script["written"](once, []) == script["written"](page, [])
     assert once.partition(script["BEGIN"])[0] == page.partition(script["BEGIN"])[0]

@@ -4,12 +4,13 @@ import re
 
 
 def test_the_tutorial_runs(repository, tmp_path, monkeypatch, capsys):
-    text = (repository / "docs" / "tutorial_python.md").read_text()
-    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    pages = [(repository / "docs" / name).read_text() for name in ("tutorial_python.md", "how_to/running.md")]
+    blocks = re.findall(r"```python\n(.*?)```", "\n".join(pages), re.DOTALL)
     monkeypatch.chdir(tmp_path)
     names: dict = {}
     for number, block in enumerate(blocks):
         block = block.replace('Path("samples")', f'Path("{repository}") / "samples"')
+        block = block.replace('"shot.usda"', f'"{repository}/samples/lamp/lamp.usda"')
         exec(compile(block, f"block {number} of the tutorial", "exec"), names)
     printed = capsys.readouterr().out
     assert "mm before" in printed and "max_iterations" in printed

@@ -18,7 +18,11 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 DOCS = REPOSITORY / "docs"
 PAGES = DOCS / "tutorials"
 FOLLOWED = ("usd", "urdf", "skinned_character", "calibration", "two_workers", "puppeteer", "diagnosis")
-HOW_TO = ("arduino", "phone", "weights", "remaining_error", "offline_or_live", "slow_motors", "diagnose")
+HOW_TO = (
+    "arduino", "phone", "weights", "remaining_error", "offline_or_live", "slow_motors", "diagnose", "shows", "workers",
+    "clips",
+)  # fmt: skip
+OTHERS = ("./quickstart", "./importing", "./troubleshooting", "./exporting")
 # What newcomers want to do, and the page that is enough for it: all of them are followed below.
 TASKS = {
     "see it work, and show it in a browser": "./quickstart",
@@ -46,24 +50,35 @@ def blocks(page: str, language: str) -> list[str]:
 
 
 def follow(page: str, folder: Path) -> str:
-    """Run a page in an empty folder with `calmotion` and `python3` on the path; what it printed."""
+    """Run a page in an empty folder, or one with the files of `begun`; what it printed."""
+    (folder / "work").mkdir(exist_ok=True)
+    return run(script(page), folder, folder / "work")
+
+
+def run(commands: str, folder: Path, work: Path) -> str:
+    """Run commands with `calmotion` and `python3` on the path, in `folder / "tools"`; what they printed."""
     tools = folder / "tools"
-    tools.mkdir()
+    tools.mkdir(exist_ok=True)
     for name, command in {"python3": "", "calmotion": "-m calmotion "}.items():
         file = tools / name
         file.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} {command}"$@"\n')
         file.chmod(0o755)
-    work = folder / "work"
-    work.mkdir(exist_ok=True)
     environment = os.environ | {
         "PATH": os.pathsep.join(map(str, (tools, Path(sys.executable).parent, os.environ["PATH"]))),
         "PYTHONPATH": str(REPOSITORY / "pipeline"),
     }  # fmt: skip
     done = subprocess.run(
-        ["bash", "-e", "-c", script(page)], cwd=work, env=environment, capture_output=True, text=True, timeout=3600
+        ["bash", "-e", "-c", commands], cwd=work, env=environment, capture_output=True, text=True, timeout=3600
     )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     return done.stdout
+
+
+def begun(page: str, end: str, folder: Path) -> None:
+    """Make the files of a page in the working folder of another one: its blocks before that with the words `end`."""
+    (folder / "work").mkdir()
+    before = script(page).split(end)[0]
+    run(before[: before.rindex("\n") + 1], folder, folder / "work")
 
 
 def errors_of(printed: str) -> list[tuple[float, float]]:
@@ -86,7 +101,7 @@ def test_a_task_of_a_newcomer_is_found_in_two_clicks_and_followed(page, front):
     assert f'follow("{page.removeprefix("tutorials/")}", ' in Path(__file__).read_text()
 
 
-@pytest.mark.parametrize("page", [*FOLLOWED, "./quickstart", *(f"how_to/{page}" for page in HOW_TO)])
+@pytest.mark.parametrize("page", [*FOLLOWED, *OTHERS, *(f"how_to/{page}" for page in HOW_TO)])
 def test_the_commands_of_a_page_are_accepted(page, capsys):
     from calmotion.cli.commands.table import all_commands
     from calmotion.cli.main import build_parser
@@ -216,6 +231,67 @@ def test_a_show_on_two_workers(tmp_path):
     for folder in ("calm", "farm"):
         jobs = json.loads((tmp_path / "work" / folder / "batch.json").read_text())["jobs"]
         assert len(jobs) == 2 and all(job["outcome"] in ("done", "kept") for job in jobs)
+
+
+@pytest.mark.long
+def test_many_shots_are_optimised_and_can_be_published(tmp_path):
+    printed = follow("how_to/shows", tmp_path)
+    assert printed.count("can be published") == 2
+    assert "27.23 mm" in (tmp_path / "work" / "calmotion_demo" / "batch.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.long
+def test_other_machines_make_the_same_files(tmp_path):
+    pytest.importorskip("distributed")
+    if shutil.which("openjd") is None:
+        pytest.skip("openjd-cli is not here")
+    follow("how_to/workers", tmp_path)
+    work = tmp_path / "work" / "calmotion_demo"
+    for name in ("bartender_calm.usda", "half_calm.usda"):
+        curves = [
+            "".join(line for line in (work / folder / name).read_text().splitlines() if "timeSamples" in line)
+            for folder in ("calm", "farm")
+        ]
+        assert curves[0] == curves[1] != ""
+
+
+@pytest.mark.long
+def test_clips_follow_one_another_as_the_page_says(tmp_path):
+    printed = follow("how_to/clips", tmp_path)
+    assert "Every clip may follow every other one." in printed
+    rows = re.search(r"```text\n(.*?)```", (DOCS / "how_to" / "clips.md").read_text(), re.DOTALL)[1].splitlines()
+    assert len(rows) == 5
+    for row in rows[1:]:
+        name = row.split("  ")[0]
+        line = next(line for line in printed.splitlines() if line.startswith(f"{name}  "))
+        found, told = (re.findall(r"([\d.]+) (?:s|mm)", text) for text in (line, row))
+        assert [float(value) for value in found] == pytest.approx([float(value) for value in told], rel=0.03), row
+    assert (tmp_path / "work" / "calmotion_demo" / "pour_to_slow.csv").is_file()
+
+
+def test_a_robot_is_imported_as_the_page_says(tmp_path):
+    needs_converters()
+    begun("urdf", "calmotion import", tmp_path)
+    (before, after), *_ = errors_of(follow("./importing", tmp_path))
+    assert after < 0.5 * before
+    source = "\n".join(blocks("./importing", "python"))
+    run(f"python3 - <<'END'\n{source}\nEND\n", tmp_path, tmp_path / "work")
+    assert (tmp_path / "work" / "from_python.usda").is_file()
+
+
+def test_commands_of_a_controller_are_written_as_the_page_says(tmp_path):
+    printed = follow("./exporting", tmp_path)
+    loss = re.search(r"Playing the commands costs up to ([\d.]+) mm", printed)
+    assert float(loss[1]) < 2.0 and "The lowest rate that keeps it" in printed
+    assert "joint_names" in (tmp_path / "work" / "calmotion_demo" / "trajectory.yaml").read_text()
+
+
+def test_trouble_is_found_as_the_page_says(tmp_path):
+    pytest.importorskip("calmotion_plugins.calibration")
+    begun("calibration", "calmotion calibrate", tmp_path)
+    printed = follow("./troubleshooting", tmp_path)
+    assert "The flexible links explain 99% of the error" in printed and "usd-core" in printed
+    assert "xformOp:transform:calmotion.timeSamples" in (tmp_path / "work" / "calm.usda").read_text()
 
 
 SKETCHES = {

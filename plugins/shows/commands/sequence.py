@@ -76,8 +76,8 @@ def _print(report: dict[str, Any], console: Console) -> None:
     if not report["good"]:
         say(
             console,
-            "next: where limits are exceeded or the tolerance is missed, a longer shortest_transition in the file of "
-            "clips or a larger --tolerance helps; the same command makes again only what has changed",
+            "next: a longer shortest_transition in the file of clips helps where limits are exceeded, --goal accepts a "
+            "larger error; the same command makes again only what has changed",
         )
     if layers:
         several = " (one for each clip and transition)" if len(layers) > 1 else ""

@@ -36,7 +36,8 @@ class Member:
         seconds: Its length [s].
         outcome: Of its job, see `JobResult`.
         error_before_m, error_m: Largest error of a target, as planned and retargeted [m]; None without a result.
-        within_tolerance: Whether that is within the tolerance, and the simulation keeps it.
+        within_tolerance: Whether the simulation keeps the tolerance.
+        within_goal: Whether the error is one that is accepted: not larger than the goal, by default the tolerance.
         exceeded_limits: Limits of motors that it exceeds, as `path quantity`.
         joined: Whether its ends are the poses as animated, where it meets the others.
         layer: Its layer, or None.
@@ -51,6 +52,7 @@ class Member:
     error_before_m: float | None
     error_m: float | None
     within_tolerance: bool
+    within_goal: bool
     exceeded_limits: tuple[str, ...]
     joined: bool
     layer: str | None
@@ -59,7 +61,7 @@ class Member:
     @property
     def good(self) -> bool:
         """Whether it may be played."""
-        return self.error_m is not None and self.within_tolerance and not self.exceeded_limits and self.joined
+        return self.error_m is not None and not _faults(self)
 
 
 @dataclass(frozen=True)
@@ -183,10 +185,11 @@ def _member(job: JobResult, start: str, end: str, seconds: float, poses: tuple[A
     row, report = job.as_dict(), job.report or {}
     error = row.get("max_error_after_m")
     limits = tuple(f"{use['path']} {use['quantity']}" for use in report.get("limits", []) if use["exceeded"])
-    kept = bool(report.get("tolerance_kept")) and error is not None and error <= report["tolerance_m"]
+    accurate = bool(report.get("tolerance_kept"))
+    accepted = error is not None and error <= (report.get("goal_m") or report["tolerance_m"])
     return Member(
-        job.job.name, start, end, seconds, job.outcome, row.get("max_error_before_m"), error, kept, limits,
-        error is not None and _is_joined(job, poses), row["layer"], job.problem,
+        job.job.name, start, end, seconds, job.outcome, row.get("max_error_before_m"), error, accurate, accepted,
+        limits, error is not None and _is_joined(job, poses), row["layer"], job.problem,
     )  # fmt: skip
 
 
@@ -208,10 +211,14 @@ def _is_joined(job: JobResult, poses: tuple[Any, Any]) -> bool:
 
 
 def _verdict(member: Member) -> str:
-    if member.good:
-        return "yes"
     if member.error_m is None:
         return "no"
-    reasons = [] if member.within_tolerance else ["tolerance missed"]
-    reasons += [f"exceeds {limit}" for limit in member.exceeded_limits] + ([] if member.joined else ["ends changed"])
-    return f"no: {', '.join(reasons)}"
+    return f"no: {', '.join(faults)}" if (faults := _faults(member)) else "yes"
+
+
+def _faults(member: Member) -> list[str]:
+    """Why a member that has a result may not be played."""
+    faults = [] if member.within_tolerance else ["tolerance missed"]
+    faults += [] if member.within_goal else ["error above the goal"]
+    faults += [f"exceeds {limit}" for limit in member.exceeded_limits]
+    return faults + ([] if member.joined else ["ends changed"])

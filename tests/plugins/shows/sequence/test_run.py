@@ -71,6 +71,7 @@ def test_every_clip_may_follow_every_other_one(plan_file, tmp_path, calmotion):
     ("change", "told"),
     [
         ({"within_tolerance": False}, "no: tolerance missed"),
+        ({"within_goal": False}, "no: error above the goal"),
         ({"exceeded_limits": ("/Arm/elbow velocity",)}, "no: exceeds /Arm/elbow velocity"),
         ({"joined": False}, "no: ends changed"),
         ({"error_m": None, "outcome": "failed", "layer": None}, "no"),
