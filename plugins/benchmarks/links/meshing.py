@@ -2,9 +2,9 @@
 
 `calmotion bench meshing ROBOT ... [--csv FILE [--resume]]` has a row for each link: what its solid was made of, its
 volume and mass, interface patches, unknowns, processor time, first frequencies, and why it was refused.
-`--geometry-only` ends before the mesh. `FILE:PRIM` names one link. Each link is meshed in a process of its own
-(`--jobs`): where that crashes or hangs, this is the outcome of the link. With `--resume` links that the CSV file has
-are not meshed again. The command fails where no link could be meshed.
+`--geometry-only` ends before the mesh, `--reference` compares with a finer one (minutes). `FILE:PRIM` names one link.
+Each link is meshed in a process of its own (`--jobs`): where that crashes or hangs, this is the outcome of the link.
+With `--resume` links that the CSV file has are not meshed again. The command fails where no link could be meshed.
 """
 
 from __future__ import annotations
@@ -20,8 +20,12 @@ from ..scenes.links import links_of_all
 from .survey import LIMIT, LinkRow, faulty_row, survey_link
 
 PATIENCE = 30.0  # of the time limit, that a link may take on a busy machine
+NEAR, FAR = 2.0, 5.0  # difference to a finer mesh that is wanted, and that must be told [%]
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-COLUMNS = "robot, link, source, volume_cm3, mass_kg, nodes, processor_s, f1_hz, by_sections_hz, estimate_percent, note"
+COLUMNS = (
+    "robot, link, source, volume_cm3, mass_kg, nodes, processor_s, f1_hz, by_sections_hz, estimate_percent, "
+    "difference_percent, note"
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -29,6 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = bench_parser("meshing", __doc__)
     parser.add_argument("links", nargs="+", metavar="FILE[:PRIM]", help="links; all bodies without a prim")
     parser.add_argument("--geometry-only", action="store_true", help="make solids, and no meshes")
+    parser.add_argument("--reference", action="store_true", help="compare frequencies with those of a finer mesh")
     parser.add_argument("--time-limit", type=float, default=60.0, help="processor time of the meshes of a link [s]")
     parser.add_argument("--jobs", type=int, default=1, help="links at a time, each in a process of its own")
     parser.add_argument("--resume", action="store_true", help="keep the links that the file of --csv has")
@@ -36,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rows: list[LinkRow] = kept_rows(options, LinkRow)
     known = {(row.robot, row.link) for row in rows}
     found = [pair for pair in links_of_all(options.links, say) if (pair[1], pair[0].name) not in known]
-    work = [(*pair, options.time_limit, options.geometry_only) for pair in found]
+    work = [(*pair, options.time_limit, options.geometry_only, options.reference) for pair in found]
     start = time.monotonic()
     results = results_of(survey_link, work, options.jobs, PATIENCE * options.time_limit + 300.0)
     for done, (index, result) in enumerate(results, 1):
@@ -72,5 +77,14 @@ def summary(rows: Sequence[LinkRow], geometry_only: bool = False) -> list[str]:
         lines.append(
             f"first frequencies by sections over those of the meshes: {within[0]:.3g}% of {len(ratios)} links within a "
             f"factor of 2, {within[1]:.3g}% within 1.5; at 5, 25, 50, 75 and 95% {spread}"
+        )
+    compared = [row for row in good if np.isfinite(row.difference_percent)]
+    if compared:
+        near = np.mean([row.difference_percent <= NEAR for row in compared])
+        silent = sum(row.difference_percent > max(FAR, row.estimate_percent) for row in compared)
+        lines.append(
+            f"first three frequencies against finer meshes: within {NEAR:g}% for {100.0 * near:.3g}% of "
+            f"{len(compared)} links, at most {max(row.difference_percent for row in compared):.2g}% off; "
+            f"{silent} more than {FAR:g}% off without being told so"
         )
     return lines + [f"{row.robot} {row.link}: {row.note}" for row in links if row not in good]

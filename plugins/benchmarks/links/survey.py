@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from calmotion import ShotError
+from calmotion.arrays import Array
 from calmotion.model import Body, FEMesh
 from calmotion.support import Fault
 
 from ..common.timing import processor_time
 from ..scenes.links import Link, attachments_of, frames_of
 
+if TYPE_CHECKING:
+    from calmotion.tolerance import Volume
+
 LIMIT = 20.0  # processor time of a link that is wanted [s]
+REFERENCE = (0.002, 100_000)  # wanted error of the compliances of a reference, and its nodes at most
+REFERENCE_TIME = 300.0  # processor time of its mesh [s]
 
 
 @dataclass(frozen=True)
@@ -34,6 +40,7 @@ class LinkRow:
         f1_hz, f2_hz, f3_hz: First frequencies, held by the joint towards the world, in polyamide.
         by_sections_hz: First frequency by beams and sections, as `calmotion inspect` tells it.
         estimate_percent: Error of the frequencies that is estimated.
+        difference_percent: Largest difference of the three frequencies to those of the reference, a finer mesh.
         note: Why it was refused, or why another source than the visual surface was taken.
     """
 
@@ -53,6 +60,7 @@ class LinkRow:
     f3_hz: float = np.nan
     by_sections_hz: float = np.nan
     estimate_percent: float = np.nan
+    difference_percent: float = np.nan
     note: str = ""
 
     @property
@@ -75,7 +83,9 @@ def faulty_row(link: Link, robot: str, fault: Fault) -> LinkRow:
     return LinkRow(robot=robot, link=link.name, source="fault", note=note)
 
 
-def survey_link(link: Link, robot: str, time_limit: float, geometry_only: bool = False) -> LinkRow:
+def survey_link(
+    link: Link, robot: str, time_limit: float, geometry_only: bool = False, reference: bool = False
+) -> LinkRow:
     """The row of a link, by the bundled mesher; what is wrong with the link is in its note.
 
     Args:
@@ -83,9 +93,10 @@ def survey_link(link: Link, robot: str, time_limit: float, geometry_only: bool =
         robot: Its name.
         time_limit: Processor time of its meshes [s].
         geometry_only: Whether its solid is made but not meshed.
+        reference: Whether its frequencies are compared with those of a finer mesh, which may take minutes.
     """
     from calmotion.reduction import recomputed
-    from calmotion.tolerance import MeshOptions, geometry_of, mesh_of
+    from calmotion.tolerance import MeshOptions, Volume, geometry_of, mesh_of
 
     body = replace(link.body, mass=link.mass)
     frames = frames_of(link)
@@ -109,6 +120,8 @@ def survey_link(link: Link, robot: str, time_limit: float, geometry_only: bool =
                 mesh = mesh_of(0, body, geometry, options, frames, attachments_of(link))
             row = replace(row, processor_s=processor_time() - begin)
             row = _with_sections(_with_mesh(row, mesh, link), body, link)
+            if reference and isinstance(geometry, Volume):
+                row = _with_reference(row, geometry, body, link)
     except ShotError as problem:
         row = replace(row, note=str(problem), nodes=0)
     return row if row.nodes else replace(row, processor_s=processor_time() - begin)
@@ -132,17 +145,9 @@ def _with_solid(row: LinkRow, geometry: Any, frames: Sequence[Any]) -> LinkRow:
 
 
 def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
-    from calmotion.mesh import interface_patches
-    from calmotion.reduction import assemble, clamped_modes
+    from calmotion.mesh import quadratic_nodes
 
-    settings = link.body.flexible
-    assert settings is not None
-    model = assemble(mesh.points, mesh.tets, settings.material)
-    patches = interface_patches(
-        model.mesh, attachments_of(link), settings.interface_radius, link.body.path, mesh.patches
-    )
-    clamped = patches[0].nodes if link.carrier is not None else None
-    f1, f2, f3 = np.sqrt(mesh.quality.stiffness_factor) * clamped_modes(model, 3, clamped)[0]
+    f1, f2, f3 = _frequencies(mesh, link)
     error = mesh.quality.frequency_error
     late = [
         note for note in mesh.quality.repairs if "too long" in note or "would exceed" in note or "on a grid" in note
@@ -150,7 +155,7 @@ def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
     return replace(
         row,
         source=mesh.quality.source,
-        nodes=len(model.mesh.nodes),
+        nodes=quadratic_nodes(mesh.points, mesh.tets),
         volume_error_percent=100.0 * mesh.quality.volume_error,
         f1_hz=float(f1),
         f2_hz=float(f2),
@@ -158,6 +163,36 @@ def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
         estimate_percent=np.nan if error is None else 100.0 * error,
         note="; ".join(filter(None, (row.note, *late))),
     )
+
+
+def _frequencies(mesh: FEMesh, link: Link) -> Array:
+    """The first three frequencies [Hz], held by the joint towards the world."""
+    from calmotion.mesh import interface_patches
+    from calmotion.reduction import assemble, clamped_modes
+
+    settings = link.body.flexible
+    assert settings is not None
+    model = assemble(mesh.points, mesh.tets, settings.material)
+    held = interface_patches(model.mesh, attachments_of(link), settings.interface_radius, link.body.path, mesh.patches)
+    clamped = held[0].nodes if link.carrier is not None else None
+    return np.asarray(np.sqrt(mesh.quality.stiffness_factor) * clamped_modes(model, 3, clamped)[0])
+
+
+def _with_reference(row: LinkRow, volume: Volume, body: Body, link: Link) -> LinkRow:
+    """The row with the difference to a mesh of half the element size, bisected where its error arises."""
+    from calmotion.mesh import element_size
+    from calmotion.reduction import MeshController, root_at
+    from calmotion.tolerance import MeshOptions, mesh_of
+
+    held = attachments_of(link)
+    finer = replace(volume, size=0.5 * element_size(volume.shape))
+    options = MeshOptions(time_limit=REFERENCE_TIME, cache=False)
+    mesh = mesh_of(0, body, finer, options, frames_of(link), held)
+    if mesh.quality.source != row.source:  # a beam or a collision surface in its place is no reference
+        return row
+    mesh = MeshController(*REFERENCE, "finer").refined(mesh, body, held, root_at(held, link.carrier))
+    ratios = np.array([row.f1_hz, row.f2_hz, row.f3_hz]) / _frequencies(mesh, link)
+    return replace(row, difference_percent=100.0 * float(np.abs(ratios - 1.0).max()))
 
 
 def _with_sections(row: LinkRow, body: Body, link: Link) -> LinkRow:

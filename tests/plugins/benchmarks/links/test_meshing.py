@@ -24,7 +24,7 @@ def shot(tmp_path_factory):
 def test_the_survey_has_a_row_for_each_link_and_says_what_became_of_it(shot, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "cache"))
     file = tmp_path / "links.csv"
-    assert meshing.main([f"{shot}:fore", "--csv", str(file)]) == 0
+    assert meshing.main([f"{shot}:fore", "--reference", "--csv", str(file)]) == 0
     with open(file, newline="") as text:
         (row,) = csv.DictReader(text)
     assert (row["link"], row["source"], row["note"]) == ("fore", "visual surface", "")
@@ -34,7 +34,9 @@ def test_the_survey_has_a_row_for_each_link_and_says_what_became_of_it(shot, tmp
     assert float(row["f1_hz"]) == pytest.approx(beam, rel=0.03)
     assert int(row["nodes"]) > 100 and float(row["processor_s"]) > 0.0 and float(row["estimate_percent"]) < 5.0
     assert 0.5 < float(row["by_sections_hz"]) / float(row["f1_hz"]) < 2.0
+    assert 0.0 < float(row["difference_percent"]) < float(row["estimate_percent"]) + 0.2
     printed = capsys.readouterr().out
+    assert "within 2% for 100% of 1 links" in printed
     assert "1 of 1 links are flexible (100%)" in printed and "visual surface" in printed
 
 
