@@ -27,16 +27,10 @@ class SparseSolver:
     """
 
     def __init__(self, matrix: Any, points: Array | None = None):
-        from scipy.sparse import csr_matrix
-
         interrupts.check()
         matrix = matrix.tocsr()
-        n = matrix.shape[0]
-        block = 3 if n % 3 == 0 else 1
-        row = np.repeat(np.arange(n), np.diff(matrix.indptr)) // block
-        graph = csr_matrix(
-            (np.ones(matrix.nnz, dtype=np.int8), (row, matrix.indices // block)), shape=(n // block, n // block)
-        )
+        block = 3 if matrix.shape[0] % 3 == 0 else 1
+        graph = _graph(matrix, block)
         self._scale = 1.0
         self._factors = MultifrontalCholesky(matrix, graph, dissect(graph, points), block)
 
@@ -59,3 +53,12 @@ class SparseSolver:
             found = self._factors.solve(columns)
         found = found.reshape(b.shape)
         return found if self._scale == 1.0 else found / self._scale
+
+
+def _graph(matrix: Any, block: int) -> Any:
+    """Sparse CSR pattern of the blocks of a CSR matrix, shape [n / block, n / block]."""
+    from scipy.sparse import csr_matrix
+
+    blocks = matrix.shape[0] // block
+    row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr)) // block
+    return csr_matrix((np.ones(matrix.nnz, dtype=np.int8), (row, matrix.indices // block)), shape=(blocks, blocks))

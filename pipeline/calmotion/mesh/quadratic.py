@@ -52,8 +52,8 @@ def quadratic_mesh(points: Array, tets: IntArray) -> QuadraticMesh:
     from skfem import Basis, ElementTetP2, MeshTet
 
     mesh = MeshTet(np.ascontiguousarray(points.T, dtype=float), np.ascontiguousarray(tets.T, dtype=np.int64))
-    # degree 4: products of two quadratic fields; this rule of scikit-fem is exact to rounding (tested)
-    basis = Basis(mesh, ElementTetP2(), intorder=4)
+    # a rule of one point: finer ones are made where they are used, since each holds megabytes
+    basis = Basis(mesh, ElementTetP2(), intorder=1)
     corners = boundary_triangles(tets)
     keys = corner_keys(mesh.edges.T)
     order = np.argsort(keys)

@@ -124,7 +124,7 @@ class FullBody:
         """The same body with its stiffness times a factor, without a new factorisation."""
         own = self.support
         support = Support(own.root, own.patches, own.centers)
-        model = replace(self.model, stiffness=factor * self.model.stiffness)
+        model = self.model.stiffened(factor)
         return FullBody(
             model,
             support.known(model, own.fixed(self.model).scaled(model, factor)),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -35,18 +34,13 @@ class FixedInterface:
         model: Full model, n nodes.
         patches: Nodes of the p moving patches.
         interior: Degrees of freedom of the nodes in no patch, shape [i].
-        K, M: Of the interior, sparse, shape [i, i].
-        mass: Of the whole body, sparse, shape [3n, 3n].
-        solver: Of K.
+        solver: Of the stiffness of the interior.
         constraint: Static response of the body to each motion of its patches, shape [3n, 6p].
     """
 
     model: FEModel
     patches: Sequence[IntArray]
     interior: Indices
-    K: Any
-    M: Any
-    mass: Any
     solver: SparseSolver
     constraint: Array
     _softer: tuple[FixedInterface, float] | None = field(default=None, repr=False)  # see `scaled`
@@ -67,9 +61,7 @@ class FixedInterface:
         for patch in patches:
             free[patch] = False
         interior = np.flatnonzero(np.repeat(free, 3))
-        mass = vector_mass(model.mass)
-        K, M = model.stiffness[interior][:, interior], mass[interior][:, interior]
-        solver = SparseSolver(K, nodes[free])
+        solver = SparseSolver(model.stiffness[interior][:, interior], nodes[free])
         constraint = np.zeros((n, 3, 6 * len(patches)))
         for k, (patch, center) in enumerate(zip(patches, centers, strict=True)):
             constraint[patch, :, 6 * k : 6 * k + 6] = rigid_patch(nodes[patch], center)
@@ -77,7 +69,7 @@ class FixedInterface:
         if len(patches):
             # static response of the interior to a motion of the patches; the interior rows of `flat` were zero
             flat[interior] = solver.solve(-(model.stiffness @ flat)[interior])
-        return cls(model, patches, interior, K, M, mass, solver, flat)
+        return cls(model, patches, interior, solver, flat)
 
     def scaled(self, model: FEModel, factor: float) -> FixedInterface:
         """The same with another stiffness, without a new factorisation.
@@ -86,8 +78,8 @@ class FixedInterface:
             model: The full model with its stiffness times the factor, and the same mass.
             factor: Positive.
         """
-        K, solver, own = factor * self.K, self.solver.scaled(factor), (self, factor)
-        return FixedInterface(model, self.patches, self.interior, K, self.M, self.mass, solver, self.constraint, own)
+        solver, own = self.solver.scaled(factor), (self, factor)
+        return FixedInterface(model, self.patches, self.interior, solver, self.constraint, own)
 
     def lowest(self, count: int) -> Array:
         """Constraint modes and enough normal modes for `count` accurate modes of the body, shape [3n, 6p + k]."""
@@ -140,8 +132,11 @@ class FixedInterface:
             if not self._normal or not self._is_enough(self._normal[0][0], count, below, most):
                 bound = _GRID ** np.ceil(np.log(below) / np.log(_GRID)) if below > 0.0 else None
                 count = min(max(count, _MOST), len(self.interior))
+                inside = self.interior
+                nodes = inside[::3] // 3
+                K, M = self.model.stiffness[inside][:, inside], vector_mass(self.model.mass[nodes][:, nodes])
                 self._normal[:] = [
-                    lowest_modes(self.K, self.M, count, solver=self.solver, below=bound, most=most and max(most, count))
+                    lowest_modes(K, M, count, solver=self.solver, below=bound, most=most and max(most, count))
                 ]
             return self._normal[0]
 
@@ -195,7 +190,7 @@ class FixedInterface:
     def _weight(self, count: int) -> Array:
         """Nodal forces of the first unit accelerations, shape [3n, count]."""
         fields = unit_accelerations(self.model.mesh.nodes)[:, :, :count]
-        return np.asarray(self.mass @ fields.reshape(len(self.constraint), count))
+        return self.model.momentum(fields.reshape(len(self.constraint), count))
 
     def inertial(self) -> tuple[Array, Array]:
         """Nodal forces of the unit accelerations on the interior, and its static response, shape [i, 12] each."""
@@ -208,8 +203,14 @@ class FixedInterface:
     def _residual(self, values: Array, vectors: Array, weight: Array, least: float) -> Array:
         used = np.flatnonzero(weight > 0.0)
         loads, static = (part[:, used] for part in self.inertial())
-        residual, work = residual_vectors(self.K, loads, weight[used], values, vectors, static)
+        residual, work = residual_vectors(self._force, loads, weight[used], values, vectors, static)
         return residual[:, work > least]
+
+    def _force(self, displacement: Array) -> Array:
+        """Forces that hold the interior at displacements, both of shape [i, k]."""
+        whole = np.zeros((len(self.constraint), displacement.shape[1]))
+        whole[self.interior] = displacement
+        return np.asarray((self.model.stiffness @ whole)[self.interior])
 
     def _work(self, loads: Array) -> Array:
         """Twice the work of loads on the whole body [J], shape [l]."""
@@ -263,9 +264,8 @@ def ritz_modes(model: FEModel, columns: Array) -> tuple[Array, Array]:
 
     if columns.shape[1] == 0:
         return np.zeros(0), np.zeros((0, 0))
-    mass = model.mass @ columns.reshape(len(model.mesh.nodes), -1)
     # rotations and translations differ by a length: equal kinetic energy keeps the small eigenproblem well scaled
-    M_r = columns.T @ mass.reshape(columns.shape)
+    M_r = columns.T @ model.momentum(columns)
     scale = 1.0 / np.sqrt(np.diag(M_r))
     K_r = columns.T @ (model.stiffness @ columns)
     size, directions = eigh(M_r * np.outer(scale, scale))

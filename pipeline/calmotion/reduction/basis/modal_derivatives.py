@@ -14,7 +14,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,6 @@ from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.model.character import ElasticMaterial
 from calmotion.reduction.basis.craig_bampton import Basis, mode_signs
 from calmotion.reduction.basis.fixed_interface import FixedInterface
-from calmotion.reduction.basis.natural_modes import vector_mass
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants
 from calmotion.reduction.elements.patch_rotation import (
@@ -192,11 +190,11 @@ def extended_basis(
     extra = derivatives.fields.reshape(3 * n, -1) * weight
     extra -= shapes @ change_sizes
     moved = derivatives.motion * weight - shape_motion @ change_sizes
-    M, K = vector_mass(model.mass), model.stiffness
+    K = model.stiffness
     modes = basis.modes.reshape(3 * n, -1)
     for _ in range(2):  # the second pass removes the rounding of the first
-        extra, moved = _without_modes(modes, basis.patch_motion, M, extra, moved)
-        shapes, shape_motion = _without_modes(modes, basis.patch_motion, M, shapes, shape_motion)
+        extra, moved = _without_modes(modes, basis.patch_motion, model, extra, moved)
+        shapes, shape_motion = _without_modes(modes, basis.patch_motion, model, shapes, shape_motion)
     # Those that matter by either weight are kept. By the second alone, the energy of stiff modes that bending moves far
     # would hide the derivatives of the bending itself.
     strain_energy = extra.T @ (K @ extra)
@@ -219,7 +217,7 @@ def extended_basis(
     roots = springs(model.mesh.nodes, support.patches, material.youngs_modulus, stiff)
     extension = spring_rows(roots, shape, np.zeros((p, 3, ritz.shape[1])))[:, : ritz.shape[1]]
     added = extension.T @ extension if law == "stvk" else 0.0
-    omega_squared, U = _orthonormal(ritz.T @ (M @ ritz), ritz.T @ (K @ ritz) + added)
+    omega_squared, U = _orthonormal(ritz.T @ model.momentum(ritz), ritz.T @ (K @ ritz) + added)
     result = ritz @ U
     sign = mode_signs(result)
     U, result = U * sign, result * sign
@@ -228,8 +226,8 @@ def extended_basis(
         omega_squared,
         np.ascontiguousarray(motion @ U),
         patch_squares=np.ascontiguousarray(shape @ U),
-        first_order=result.T @ (M @ modes),
-        second_order=result.T @ (M @ derivatives.fields.reshape(3 * n, -1)),
+        first_order=result.T @ model.momentum(modes),
+        second_order=result.T @ model.momentum(derivatives.fields.reshape(3 * n, -1)),
         dropped=dropped,
     )
 
@@ -252,7 +250,7 @@ def _moved(model: FEModel, basis: Basis, derivatives: Derivatives, deflections: 
     """
     count = len(deflections)
     modes = basis.modes[:, :, :count].reshape(-1, count)
-    share = modes.T @ (vector_mass(model.mass) @ derivatives.fields.reshape(len(modes), -1))
+    share = modes.T @ model.momentum(derivatives.fields.reshape(len(modes), -1))
     first, second = np.triu_indices(count)
     pairs = np.where(first == second, 0.5, 1.0) * deflections[first] * deflections[second]
     moved = np.linalg.norm(share * pairs, axis=1)
@@ -260,9 +258,11 @@ def _moved(model: FEModel, basis: Basis, derivatives: Derivatives, deflections: 
     return np.asarray(np.minimum(largest / max(deflections[0], np.finfo(float).tiny), 1.0))
 
 
-def _without_modes(modes: Array, patch_motion: Array, M: Any, fields: Array, motion: Array) -> tuple[Array, Array]:
+def _without_modes(
+    modes: Array, patch_motion: Array, model: FEModel, fields: Array, motion: Array
+) -> tuple[Array, Array]:
     """Fields and the motion of their patches, made mass-orthogonal to the modes."""
-    share = modes.T @ (M @ fields)
+    share = modes.T @ model.momentum(fields)
     return fields - modes @ share, motion - patch_motion @ share
 
 

@@ -10,8 +10,8 @@ Craig-Bampton Method for Dynamic Substructuring, Journal of Computational and Ap
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -22,15 +22,15 @@ _ROUNDING = 1e-19  # of the work of a load: rounding of the static response
 
 
 def residual_vectors(
-    K: Any, loads: Array, weight: Array, values: Array, modes: Array, static: Array
+    stiffness: Callable[[Array], Array], loads: Array, weight: Array, values: Array, modes: Array, static: Array
 ) -> tuple[Array, Array]:
     """Static responses to loads minus those of modes, as orthogonal vectors by descending work.
 
     Args:
-        K: Stiffness, shape [n, n].
+        stiffness: Displacements of shape [n, k] -> the forces that hold them.
         loads: Shape [n, l].
         weight: Factor of each load, shape [l]; it affects only the order.
-        values, modes: Eigenpairs of K and the mass matrix, mass-orthonormal, shapes [k] and [n, k].
+        values, modes: Eigenpairs of the stiffness K and the mass matrix, mass-orthonormal, shapes [k] and [n, k].
         static: Static response to each load, shape [n, l].
 
     Returns:
@@ -40,7 +40,7 @@ def residual_vectors(
     loads, static = loads * weight, static * weight
     work = np.einsum("ij,ij->j", loads, static)
     rest = static - modes @ ((modes.T @ loads) / values[:, None])
-    gram = rest.T @ (K @ rest)
+    gram = rest.T @ stiffness(rest)
     energy, directions = np.linalg.eigh(0.5 * (gram + gram.T))
     energy, directions = energy[::-1], directions[:, ::-1]
     keep = energy > _ROUNDING * work.max(initial=0.0)

@@ -74,7 +74,7 @@ def third_order(
     if _STIFFENING * total <= allowed:
         return ThirdOrder(basis, np.zeros(r), 0.0)
     normal = fixed.lowest(_CANDIDATES)[:, 6 * len(support.patches) :]
-    share = modes.T @ (fixed.mass @ normal)
+    share = modes.T @ model.momentum(normal)
     squares, U = ritz_modes(model, normal - modes @ share)
     normal, motion = (normal - modes @ share) @ U, -basis.patch_motion @ (share @ U)
     energy = (normal.T @ pull) ** 2 / squares / work

@@ -29,26 +29,40 @@ class FEModel:
     mass: Any
     stiffness: Any
 
+    def momentum(self, columns: Array) -> Array:
+        """The vector mass matrix times columns, both of shape [3n, k]."""
+        return np.asarray((self.mass @ columns.reshape(len(self.mesh.nodes), -1)).reshape(columns.shape))
+
+    def stiffened(self, factor: float) -> FEModel:
+        """The same model with its stiffness times a factor."""
+        from scipy.sparse import csr_matrix
+
+        own = self.stiffness
+        return replace(self, stiffness=csr_matrix((factor * own.data, own.indices, own.indptr), shape=own.shape))
+
 
 def assemble_mass(mesh: QuadraticMesh, density: float) -> Any:
     """Scalar consistent mass matrix [kg], CSR, shape [n, n]; density (of the body's material) in kg/m^3."""
+    from skfem import Basis, ElementTetP2
     from skfem.models.poisson import mass
 
+    # degree 4: products of two quadratic fields; this rule of scikit-fem is exact to rounding (tested)
+    basis = Basis(mesh.basis.mesh, ElementTetP2(), intorder=4)
     if mesh.filling is not None:
-        return density * _mass_of_filling(mesh, mesh.filling)
-    return (density * mass.assemble(mesh.basis)).tocsr()
+        return density * _mass_of_filling(mesh, basis, mesh.filling)
+    return (density * mass.assemble(basis)).tocsr()
 
 
-def _mass_of_filling(mesh: QuadraticMesh, filling: Filling) -> Any:
+def _mass_of_filling(mesh: QuadraticMesh, basis: Any, filling: Filling) -> Any:
     """`assemble_mass` of a body of several materials, for a density of 1."""
     from scipy.sparse import coo_matrix
 
     n, tets = len(mesh.nodes), mesh.tets.astype(np.int64)
-    values = np.stack([mesh.basis.elem.lbasis(mesh.basis.X, a)[0] for a in range(10)])
-    exact = np.einsum("aq,bq,q->ab", values, values, mesh.basis.W) / mesh.basis.W.sum()
+    values = np.stack([basis.elem.lbasis(basis.X, a)[0] for a in range(10)])
+    exact = np.einsum("aq,bq,q->ab", values, values, basis.W) / basis.W.sum()
     places = filling.makeup.places[:, 1:].T
-    shapes = np.stack([mesh.basis.elem.lbasis(places, a)[0] for a in range(10)], axis=1)
-    blocks = element_masses(filling, shapes, exact) * mesh.basis.dx.sum(axis=1)[:, None, None]
+    shapes = np.stack([basis.elem.lbasis(places, a)[0] for a in range(10)], axis=1)
+    blocks = element_masses(filling, shapes, exact) * basis.dx.sum(axis=1)[:, None, None]
     rows, columns = np.repeat(tets, 10, axis=1), np.tile(tets, (1, 10))
     matrix = coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(n, n)).tocsr()
     return 0.5 * (matrix + matrix.T)
