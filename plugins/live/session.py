@@ -22,6 +22,7 @@ from .regulation.guard import Guard
 from .regulation.limits import EFFORT, MotorLimits
 from .regulation.regulator import Regulator, Window
 from .regulation.renewal import Renewal
+from .regulation.robustness import EQUAL, affordable_others
 from .settings import LiveSettings, notes_of, refuse_unfit
 from .stream import Stream
 
@@ -77,6 +78,7 @@ class Live:
         self._delay = max((motor.delay for motor in character.motors if motor.model != PRESCRIBED), default=0.0)
         self.notes = notes_of(shot, forces)
         self.start = np.array([float(np.interp(0.0, track.times, track.values)) for track in shot.animation.current])
+        self._count_others()
         self.reset(self.start)
         self._refuse_slow()
 
@@ -205,6 +207,7 @@ class Live:
             "too_weak": {self.joints[k]: float(self._needed[k]) for k in np.flatnonzero(self._needed > 1.0)},
             "largest_deviation": self._largest,
             "let_go": self._guard.count,
+            "uncertainty": self._weighting.spread,
             "renewal_s": self._gains_s,
             "renewals": self._renewal.done,
             "renewals_failed": self._renewal.failed,
@@ -255,16 +258,31 @@ class Live:
         largest = np.array([shot.character.motors[k].max_acceleration for k in self._deviating])
         largest = np.where(np.isfinite(largest), largest, LiveSettings.ACCELERATION)
         weights = np.stack([targets.position_weight, targets.rotation_weight], axis=1)
-        spread = (1.0 - settings.uncertainty, 1.0, 1.0 + settings.uncertainty) if settings.uncertainty else (1.0,)
         return Weighting(
             self.tick_s,
             self._window_ticks,
             np.sqrt(np.repeat(weights, 3, axis=1)),
             LiveSettings.PENALTY * tolerance_of(shot.character, settings.tolerance) / (largest * self.tick_s),
             0.0,
-            spread,
-            self._efforts.limited,
+            limited=self._efforts.limited,
         )
+
+    def _count_others(self) -> None:
+        """Let robots of other frequencies count as they are asked for, or as much as that of the model allows."""
+        asked, alone, self._near = self.settings.uncertainty, self._weighting, None
+        if asked is not None:
+            self._weighting = alone.with_others(asked, EQUAL)
+            return
+
+        def gains(share: float) -> Gains:
+            self._weighting = alone.with_others(LiveSettings.UNCERTAINTY, share)
+            return self._gains(self.start)
+
+        try:
+            share = affordable_others(gains, self._coupling, self.tick_s)
+        except SimulationFailure:
+            share = 0.0
+        self._weighting = alone.with_others(LiveSettings.UNCERTAINTY, share)
 
     def _gains(self, position: Array) -> Gains:
         # chains that close in several ways stay in theirs
@@ -274,7 +292,7 @@ class Live:
         moved = (weighting.targets[..., None] * pose.targets_by_input).reshape(-1, len(self.joints))
         lever = float(np.linalg.norm(moved, axis=0).max(initial=0.0))
         coarser = max(LiveSettings.FINEST * lever / tolerance, 1.0)
-        closeness = self.settings.closeness(lever, tolerance)
+        closeness = self.settings.closeness(lever, tolerance, weighting.spread)
         weighting = replace(weighting, penalty=coarser * weighting.penalty, closeness=closeness)
         return gains_at(pose, self._coupling, weighting)
 

@@ -20,7 +20,8 @@ class LiveSettings:
         rate: Commands a second [Hz].
         lookahead: How late the robot may answer [s].
         sender_rate: Samples a second of the sender [Hz]; None: one for each command.
-        uncertainty: Share by which the frequencies of the robot are not known.
+        uncertainty: Share by which the frequencies of the robot are not known; None: `UNCERTAINTY`, as far as the robot
+            of the model hardly loses by it, see `affordable_others`.
         tolerance: Error at the targets that is worth an effort [m]; None: the shot's.
         background: Whether a thread renews the gains; else `step` does, at fixed ticks: slower, but repeatable.
     """
@@ -31,16 +32,17 @@ class LiveSettings:
     CLOSE = 0.01  # error over that lever for which motors may deviate by a radian, where no target moves
     HIGHEST = 1 / 3  # frequency of a mode that commands can act on, of the rate
     RENEWAL_S = 0.02  # between two renewals without a thread
+    UNCERTAINTY = 0.1  # of frequencies, which is spared where the robot of the model would shake
     SLOW_GAINS_S = 0.1  # processor time of a renewal that is told; poses turn by a tenth of a radian meanwhile
 
     rate: float = 250.0
     lookahead: float = 0.12
     sender_rate: float | None = None
-    uncertainty: float = 0.0
+    uncertainty: float | None = None
     tolerance: float | None = None
     background: bool = True
 
-    def closeness(self, lever: float, tolerance: float) -> float:
+    def closeness(self, lever: float, tolerance: float, spread: float) -> float:
         """Error that a deviation of a command is worth [m/rad].
 
         Robots whose frequencies differ by a share leave errors of that share in common, which must not pay for motors
@@ -49,8 +51,9 @@ class LiveSettings:
         Args:
             lever: The longest of the motors [m].
             tolerance: [m].
+            spread: Of the frequencies, see `Weighting`.
         """
-        return max(max(self.CLOSE, self.uncertainty) * lever, tolerance)
+        return max(max(self.CLOSE, spread) * lever, tolerance)
 
 
 def refuse_unfit(shot: CompiledShot, settings: LiveSettings) -> None:

@@ -28,6 +28,7 @@ from calmotion.simulation.inputs.roots import root_tracks as root_tracks
 from calmotion.simulation.inputs.roots import sample_roots as sample_roots
 from calmotion.simulation.inputs.shapers import best_delay as best_delay
 from calmotion.simulation.inputs.shapers import delay as delay
+from calmotion.simulation.inputs.shapers import impulses as impulses
 from calmotion.simulation.inputs.shapers import shaped as shaped
 from calmotion.simulation.inputs.supported import refuse_half_turns as refuse_half_turns
 from calmotion.simulation.inputs.supported import refuse_unsupported as refuse_unsupported

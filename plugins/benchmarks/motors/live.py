@@ -3,10 +3,11 @@
 `calmotion bench live [SHOT ...]` plays the motion of each shot, or with `--random` moves between random poses, as a
 stream at 250 Hz with several look-aheads (shares of the longest period), and simulates the whole robot with the
 commands. Errors are root mean squares over all targets against the intended motion with the sag of each pose, delayed
-by the look-ahead; those of shapers and filters with the delay that suits each best, for which `best` has all errors.
-`frequencies` scales those of the robot that is simulated: what is calmed knows the robot as it should be. With
-`--mujoco` the robot has rigid bodies, and MuJoCo plays the commands. Ticks are timed in processor time of their own
-thread, since others may use the machine; another thread renews the gains.
+by what is known beforehand: the look-ahead, and for shapers and filters the delay that suits each best on the robot of
+the model. `best` has errors with the delay that suits best on the robot that is simulated. `frequencies` scales those
+of that robot: what is calmed knows the robot as it should be. Random moves are streamed with 0.4 of the period alone.
+With `--mujoco` the robot has rigid bodies, and MuJoCo plays the commands. Ticks are timed in processor time of their
+own thread, since others may use the machine; another thread renews the gains.
 """
 
 from __future__ import annotations
@@ -31,8 +32,9 @@ from .lumped_robot import MUJOCO_STEP, simulate_lumped
 
 RATE = 250.0  # of the stream [Hz]
 SHARES = (0.1, 0.2, 0.4, 0.8)  # of the longest period, as look-ahead
-FREQUENCIES = (0.9, 1.0, 1.1)
-UNCERTAIN = 0.1  # share of the frequencies, with 0.4 of the period
+SHARE = 0.4  # the one that is compared
+FREQUENCIES = (1.0, 0.9, 1.1)  # the robot of the model is the first
+UNCERTAIN = (0.0, 0.1)  # shares of the frequencies, with that look-ahead
 CUTOFF = 0.5  # of the low-pass filter, over the lowest frequency
 Left = tuple[float, Array]  # a delay, and distances of targets
 KINDS = ("zv", "zvd", "ei", "mzv", "zv2", "zvd2", "ei2", "mzv2")
@@ -66,16 +68,21 @@ class Row:
 
 
 def compare(
-    name: str, shot: CompiledShot, frequencies: tuple[float, ...] = FREQUENCIES, mujoco: bool = False
+    name: str,
+    shot: CompiledShot,
+    frequencies: tuple[float, ...] = FREQUENCIES,
+    shares: tuple[float, ...] = SHARES,
+    mujoco: bool = False,
 ) -> Iterator[Row]:
-    """All methods on one robot."""
+    """All methods on one robot; the first of the frequencies are those of the model."""
     prepared = prepare(shot, RunSettings())
     grid, modes = prepared.grid, modes_of(prepared)
     trial = Trial(prepared)
     curves, longest = trial.curves, 1.0 / modes[0][0]
-    asked = {f"live, {share:g} of the period": LiveSettings(RATE, share * longest) for share in SHARES}
-    asked[f"live, {UNCERTAIN:.0%} uncertain"] = LiveSettings(RATE, 0.4 * longest, uncertainty=UNCERTAIN)
-    streams = []
+    asked = {f"live, {share:g} of the period": LiveSettings(RATE, share * longest) for share in shares}
+    for share in UNCERTAIN if len(shares) > 1 else ():
+        asked[f"live, {share:.0%} uncertain"] = LiveSettings(RATE, SHARE * longest, uncertainty=share)
+    streams, delays = [], {"as animated": 0.0}
     for method, settings in asked.items():
         ticks = _ticks(shot, settings, CubicSpline(grid.times, curves.angles))
         streams.append((method, *trial.streamed(shot, settings), ticks))
@@ -93,7 +100,9 @@ def compare(
 
         for method in ("as animated", *KINDS, *FILTERS):
             made: tuple[Array, Array] = _other(method, curves, grid, modes)
-            yield _row(name, method, factor, *left(*made, 0.0 if method == "as animated" else None))
+            late, best = left(*made, delays.get(method))
+            delays.setdefault(method, late[0])
+            yield _row(name, method, factor, late, best)
         for method, angles, rates, report, ticks in streams:
             limited = report["limited"].values()
             share_limited = 100.0 * max(limited, default=0) / report["ticks"]
@@ -160,8 +169,8 @@ def _other(method: str, curves: Curves, grid: TimeGrid, modes: tuple[Array, Arra
         sections = butter(2, CUTOFF * lowest, fs=1.0 / grid.h, output="sos")
         angles = first + sosfilt(sections, curves.angles - first, axis=0)
     else:
-        # as late as `live` with 0.4 of the period
-        reach = max(round(0.4 / lowest / grid.h), 1)
+        # as late as `live`
+        reach = max(round(SHARE / lowest / grid.h), 1)
         kernel = np.exp(-0.5 * (2.5 * np.arange(-reach, reach + 1) / reach) ** 2)[:, None]
         angles = first + fftconvolve(curves.angles - first, kernel / kernel.sum(), axes=0)[: len(grid.times)]
     return angles, np.gradient(angles, grid.h, axis=0)
@@ -184,7 +193,8 @@ def main(arguments: list[str] | None = None) -> int:
         shot = giving_shot(path, None) if options.mujoco else load(path)
         if options.random:
             shot = with_random_moves(shot, options.random)
-        rows += compare(Path(path).stem, shot, (1.0,) if options.mujoco else FREQUENCIES, options.mujoco)
+        shares = (SHARE,) if options.random else SHARES
+        rows += compare(Path(path).stem, shot, FREQUENCIES[: 1 if options.mujoco else 3], shares, options.mujoco)
         say(f"{path} is done")
         keep(options, Row, rows)
     finish(options, "Streams and shapers", rows)

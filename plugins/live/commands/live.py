@@ -54,8 +54,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--uncertainty",
         metavar="SHARE",
         type=_share,
-        default=0.0,
-        help="uncertainty of the robot's frequencies, such as 0.1: calm for slower and faster robots too",
+        help="uncertainty of the robot's frequencies: 0.1 calms slower and faster robots as much as that of the model, "
+        "0 that of the model alone (default: others as far as that of the model hardly shakes more)",
     )
     command.add_argument(
         "--in",
@@ -173,7 +173,7 @@ def worth_of_lookahead(args: argparse.Namespace, output: Output) -> int:
     from ..opening import compiled
     from ..settings import LiveSettings
 
-    asked = LiveSettings(rate=getattr(args, "rate", 250.0), uncertainty=getattr(args, "uncertainty", 0.0))
+    asked = LiveSettings(rate=getattr(args, "rate", 250.0), uncertainty=getattr(args, "uncertainty", None))
     shot = opened_shot(args)
     with progress_display(args) as display:
         robot = compiled(shot, assignments(args), Hooks(progress=display, on_operator=display.done))

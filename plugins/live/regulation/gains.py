@@ -14,7 +14,7 @@ with impulses known for a window and zero after it, has the solution v = -feedba
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.arrays import Array, BoolArray
@@ -35,6 +35,7 @@ class Weighting:
         penalty: Of a change of a command's rate [m s/rad], shape [m].
         closeness: Of the deviation of a command from the intended one [m/rad].
         frequencies: Factors of the frequencies of the robots that are thought possible.
+        shares: Of these robots in what counts; their sum is 1. The robot of the model is in the middle.
         limited: Motors whose efforts are kept within limits, shape [M]; None: none.
     """
 
@@ -46,7 +47,24 @@ class Weighting:
     penalty: Array
     closeness: float
     frequencies: tuple[float, ...] = (1.0,)
+    shares: tuple[float, ...] = (1.0,)
     limited: BoolArray | None = None
+
+    def with_others(self, uncertainty: float, share: float) -> Weighting:
+        """The same with two robots beside that of the model, which have a share in what counts.
+
+        Args:
+            uncertainty: Share of frequency by which one is slower and one is faster.
+        """
+        if not uncertainty * share:
+            return replace(self, frequencies=(1.0,), shares=(1.0,))
+        factors = (1.0 - uncertainty, 1.0, 1.0 + uncertainty)
+        return replace(self, frequencies=factors, shares=(0.5 * share, 1.0 - share, 0.5 * share))
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the frequencies, over those of the model."""
+        return float(np.sqrt(np.square(np.subtract(self.frequencies, 1.0)) @ self.shares))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +116,9 @@ def gains_at(pose: PoseModel, coupling: Array, weighting: Weighting) -> Gains:
     """
     m, n, h = coupling.shape[1], len(pose.omega), weighting.tick
     robots = len(weighting.frequencies)
-    share = weighting.targets[..., None] / np.sqrt(robots)
-    rows = share.size
-    by_input = (share * (pose.targets_by_input @ coupling)).reshape(rows, m)
-    by_mode = (share * pose.targets_by_mode).reshape(rows, n)
+    weights, roots = weighting.targets[..., None], np.sqrt(weighting.shares)[:, None, None]
+    by_input = (weights * (pose.targets_by_input @ coupling)).reshape(weights.size, m)
+    by_mode = (weights * pose.targets_by_mode).reshape(weights.size, n)
     size = 2 * (m + robots * n)
     d, rate = np.arange(m), m + np.arange(m)
     a = 2 * m + np.arange(robots * n)
@@ -119,8 +136,8 @@ def gains_at(pose: PoseModel, coupling: Array, weighting: Weighting) -> Gains:
     strikes[speed] = np.tile(pose.by_acceleration @ coupling, (robots, 1))
     by_change, by_impulse = transition @ strikes, transition[:, speed]
     targets = np.zeros((robots * len(by_input), size))
-    targets[:, :m] = np.tile(by_input, (robots, 1))
-    targets[:, a] = block_diag(*[by_mode] * robots)
+    targets[:, :m] = (roots * by_input).reshape(len(targets), m)
+    targets[:, a] = block_diag(*(roots * by_mode))
     least = targets.T @ targets
     least[d, d] += weighting.closeness**2
     value = riccati(transition, by_change, least, weighting.penalty**2)

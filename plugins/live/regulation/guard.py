@@ -19,8 +19,8 @@ class Guard:
         tick: [s].
 
     Attributes:
-        lets_go: Whether deviations glide to zero.
-        count: In how many ticks they did.
+        lets_go: Whether deviations glide to zero, or stay there.
+        count: In how many ticks they did glide.
     """
 
     MEMORY_S = 0.5  # over which errors are averaged
@@ -59,9 +59,10 @@ class Guard:
         self._rested_s = 0.0 if moves else self._rested_s + self._tick
         lever = np.sum(rows[:, :motors] ** 2, axis=0).max(initial=0.0)
         harms = self._errors[0] > self._errors[1] + self.HARM**2 * lever
-        self.lets_go = bool(deviations > self.NONE and (self.lets_go or harms or self._rested_s > self.REST_S))
+        deviates = bool(deviations > self.NONE)
+        self.lets_go = self._rested_s > self.REST_S or (deviates and (self.lets_go or bool(harms)))
         self._errors *= not self.lets_go
-        self.count += self.lets_go
+        self.count += self.lets_go and deviates
 
     def glide(self, deviation: Array, rate: Array) -> Array:
         """The change of the rates with which deviations decay, shape [m]."""

@@ -13,9 +13,9 @@ from calmotion.simulation.forward import PerformedCurves
 from calmotion.testing import small_shot
 from calmotion_plugins.live import Live, LiveSettings, Weighting, gains_at
 from calmotion_plugins.live.regulation.efforts import Efforts, efforts_ahead, multipliers
+from hinges import two_hinges
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
-from two_hinges import two_hinges
 
 TICK, TICKS = 1.0 / 250.0, 30
 
@@ -121,7 +121,7 @@ def test_a_motor_that_is_a_little_too_weak_costs_little():
     motion = np.outer(s**3 * (10.0 - 15.0 * s + 6.0 * s * s), [0.9, -0.4])
 
     def streamed(shot):
-        with Live(shot, LiveSettings(lookahead=0.1, background=False)) as live:
+        with Live(shot, LiveSettings(lookahead=0.1, uncertainty=0.0, background=False)) as live:
             live.reset(np.zeros(2))
             return np.array([live.step(k * TICK, row) for k, row in enumerate(motion)]), live.report()
 

@@ -12,10 +12,10 @@ from calmotion_plugins.live.opening import compiled
 from calmotion_plugins.live.regulation.guard import Guard
 
 RATE = 250.0
-LONG = (("lamp", 3600.0), ("bartender", 3600.0))
+LONG = (("lamp", 3600.0, 5), ("bartender", 3600.0, 5))
 
 
-def hostile(start, ticks, seed=5):
+def hostile(start, ticks, seed):
     """Stamps [s] and samples of motors, shape [M]: a tenth missing, late ones, jumps of a radian, NaN; then rest."""
     random, value = np.random.default_rng(seed), start.copy()
     for k in range(ticks):
@@ -26,14 +26,16 @@ def hostile(start, ticks, seed=5):
         chance, late = random.random(), random.normal()
         sample = np.where(random.random(len(start)) < 0.01, np.nan, value)
         yield k / RATE + (1e-3 * late if chance < 0.95 else -0.02), None if chance < 0.1 else sample
-    for k in range(ticks, ticks + round(15.0 * RATE)):
+    for k in range(ticks, ticks + round(8.0 * RATE)):
         yield k / RATE, value
 
 
 @pytest.mark.parametrize(
-    ("name", "seconds"), [("lamp", 8.0), *(pytest.param(*case, marks=pytest.mark.long) for case in LONG)]
+    ("name", "seconds", "seed"),
+    [("lamp", 8.0, 5), ("bartender", 2.0, 9), *(pytest.param(*case, marks=pytest.mark.long) for case in LONG)],
 )
-def test_commands_keep_their_limits_and_come_to_rest(repository, name, seconds):
+def test_commands_keep_their_limits_and_come_to_rest(repository, name, seconds, seed):
+    """The bartender of that seed still swings by the model when deviations are gone, and must not deviate again."""
     shot = compiled(Shot(repository / "samples" / name / f"{name}.usda"))
     motors, joints = shot.character.motors, shot.character.joints
     lower, upper = (np.array([getattr(joints[m.joint], side) for m in motors]) for side in ("lower", "upper"))
@@ -41,7 +43,7 @@ def test_commands_keep_their_limits_and_come_to_rest(repository, name, seconds):
     lookahead = 0.4 / modes_of(prepare(shot, RunSettings()))[0][0]
     with Live(shot, LiveSettings(RATE, lookahead, background=False)) as live:
         before, speed, beyond = live.start, np.zeros(len(motors)), np.full(3, -np.inf)
-        for stamp, sample in hostile(live.start, round(seconds * RATE)):
+        for stamp, sample in hostile(live.start, round(seconds * RATE), seed):
             commands = live.step(stamp, sample)
             now = (commands - before) * RATE
             parts = (np.maximum(commands - upper, lower - commands), np.abs(now) - fastest)

@@ -89,7 +89,7 @@ def test_a_stream_leaves_a_quarter_of_what_the_best_shaper_does(stream):
     shot = robot()
     frequencies, ratios = modes_of(prepare(shot, RunSettings(pre_roll=0.0)))
     lookahead = 0.4 / frequencies[0]
-    commands, latency, _ = streamed(shot, motion, 6.0, lookahead=lookahead)
+    commands, latency, _ = streamed(shot, motion, 6.0, lookahead=lookahead, uncertainty=0.0)
     assert latency <= lookahead + 0.5 / RATE
     live = left(shot, CubicSpline(ticks, commands), intended, times, latency)
     long = replace(shot.animation, frame_times=np.arange(0.0, 6.0, 1.0 / 24.0))
@@ -186,7 +186,7 @@ def test_motors_that_lag_far_behind_are_led_while_the_pose_turns(stream, toleran
     """A tenth of a second; a tolerance finer than what a linear model knows does not let commands grow."""
     motion, intended, ticks, times = stream
     shot = robot({"model": "drive", "position_gain": 200.0, "velocity_gain": 20.0, "damping_on": "joint"})
-    commands, latency, _ = streamed(shot, motion, 6.0, lookahead=0.14, tolerance=tolerance)
+    commands, latency, _ = streamed(shot, motion, 6.0, lookahead=0.14, tolerance=tolerance, uncertainty=0.0)
     live = left(shot, CubicSpline(ticks, commands), intended, times, latency)
     assert live <= 0.02 * left(shot, intended, intended, times, 0.0)
 
