@@ -77,6 +77,18 @@ def test_the_sentences_of_a_page_are_short_and_plain(page):
     assert sentences_through_code(text) == [], f"{page}: a sentence begins before a block of code and ends behind it"
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(REPOSITORY)))
+def test_tables_and_lists_of_a_page_end_where_they_seem_to(page):
+    """A text right below a table is a row of it, and a number right below an indented text is a part of that."""
+    lines = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL).splitlines()
+    swallowed = [
+        below for above, below in zip(lines, lines[1:], strict=False)
+        if (above.startswith("|") and below.strip() and not below.startswith(("|", "<!--")))
+        or (re.match(r"    \S", above) and re.match(r"(?:\d+\.|[-*]) ", below))
+    ]  # fmt: skip
+    assert swallowed == []
+
+
 def test_the_sentences_of_the_help_are_short():
     from calmotion.cli.main import build_parser
 
@@ -343,7 +355,7 @@ def site(tmp_path_factory):
 
 
 def test_the_documentation_builds_without_a_warning(site):
-    schemas = (site / "reference" / "schemas" / "index.html").read_text()
+    schemas = (site / "reference" / "schemas" / "index.html").read_text().replace("<wbr>", "")
     assert (
         "calm:target:rotationWeight" in schemas
         and "usage: calmotion optimize" in (site / "reference" / "commands" / "index.html").read_text()
