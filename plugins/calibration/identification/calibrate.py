@@ -249,10 +249,12 @@ def _notes(
 ) -> list[str]:
     """What the user must know."""
     notes = []
-    if not found.solution.converged:
-        notes.append("the search did not converge: the estimates may be far from the best ones")
-    if found.interrupted:
+    if found.interrupted and found.solution.converged:
         notes.append("interrupted while the step was halved: the estimates are those of the last step that converged")
+    elif found.interrupted:
+        notes.append("interrupted: the estimates are the best ones so far, and the search had not converged")
+    elif not found.solution.converged:
+        notes.append("the search did not converge: the estimates may be far from the best ones")
     if settings.halvings and found.shift > 1.0:
         notes.append("the estimates still depend on the time step: give a smaller one with --step")
     for take in found.problem.takes:

@@ -134,7 +134,7 @@ def settled(problem: Calibrated, solution: Solution) -> tuple[Scattered, Solutio
         # variances that an estimate has shown stay: else it returns to where pieces seem to agree
         apart = _scattered(apart, solution.z, residuals, jacobian)
         before, solution = solution.z, minimize(apart, solution.z, apart.lower)
-        if np.abs(solution.z - before).max() < SETTLED:
+        if np.abs(solution.z - before).max() < SETTLED or solution.interrupted:
             break
         residuals, jacobian = problem.linearized(solution.z)
     return apart, solution

@@ -12,11 +12,12 @@ Source: Nocedal, Wright, Numerical Optimization, 2006, section 10.3; Huber, Robu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from calmotion.arrays import Array
+from calmotion.support import answer
 
 HUBER = 3.0  # standard deviations: few residuals of a normal distribution are larger
 ENOUGH = 1e-2  # change of z, in standard deviations of its posterior, at which a search ends
@@ -50,6 +51,7 @@ class Solution:
         cost: Loss and prior.
         iterations: Number of linearisations.
         converged: Whether the last step was small, rather than that the iterations ended.
+        interrupted: Whether the user ended them.
     """
 
     z: Array
@@ -58,6 +60,7 @@ class Solution:
     cost: float
     iterations: int
     converged: bool
+    interrupted: bool = False
 
 
 def weights_of(residuals: Array) -> Array:
@@ -73,7 +76,7 @@ def loss_of(residuals: Array, counts: Array | float = 1.0) -> float:
 
 
 def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST, enough: float = ENOUGH) -> Solution:
-    """The minimum that is reached from a start.
+    """The minimum that is reached from a start; after an interrupt the last place that has derivatives.
 
     Args:
         problem: Its residuals.
@@ -84,12 +87,27 @@ def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST, eno
 
     Raises:
         ValueError: The residuals have no value at the start.
+        KeyboardInterrupt: Before there is any.
     """
+    known: list[Solution] = []
+    try:
+        return _minimized(problem, start, lower, most, enough, known)
+    except KeyboardInterrupt:
+        if not known:
+            raise
+        answer()
+        return replace(known[-1], interrupted=True)
+
+
+def _minimized(
+    problem: Problem, start: Array, lower: Array, most: int, enough: float, known: list[Solution]
+) -> Solution:
     z, counts = np.maximum(start, lower), problem.counts
     damping = FIRST
     for iteration in range(1, most + 1):
         r, J = problem.linearized(z)
         cost = loss_of(r, counts) + 0.5 * float(z @ z)
+        known[:] = [Solution(z, r, J, cost, iteration, False)]
         w = weights_of(r) / counts
         H = J.T @ (w[:, None] * J) + np.eye(len(z))
         gradient = J.T @ (w * r) + z
@@ -114,9 +132,9 @@ def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST, eno
                 break
             damping *= 10.0  # not back to the first: along a narrow bent valley steps need little of it
             if damping > LARGEST:
-                return Solution(z, r, J, cost, iteration, False)
+                return known[-1]
         if small:
-            return Solution(z, r, J, cost, iteration, True)
+            return replace(known[-1], converged=True)
     r, J = problem.linearized(z)
     return Solution(z, r, J, loss_of(r, counts) + 0.5 * float(z @ z), most, False)
 

@@ -8,7 +8,7 @@ parameter of the measurement is exact.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.arrays import Array
@@ -19,6 +19,8 @@ from calmotion.simulation import CompiledShot
 from calmotion.support import check
 
 from .measurement import Measurement, Motions
+from .recordings.noise import correlation_time, least_sigma, spread_of
+from .recordings.sensors import Sensor
 from .robots import robot_at
 from .signals import signals_of, with_rotors
 from .takes import Take
@@ -191,3 +193,40 @@ class Measured:
         """With their derivative, shape [N, m]."""
         change = [self._measurement.derivatives(self._signals, sensor, z) for sensor in self._measurement.sensors]
         return self._measurement.residuals(self._signals, z), -self._measurement.weighted(change)
+
+
+def correlated(problem: Calibrated, z: Array) -> Measurement:
+    """The measurement with the number of successive samples that count as one, as the residuals have it."""
+    measurement, y = problem.measurement, z[len(problem.parameters) :]
+    motions = problem.signals(z)
+
+    def of(sensor: Sensor) -> Sensor:
+        off = sensor.channel.values - measurement.predicted(motions, sensor, y)
+        return replace(sensor, count=correlation_time(np.where(sensor.fitted, off, np.nan)[sensor.used]))
+
+    return measurement.with_sensors([of(sensor) for sensor in measurement.sensors])
+
+
+def renoised(problem: Calibrated, z: Array) -> Measurement:
+    """The measurement with the noise of its sensors as the residuals have it, where it is not given.
+
+    A sensor has one noise in all shots: a shot that the model does not explain would else count as noise.
+    """
+    measurement, y = problem.measurement, z[len(problem.parameters) :]
+    motions, left = problem.signals(z), dict[object, list[Array]]()
+    places: list[tuple[str, str, int, int]] = []
+    for sensor in measurement.sensors:
+        off = sensor.channel.values - measurement.predicted(motions, sensor, y)
+        rank = sum(other[:3] == (sensor.channel.kind, sensor.channel.path, sensor.take) for other in places)
+        places.append((sensor.channel.kind, sensor.channel.path, sensor.take, rank))
+        left.setdefault((sensor.channel.kind, sensor.channel.path, rank), []).append(off[sensor.fitted])
+    spreads = {key: spread_of(np.concatenate(values)) for key, values in left.items()}
+
+    def of(sensor: Sensor, place: tuple[str, str, int, int]) -> Sensor:
+        if sensor.channel.sigma is not None:
+            return replace(sensor, sigma=sensor.channel.sigma)
+        spread = spreads[place[0], place[1], place[3]]
+        return replace(sensor, sigma=max(spread, least_sigma(sensor.channel.values)))
+
+    sensors = [of(*item) for item in zip(measurement.sensors, places, strict=True)]
+    return measurement.with_sensors(sensors)

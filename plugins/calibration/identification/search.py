@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,9 +18,8 @@ from .disagreement import Scattered, settled, together
 from .least_squares import Solution, chord, loss_of, minimize, posterior, weights_of
 from .measurement import Measurement
 from .model_error import covariance_of_model
-from .problem import Calibrated, Measured
+from .problem import Calibrated, Measured, correlated, renoised
 from .recordings.free_decay import decay_factors
-from .recordings.noise import correlation_time, least_sigma, spread_of
 from .recordings.sensors import Sensor
 from .takes import STIFF
 
@@ -70,31 +69,65 @@ def search(problem: Calibrated, tell: Callable[[float, str], None], halvings: in
     """
     starts = _starts(problem, tell)
     tell(0.3, "fitting the parameters")
-    rough: list[tuple[float, Calibrated, Array, int]] = []
-    for start in starts:
-        rough.append(_from(problem, start, FIRST_ITERATIONS))
-        count = sum(int(sensor.fitted.sum()) for sensor in problem.measurement.sensors)
-        if rough[-1][0] < EXPLAINED * 0.5 * count:
-            break
-    best, z, iterations = min(rough, key=lambda item: item[0])[1:]
-    best, halvings = _resolved(best, z, halvings)
-    for _ in range(ROUNDS):
-        solution = minimize(best, z, best.lower)
-        z, iterations = solution.z, iterations + solution.iterations
-        used = np.array([s.sigma for s in best.measurement.sensors])
-        best = best.with_measurement(renoised(best, z))
-        best = best.with_measurement(correlated(best, z))
-        if np.all(np.abs(np.array([s.sigma for s in best.measurement.sensors]) / used - 1.0) < STEADY):
-            break
-    tell(0.7, "comparing pieces of the recordings")
+    best, z, iterations, interrupted = _roughly(problem, starts)
+    apart, solution = together(best), None
+    try:  # what was found is not thrown away
+        if not interrupted:
+            best, halvings = _resolved(best, z, halvings)
+        for _ in range(0 if interrupted else ROUNDS):
+            solution = minimize(best, z, best.lower)
+            z, iterations = solution.z, iterations + solution.iterations
+            used = np.array([s.sigma for s in best.measurement.sensors])
+            best = best.with_measurement(renoised(best, z))
+            best = best.with_measurement(correlated(best, z))
+            off = np.abs(np.array([s.sigma for s in best.measurement.sensors]) / used - 1.0)
+            if np.all(off < STEADY) or solution.interrupted:
+                break
+        apart = together(best)
+        if solution is not None and not solution.interrupted:
+            tell(0.7, "comparing pieces of the recordings")
+            apart, solution = settled(best, solution)
+            tell(0.8, "halving the time step")
+    except KeyboardInterrupt:
+        answer()
+        apart, interrupted = together(best), True
+    if solution is None:
+        apart, solution = _noted(best, z)
+    interrupted = interrupted or solution.interrupted
+    return _converged(apart, solution, iterations, 0 if interrupted else halvings, interrupted)
+
+
+def _roughly(problem: Calibrated, starts: Sequence[Array]) -> tuple[Calibrated, Array, int, bool]:
+    """The best of short searches from some starts, until one explains the recordings; and whether it was interrupted.
+
+    Raises:
+        KeyboardInterrupt: Before there is any.
+    """
+    rough: list[_Rough] = []
+    count = sum(int(sensor.fitted.sum()) for sensor in problem.measurement.sensors)
     interrupted = False
     try:
-        apart, solution = settled(best, solution)
-    except KeyboardInterrupt:  # what converged is not thrown away
+        for start in starts:
+            rough.append(_from(problem, start, FIRST_ITERATIONS))
+            interrupted = rough[-1].interrupted
+            if interrupted or rough[-1].cost < EXPLAINED * 0.5 * count:
+                break
+    except KeyboardInterrupt:
+        if not rough:
+            raise
         answer()
-        apart, halvings, interrupted = together(best), 0, True
-    tell(0.8, "halving the time step")
-    return _converged(apart, solution, iterations, halvings, interrupted)
+        interrupted = True
+    best = min(rough, key=lambda item: item.cost)
+    return best.problem, best.z, best.iterations, interrupted
+
+
+def _noted(problem: Calibrated, z: Array) -> tuple[Scattered, Solution]:
+    """Where a search was interrupted, with the noise of the residuals there."""
+    problem = problem.with_measurement(renoised(problem, z))
+    problem = problem.with_measurement(correlated(problem, z))
+    residuals, jacobian = problem.linearized(z)
+    cost = loss_of(residuals, problem.counts) + 0.5 * float(z @ z)
+    return together(problem), Solution(z, residuals, jacobian, cost, 0, False, True)
 
 
 def _resolved(problem: Calibrated, z: Array, halvings: int) -> tuple[Calibrated, int]:
@@ -129,6 +162,9 @@ def _converged(
             other = chord(finer, solution)
             if other is None:  # derivatives there are others
                 other = minimize(finer, solution.z, finer.lower, FIRST_ITERATIONS)
+                if other.interrupted:
+                    interrupted = True
+                    break
                 iterations += other.iterations - 1
                 deviations, of_model = _deviations(finer, other)
         except KeyboardInterrupt:  # what converged is not thrown away
@@ -170,57 +206,43 @@ def _deviations(problem: Scattered, solution: Solution) -> tuple[Array, Array]:
     return np.sqrt(np.diag(covariance)), of_model
 
 
-def correlated(problem: Calibrated, z: Array) -> Measurement:
-    """The measurement with the number of successive samples that count as one, as the residuals have it."""
-    measurement, y = problem.measurement, z[len(problem.parameters) :]
-    motions = problem.signals(z)
-
-    def of(sensor: Sensor) -> Sensor:
-        off = sensor.channel.values - measurement.predicted(motions, sensor, y)
-        return replace(sensor, count=correlation_time(np.where(sensor.fitted, off, np.nan)[sensor.used]))
-
-    return measurement.with_sensors([of(sensor) for sensor in measurement.sensors])
-
-
-def renoised(problem: Calibrated, z: Array) -> Measurement:
-    """The measurement with the noise of its sensors as the residuals have it, where it is not given.
-
-    A sensor has one noise in all shots: a shot that the model does not explain would else count as noise.
-    """
-    measurement, y = problem.measurement, z[len(problem.parameters) :]
-    motions, left = problem.signals(z), dict[object, list[Array]]()
-    places: list[tuple[str, str, int, int]] = []
-    for sensor in measurement.sensors:
-        off = sensor.channel.values - measurement.predicted(motions, sensor, y)
-        rank = sum(other[:3] == (sensor.channel.kind, sensor.channel.path, sensor.take) for other in places)
-        places.append((sensor.channel.kind, sensor.channel.path, sensor.take, rank))
-        left.setdefault((sensor.channel.kind, sensor.channel.path, rank), []).append(off[sensor.fitted])
-    spreads = {key: spread_of(np.concatenate(values)) for key, values in left.items()}
-
-    def of(sensor: Sensor, place: tuple[str, str, int, int]) -> Sensor:
-        if sensor.channel.sigma is not None:
-            return replace(sensor, sigma=sensor.channel.sigma)
-        spread = spreads[place[0], place[1], place[3]]
-        return replace(sensor, sigma=max(spread, least_sigma(sensor.channel.values)))
-
-    sensors = [of(*item) for item in zip(measurement.sensors, places, strict=True)]
-    return measurement.with_sensors(sensors)
-
-
 def profiled(problem: Calibrated, z: Array) -> tuple[Array, float]:
     """z with the best parameters of the measurement for its robot, and the loss with the prior."""
     n = len(problem.parameters)
     solution = minimize(Measured(problem.measurement, problem.signals(z)), z[n:], problem.lower[n:])
+    if solution.interrupted:
+        raise KeyboardInterrupt
     return np.concatenate([z[:n], solution.z]), solution.cost + 0.5 * float(z[:n] @ z[:n])
 
 
-def _from(problem: Calibrated, start: Array, most: int) -> tuple[float, Calibrated, Array, int]:
+@dataclass(frozen=True, eq=False)
+class _Rough:
+    """Where a short search ended: its loss with the noise that sensors have, and what was found."""
+
+    cost: float
+    problem: Calibrated
+    z: Array
+    iterations: int
+    interrupted: bool
+
+
+def _from(problem: Calibrated, start: Array, most: int) -> _Rough:
     """A search from a start, with noise as large as what the start leaves: far residuals then keep their weight."""
-    free, z, iterations = _without_given_noise(problem), start, 0
+    free, z, iterations, interrupted = _without_given_noise(problem), start, 0, False
     for _ in range(2):
         wide = free.with_measurement(renoised(free, z))
-        found = minimize(wide, z, wide.lower, most, NEAR)
+        try:
+            found = minimize(wide, z, wide.lower, most, NEAR)
+        except KeyboardInterrupt:
+            if not iterations:
+                raise
+            answer()
+            interrupted = True
+            break
         free, z, iterations = wide, found.z, iterations + found.iterations
+        if found.interrupted:
+            interrupted = True
+            break
     # compared with the noise that the sensors have
     free = free.with_measurement(renoised(free, z))
     r = problem.with_measurement(problem.measurement).residuals(z)
@@ -229,7 +251,8 @@ def _from(problem: Calibrated, start: Array, most: int) -> tuple[float, Calibrat
         for own, sensor in zip(problem.measurement.sensors, free.measurement.sensors, strict=True)
     ]
     cost = np.inf if r is None else loss_of(r)
-    return cost, free.with_measurement(free.measurement.with_sensors(sensors)), z, iterations
+    known = free.with_measurement(free.measurement.with_sensors(sensors))
+    return _Rough(cost, known, z, iterations, interrupted)
 
 
 def _without_given_noise(problem: Calibrated) -> Calibrated:

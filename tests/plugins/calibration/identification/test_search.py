@@ -7,6 +7,7 @@ import pytest
 from calmotion import ShotError
 from calmotion.recordings import MARKER
 from calmotion_plugins.calibration.identification import search
+from calmotion_plugins.calibration.identification.problem import Calibrated
 from recorded import only, problem_of
 
 
@@ -46,6 +47,27 @@ def test_what_converged_is_kept_where_halving_the_step_ends(recorded_shot, recor
     found = search.search(problem, quiet, halvings=2)
     assert found.interrupted == isinstance(failure, KeyboardInterrupt)
     assert found.solution.converged and np.all(np.isfinite(found.covariance))
+
+
+@pytest.mark.parametrize("simulations", [0, 25, 32, 40, 50])
+def test_an_interrupt_keeps_the_best_estimates_so_far(recorded_shot, recordings, simulations):
+    problem = problem_of(recorded_shot, only(recordings, MARKER))
+    counted = []
+
+    def tell():
+        counted.append(1)
+        if len(counted) == simulations + 1:
+            raise KeyboardInterrupt
+
+    own = Calibrated(problem.takes, problem.measurement, problem.options, tell)
+    if not simulations:  # there is nothing yet
+        with pytest.raises(KeyboardInterrupt):
+            search.search(own, quiet, halvings=2)
+        return
+    found = search.search(own, quiet, halvings=2)
+    assert found.interrupted and np.all(np.isfinite(found.covariance)) and found.shift == 0.0
+    before, after = (np.abs(problem.residuals(z)).mean() for z in (np.zeros(len(found.z)), found.z))
+    assert after <= before
 
 
 def test_halving_ends_where_estimates_stay_though_each_step_needs_derivatives_of_its_own(
