@@ -180,9 +180,12 @@ class Links(Structure):
         """Optimise."""
         rows = {row["name"]: row["value"] for row in parameters}
         told = f"the links swing at {rows['frequency']:.3g} Hz"
-        if abs(rows["factor"] - 1.0) > 0.03:
-            told += f", {rows['factor']:.3g} times what the model says: run calmotion calibrate first"
-        return f"{told}; calmotion optimize changes the motor curves so that they do not"
+        if abs(rows["factor"] - 1.0) <= 0.03:
+            return f"{told}: run calmotion optimize, whose curves do not make them swing"
+        return (
+            f"{told}, {rows['factor']:.3g} times the frequency of the model: run calmotion calibrate, then calmotion "
+            "optimize, whose curves do not make them swing"
+        )
 
 
 def _lowered(M: Array, K: Array, h: float) -> Array:
