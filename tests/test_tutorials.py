@@ -35,6 +35,12 @@ TASKS = {
     "keep slow motors within their limits": "how_to/slow_motors",
     "find out what shakes": "how_to/diagnose",
     "make the model fit the robot": "tutorials/calibration",
+    "import a robot": "./importing",
+    "write commands for a controller": "./exporting",
+    "find the cause of what looks wrong": "./troubleshooting",
+    "optimise many shots": "how_to/shows",
+    "use several machines": "how_to/workers",
+    "play clips in any order": "how_to/clips",
 }
 
 
