@@ -7,7 +7,7 @@ from collections import Counter, deque
 import numpy as np
 from calmotion.arrays import Array
 
-from .regulation.limits import MotorLimits, braking_speed
+from .regulation.limits import MotorLimits
 
 LATE, REPEATED, DISORDERED, NOT_FINITE = "late", "repeated", "disordered", "not finite"
 JUMP, RESTARTED, REPLACED = "jump", "restarted", "replaced"
@@ -49,7 +49,7 @@ class Stream:
     def begin(self, position: Array) -> None:
         """Rest at a pose; the next sample is the first."""
         self.position, self.speed = np.array(position, float), np.zeros(len(position))
-        self._wanted = self.position
+        self._wanted, self._change = self.position, np.zeros(len(position))
         for kept in (self._samples, self._spacings, self.events):
             kept.clear()
         # own time: that of stamps plus `_offset`, where the tick of the first sample is 0
@@ -120,10 +120,11 @@ class Stream:
         """The positions at the next tick, shape [M]."""
         aim, speed = self._aim()
         h = self.tick
-        gap = aim - h * speed - self.position
         # in time this is the speed that leads to the aim; else the largest from which the rest can be caught up
-        catch_up = np.sign(gap) * braking_speed(np.abs(gap), self.limits.acceleration, h)
-        self.speed, acted = self.limits.kept(self.position, self.speed, speed + catch_up)
+        wanted = self.limits.towards(aim - h * speed - self.position, self.speed, self._change, speed)
+        before = self.speed
+        self.speed, acted = self.limits.kept(self.position, before, self._change, wanted)
+        self._change = self.speed - before
         self.position = self.position + h * self.speed
         locked = bool(np.all(np.abs(aim - self.position) <= 1e-12 + 1e-9 * np.abs(aim)))
         if locked:

@@ -8,7 +8,9 @@ import numpy as np
 from calmotion.arrays import Array, IntArray
 from calmotion.model import Character
 
-NAMES = ("position", "velocity", "acceleration", "effort")
+from .jerk import approach, kept_with_jerk
+
+NAMES = ("position", "velocity", "acceleration", "effort", "jerk")
 EFFORT = NAMES.index("effort")  # which is told, not kept
 
 
@@ -35,7 +37,7 @@ class MotorLimits:
 
     Attributes:
         lower, upper: Positions [rad or m], shape [M].
-        velocity, acceleration: Shape [M].
+        velocity, acceleration, jerk: Shape [M].
         tick: Time between two commands [s].
     """
 
@@ -43,6 +45,7 @@ class MotorLimits:
     upper: Array
     velocity: Array
     acceleration: Array
+    jerk: Array
     tick: float
 
     @classmethod
@@ -54,18 +57,33 @@ class MotorLimits:
             np.array([joint.upper for joint in joints], float),
             np.array([motor.max_velocity for motor in motors], float),
             np.array([motor.max_acceleration for motor in motors], float),
+            np.array([motor.max_jerk for motor in motors], float),
             tick,
         )
 
-    def share(self, of: float) -> MotorLimits:
-        """The same positions with a share of velocity and acceleration."""
-        return MotorLimits(self.lower, self.upper, of * self.velocity, of * self.acceleration, self.tick)
+    def towards(self, gap: Array, speed: Array, change: Array, aim: Array) -> Array:
+        """The speeds with which motors catch up, and do not pass, where they are wanted, shape [M].
 
-    def kept(self, position: Array, speed: Array, wanted: Array) -> tuple[Array, IntArray]:
+        Args:
+            gap: To where they are wanted at the next tick, if they go on with the speeds `aim` [rad or m].
+            speed, change: Of the last tick, as of `kept`.
+        """
+        caught = aim + np.sign(gap) * braking_speed(np.abs(gap), self.acceleration, self.tick)
+        limited = np.isfinite(self.jerk)
+        if not np.any(limited):
+            return caught
+        most = self.jerk * self.tick**2
+        gaps = gap + self.tick * aim
+        return np.where(
+            limited, approach(gaps, speed, change, aim, self.acceleration * self.tick, most, self.tick), caught
+        )
+
+    def kept(self, position: Array, speed: Array, change: Array, wanted: Array) -> tuple[Array, IntArray]:
         """The speeds next to wanted ones that keep all limits now and can keep them later.
 
         Args:
             position, speed: Where the motors are and how they came there, which kept the limits, shape [M].
+            change: By how much the speed changed with the last tick, shape [M].
             wanted: Speeds for the next tick, shape [M].
 
         Returns:
@@ -82,4 +100,11 @@ class MotorLimits:
         which: IntArray = np.where(
             wanted > most, upper.argmin(axis=0), np.where(wanted < least, lower.argmax(axis=0), -1)
         ).astype(np.int32)
+        limited = np.isfinite(self.jerk)
+        if np.any(limited):
+            slower, acted = kept_with_jerk(
+                position, speed, change, wanted, self.lower, self.upper, self.velocity, step,
+                self.jerk * self.tick**2, self.tick,
+            )  # fmt: skip
+            found, which = np.where(limited, slower, found), np.where(limited, acted, which).astype(np.int32)
         return found, which

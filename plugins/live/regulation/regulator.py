@@ -75,7 +75,7 @@ class Regulator:
     def begin(self, position: Array, gains: Gains) -> None:
         """Rest at a pose."""
         self._gains, self._x = gains, np.zeros(len(gains.transition))
-        self.command, self._speed = np.array(position, float), np.zeros(len(position))
+        self.command, self._speed, self._change = np.array(position, float), *np.zeros((2, len(position)))
         self._efforts.begin()
         self._guard.begin(len(self._x))
 
@@ -104,7 +104,9 @@ class Regulator:
             wanted = self._guard.glide(self._x[:m], self._x[m : 2 * m])
         intended = (window.next + self._efforts.lead - window.played - lead) / h
         asked = intended + self._coupling @ (self._x[m : 2 * m] + wanted)
-        self._speed, acted = self._limits.kept(self.command, self._speed, asked)
+        faster = self._speed
+        self._speed, acted = self._limits.kept(self.command, faster, self._change, asked)
+        self._change = self._speed - faster
         change = (self._speed - intended)[self._deviating] - self._x[m : 2 * m]
         before, following = self._x, window.next + self._efforts.lead
         self._x = gains.transition @ self._x + gains.by_change @ change + gains.by_impulse @ impulses[0]

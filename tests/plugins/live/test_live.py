@@ -146,10 +146,11 @@ def test_a_rigid_robot_gets_the_stream_as_it_is(stream):
     np.testing.assert_allclose(commands[late:], [motion(k / RATE) for k in range(1000 - late)], atol=1e-12)
 
 
+@pytest.mark.parametrize("jerk", [np.inf, 2000.0])
 @pytest.mark.parametrize("ticks", [4000, pytest.param(round(3600 * RATE), marks=pytest.mark.long)])
-def test_no_command_is_beyond_a_limit_whatever_arrives(ticks):
+def test_no_command_is_beyond_a_limit_whatever_arrives(ticks, jerk):
     random = np.random.default_rng(5)
-    shot = robot(max_velocity=3.0, max_acceleration=60.0)
+    shot = robot(max_velocity=3.0, max_acceleration=60.0, max_jerk=jerk)
     with Live(shot, LiveSettings(rate=RATE, lookahead=0.06, background=False)) as live:
         live.reset(np.zeros(2))
         found, value = [np.zeros(2)], np.zeros(2)
@@ -164,6 +165,7 @@ def test_no_command_is_beyond_a_limit_whatever_arrives(ticks):
     assert np.all(np.abs(found[:, 1]) <= 2.0 + 1e-9)
     assert np.abs(speed).max() <= 3.0 + 1e-9
     assert np.abs(np.diff(speed, axis=0)).max() * RATE <= 60.0 * (1.0 + 1e-6)
+    assert np.abs(np.diff(speed, 2, axis=0)).max() * RATE**2 <= jerk * (1.0 + 1e-6)
     assert report["limited"] and report["events"]["late"] and report["events"]["not finite"]
 
 

@@ -10,8 +10,8 @@ from calmotion_plugins.live.regulation.limits import MotorLimits
 TICK = 0.004
 
 
-def limits(count=1, lower=-2.0, upper=2.0, velocity=3.0, acceleration=40.0):
-    return MotorLimits(*(np.full(count, value) for value in (lower, upper, velocity, acceleration)), TICK)
+def limits(count=1, lower=-2.0, upper=2.0, velocity=3.0, acceleration=40.0, jerk=np.inf):
+    return MotorLimits(*(np.full(count, value) for value in (lower, upper, velocity, acceleration, jerk)), TICK)
 
 
 def begun(patience=0.1, period=0.0, **changes):
