@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from calmotion.model import Character
-from calmotion.recordings import ANGLE, MARKER, STRAIN
+from calmotion.recordings import ANGLE, MARKER
 from calmotion.usd import to_doubles, to_strings
 from scipy.spatial.transform import Rotation
 
@@ -42,24 +42,26 @@ def metadata_of(character: Character, calibration: Calibration) -> dict[str, Any
 
 
 def _predictions(character: Character, calibration: Calibration) -> dict[str, float]:
-    """How far recordings were from their prediction: at the places that markers and encoders tell of, root mean square
-    and largest [m]; of strain gauges, the share of the shake. Each is of the worst channel, if there is any."""
+    """How far recordings were from their prediction: the share of what links and motors that give do that was not
+    explained, and, of markers and of encoders of ideal motors, root mean square and largest at the places that they
+    tell of [m]. Each is of the worst channel, if there is any."""
     found = [(0.0, 0.0)]
     for fit in calibration.channels:
         kind, _, path = fit.name.partition(" ")
         held_out = np.isfinite(fit.validation_rms)
-        arm = 1.0 if kind == MARKER else _arm(character, path) if kind == ANGLE else 0.0
+        arm = 1.0 if kind == MARKER else _arm(character, path) if kind == ANGLE and np.isnan(fit.share) else 0.0
         found.append((arm * (fit.validation_rms if held_out else fit.rms), arm * fit.largest))
     rms, largest = np.max(found, axis=0)
     told = {"prediction_rms_m": float(rms), "prediction_largest_m": float(largest)} if rms > 0.0 else {}
-    share = gauge_share(calibration)
+    share = unexplained_share(calibration)
     return told | ({"prediction_share": share} if share else {})
 
 
-def gauge_share(calibration: Calibration) -> float:
-    """The share of the shake that a calibration leaves of the strain gauge that it predicts worst; 0 without gauges."""
-    gauges = [curve for curve in calibration.curves if curve.name.startswith(STRAIN)]
-    return max((float(np.nanstd(own.measured - own.after) / np.nanstd(own.measured)) for own in gauges), default=0.0)
+def unexplained_share(calibration: Calibration) -> float:
+    """The share of what links and motors that give did in its recordings that a calibration leaves unexplained, of the
+    channel that it predicts worst; 0 where none tells."""
+    shares = [fit.share for fit in calibration.channels if np.isfinite(fit.share)]
+    return max(shares, default=0.0)
 
 
 def _arm(character: Character, path: str) -> float:

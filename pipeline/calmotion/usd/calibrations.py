@@ -59,6 +59,6 @@ def predictions(stage: Usd.Stage) -> str | None:
             if 0.0 < share < np.inf:
                 return (
                     f"{begin} left {100.0 * share:.2g}% of the shake in its recordings; expect at least this share of "
-                    "the errors as animated in addition to the errors in this report"
+                    "the errors as animated beside the errors in this report"
                 )
     return None

@@ -36,12 +36,12 @@ from calmotion_plugins.calibration import (
     Robot,
     Signals,
     calibrate_shots,
-    gauge_share,
     place_of,
     read_performed,
     robot_parameters,
     robot_with,
     signals_of,
+    unexplained_share,
 )
 from scipy.interpolate import CubicSpline
 
@@ -177,7 +177,7 @@ def replays(machine: Machine, fits: Mapping[tuple[str, ...], Calibration], by: M
         name = max((name for name in spans if name not in own), key=spans.__getitem__)
         robot = machine.robot(name, fits[own].estimates).shot
         sensors = {path for one in machine.takes[name][1] for c in one.channels for path in (c.path, c.to)}
-        rows.append(replayed(", ".join(own), name, robot, gauge_share(fits[own]), beam, STEP, sensors))
+        rows.append(replayed(", ".join(own), name, robot, unexplained_share(fits[own]), beam, STEP, sensors))
     return rows
 
 

@@ -23,7 +23,8 @@ class Replayed:
         shot: Whose commands were optimised.
         before_mm, after_mm: Largest in the beam, with the commands as animated and as optimised.
         told_mm: What the report of the optimised commands tells: largest error of the simulation, and the share of the
-            error as animated that the fit left of its recordings' shake.
+            error as animated that the fit left of its recordings' shake, as errors that have nothing to do with each
+            other (root of the sum of squares).
     """
 
     fitted: str
@@ -63,4 +64,4 @@ def replayed(
 
     own = [k for k, target in enumerate(targets) if target.position_weight > 0.0]
     before, after = (1e3 * float(run.position_errors[rows][:, own].max()) for run in (result.before, result.after))
-    return Replayed(fitted, name, largest(intended), largest(calm), after + share * before)
+    return Replayed(fitted, name, largest(intended), largest(calm), float(np.hypot(after, share * before)))

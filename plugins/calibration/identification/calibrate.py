@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import RunSettings
-from calmotion.recordings import SensorRecording, unit_of
+from calmotion.model import PRESCRIBED, RunSettings, curve_of
+from calmotion.recordings import ANGLE, STRAIN, SensorRecording, unit_of
 from calmotion.simulation import CompiledShot
 
 from ..model.estimates import (
@@ -34,7 +34,7 @@ from .recordings.plausible import refuse_long, refuse_unlike
 from .recordings.sensors import Sensor, gauge_parameters, measurement_parameters, sensors_of, start_parameters
 from .search import HALVINGS, Found, profiled, search, step_of
 from .signals import begins_in_motion, refuse_cyclic
-from .takes import all_simulable, begun, hardly_shaking, takes_of
+from .takes import Take, all_simulable, begun, hardly_shaking, takes_of
 
 AFTER = 1.0  # what a recording holds after the end of the shot is used up to here [s]
 STRONG = 0.9  # correlation that is worth a note
@@ -228,6 +228,7 @@ def _fits(
                 _rms(off[sensor.validated]),
                 int((np.abs(off[fitted]) > 3.0 * sensor.sigma).sum()),
                 float(np.abs(off[sensor.validated if sensor.validated.any() else fitted]).max(initial=0.0)),
+                _share(problem.takes[sensor.take], sensor, measurement.robot_times(sensor, y), off),
             )
         )
         used = sensor.used
@@ -238,6 +239,20 @@ def _fits(
             )
         )
     return tuple(fits), tuple(curves)
+
+
+def _share(take: Take, sensor: Sensor, times: Array, off: Array) -> float:
+    """The share of what an ideal robot would not show of a sensor that is left unexplained; NaN if that is unknown."""
+    channel, whole = sensor.channel, sensor.fitted | sensor.validated
+    if channel.kind == STRAIN:
+        added = channel.values - channel.values[whole].mean()
+    elif channel.kind == ANGLE and take.shot.character.motors[sensor.index].model != PRESCRIBED:  # type: ignore[index]
+        command = curve_of(take.shot.animation.current[sensor.index], take.end, False)  # type: ignore[index]
+        added = channel.values - command(times, 0)[:, None]
+    else:
+        return float("nan")
+    own = [part for part in (whole, sensor.validated) if part.any()]
+    return max(_rms(off[part]) / max(_rms(added[part]), 1e-300) for part in own)
 
 
 def _rms(values: Array) -> float:

@@ -93,6 +93,9 @@ class ChannelFit:
         rms, validation_rms: With the estimated ones, over fitted and over held-out values; NaN where there are none.
         outliers: Number of fitted values with less than full weight.
         largest: Residual of the held-out values, of the fitted ones where none were held out.
+        share: Of what links and motors that give add to the motion of an ideal robot, that is not explained: root mean
+            square of the residuals over that of the signal less an ideal robot's, over held-out values or all of them,
+            whichever leaves more; NaN of a channel that does not tell.
     """
 
     recording: str
@@ -106,6 +109,7 @@ class ChannelFit:
     validation_rms: float
     outliers: int
     largest: float = float("nan")
+    share: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import pytest
 from calmotion import ShotError
 from calmotion.usd import stages
 from calmotion.usd.reading import read_shot
-from calmotion_plugins.calibration.model.estimates import Calibration, ChannelCurves, ChannelFit, Estimate
+from calmotion_plugins.calibration.model.estimates import Calibration, ChannelFit, Estimate
 from calmotion_plugins.calibration.writing import write_calibration
 from pxr import Sdf, Usd
 from scipy.spatial.transform import Rotation
@@ -229,10 +229,12 @@ def test_a_shot_tells_how_far_its_calibration_was_from_an_encoder_at_the_farthes
     assert f"by {20 * arm:.3g} mm (root mean square), {50 * arm:.3g} mm at most; expect at least that" in note
 
 
-def test_a_shot_tells_which_share_of_a_gauge_s_shake_its_calibration_left(shot, tmp_path):
-    times = np.linspace(0.0, 1.0, 200)[:, None]
-    swing, other = np.sin(40.0 * times), np.cos(55.0 * times)
-    curve = ChannelCurves("take.csv", f"strain {FORE}", "", times[:, 0], swing, swing, swing - 0.2 * other, times < 0)
-    (note,), _ = told_of(shot, tmp_path, curves=(curve,))
-    assert f"left {100 * 0.2 * other.std() / swing.std():.2g}% of the shake" in note
+def test_a_shot_tells_which_share_of_the_shake_its_calibration_left(shot, tmp_path):
+    shares = (("angle", ELBOW, 0.07), ("strain", FORE, 0.12), ("accelerometer", FORE, float("nan")))
+    fits = [
+        ChannelFit("take.csv", f"{kind} {path}", "", 90, 10, 1e-3, 0.1, 0.01, 0.02, 0, 0.05, share)
+        for kind, path, share in shares
+    ]
+    (note,), _ = told_of(shot, tmp_path, channels=tuple(fits))
+    assert "left 12% of the shake" in note
     assert told_of(shot, tmp_path)[0] == []
