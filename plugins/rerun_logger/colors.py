@@ -26,12 +26,12 @@ class Style:
     width: float
     label: str
 
-    def shade(self, index: int, count: int) -> Color:
-        """A relative of the color, for one of several curves: another hue nearby, darker and brighter in turn."""
+    def shade(self, index: int, count: int, spread: float = SPREAD) -> Color:
+        """A relative of the color, one of several curves: another hue within the `spread`, dark and bright in turn."""
         if count < 2:
             return self.color
         hue, _, strength = colorsys.rgb_to_hls(*(c / 255.0 for c in self.color))
-        hue += SPREAD * (index / (count - 1) - 0.5)
+        hue += spread * (index / (count - 1) - 0.5)
         wanted = (DARKEST, BRIGHTEST)[index % 2]
         low, high = 0.0, 1.0
         for _ in range(20):  # luminance grows with lightness

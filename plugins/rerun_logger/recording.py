@@ -236,7 +236,7 @@ def log_changes(recording: rr.RecordingStream, character: Character, result: Res
     for m, motor in enumerate(character.motors):
         measure = measure_of(motor)
         change = measure.factor * (after.motor_values[rows, m] - before.motor_values[:, m])
-        color = STYLES[OPTIMIZED].shade(m, len(character.motors))
+        color = STYLES[OPTIMIZED].shade(m, len(character.motors), spread=0.85)  # no two runs to tell apart
         name = f"{names[motor.path]} [{measure.unit}]"
         log_curve(recording, f"changes_{measure.unit}{motor.path}", after.times[rows], change, color, name)
 
