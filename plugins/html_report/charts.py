@@ -61,9 +61,10 @@ def _panel(axes: Axes, xlabel: str, packing: Packing, points: int) -> dict[str, 
             at = {"x": float(x[0])} if along_x else {"y": float(y[0])}
             marks.append(at | {"color": _color(line.get_color()), "label": _label(line)})
     spans = [
-        patch.get_extents().transformed(axes.transData.inverted()).intervalx.tolist()
+        [low, high, "".join(text.get_text() for text in axes.texts if low <= text.get_position()[0] <= high)]
         for patch in axes.patches
         if patch.get_data_transform().contains_branch_seperately(axes.transData) == (True, False)
+        for low, high in [patch.get_extents().transformed(axes.transData.inverted()).intervalx.tolist()]
     ]
     bars = [
         {"points": segment.tolist(), "color": _color(collection.get_color()[0])}

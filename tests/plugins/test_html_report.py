@@ -199,6 +199,7 @@ def test_a_figure_keeps_its_lines_labels_limits_and_marks():
     lower.axvline(3.0, color="#7f7f7f", label="a mode")
     lower.axhline(2.0)
     lower.axvspan(4.0, 5.0)
+    lower.text(4.5, 0.1, "the elbow", transform=lower.get_xaxis_transform())
     lower.set_xlabel("time [s]")
     rows = Figure()
     listed = rows.subplots()
@@ -215,7 +216,8 @@ def test_a_figure_keeps_its_lines_labels_limits_and_marks():
     assert second["ylog"] and second["curves"][0]["dots"]
     assert {"x": 3.0, "color": "var(--limit)", "label": "a mode"} in second["marks"]
     assert [mark["y"] for mark in second["marks"] if "y" in mark] == [2.0]
-    np.testing.assert_allclose(second["spans"], [[4.0, 5.0]])
+    ((low, high, label),) = second["spans"]
+    assert (low, high) == pytest.approx((4.0, 5.0)) and label == "the elbow"
 
 
 def test_the_command_writes_a_page_with_the_words_of_its_report(calmotion, tmp_path):
