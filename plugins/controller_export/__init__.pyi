@@ -12,6 +12,7 @@ from .commands import HOLD as HOLD
 from .commands import LINEAR as LINEAR
 from .commands import QUINTIC as QUINTIC
 from .commands import Commands as Commands
+from .commands import ExportRequest as ExportRequest
 from .commands import Follower as Follower
 from .commands import MotorCurves as MotorCurves
 from .commands import WrittenCommands as WrittenCommands

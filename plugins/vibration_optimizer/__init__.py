@@ -62,14 +62,10 @@ def _input(context: RunContext) -> tuple[Character | None, Animation | None]:
 
 
 def _told(term: TermUse) -> str:
-    """What became of a residual or limit of a plugin, as a clause."""
-    before, after = f"{term.before:.4g} {term.unit}".rstrip(), f"{term.after:.4g} {term.unit}".rstrip()
-    if term.limit is None:
-        return f"{term.name}: {after} rms, {before} before"
+    """What became of a limit of a plugin that is exceeded, as a clause."""
+    before, after, limit = (f"{v:.4g} {term.unit}".rstrip() for v in (term.before, term.after, term.limit))
     where = f" of {term.label}" if term.label else ""
-    verdict = "exceeds its limit" if is_exceeded(term) else "keeps its limit"
-    limit = f"{term.limit:.4g} {term.unit}".rstrip()
-    return f"{term.name}{where} {verdict} {limit}: {after} at {term.time_s:.3f} s, {before} before"
+    return f"{term.name}{where} exceeds its limit {limit}: {after} at {term.time_s:.3f} s, {before} before"
 
 
 def _wrong_command(data: Mapping[type, Any], command: str) -> str | None:
@@ -283,8 +279,9 @@ class OptimizeShot(Operator):
             context.report(
                 "warning", "interrupted: these are the best curves so far; the same command resumes from them"
             )
-        for term in result.terms:
-            context.report("warning" if is_exceeded(term) else "info", _told(term))
+        result = _with_budget(context, result, least_gain=options.least_gain)
+        for term in filter(is_exceeded, result.terms):
+            context.report("warning", _told(term))
         if not result.improved:
             reason = f"the search ended: {result.search.stopped}"
             if any(map(is_exceeded, result.limits)):
@@ -299,7 +296,7 @@ class OptimizeShot(Operator):
                 "warning",
                 f"the new curves are worse than the animated ones: {reason}",
             )
-        return [_with_budget(context, result, least_gain=options.least_gain)]
+        return [result]
 
     def _search_options(self, context: RunContext) -> Any:
         values, added = context.properties, context.get(SearchTerms)

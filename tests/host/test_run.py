@@ -120,6 +120,19 @@ def test_a_used_value_whose_making_failed_stops_its_users():
     assert list(outcomes(run).values()) == [Outcome.FAILED, Outcome.BLOCKED, Outcome.BLOCKED]
 
 
+def test_no_step_is_done_for_what_cannot_be_made_any_more_and_others_are():
+    def explode(context):
+        raise RuntimeError("no match")
+
+    burn = operator("wood.burn", provides=[Coal], execute=explode)
+    alloy = operator("smithy.alloy", requires=[Iron], uses=[Coal], provides=[Steel])
+    run = host_of(DIG, burn, MELT, alloy).run([], [Steel]).finish()
+    assert outcomes(run)["wood.burn"] is Outcome.FAILED and outcomes(run)["smithy.melt"] is Outcome.BLOCKED
+    assert "there is no Coal" in run.results[-2].reason
+    run = host_of(DIG, burn, MELT, alloy).run([], [Steel, Iron]).finish()
+    assert run.get(Iron) is not None and run.get(Steel) is None, "what else was asked for is made"
+
+
 def test_a_poll_sees_what_is_known_and_an_alternative_is_not_left_out():
     def when(amount):
         return lambda data: None if data[Ore].amount == amount else f"there are {data[Ore].amount}"

@@ -97,6 +97,7 @@ class Run:
         self._made: dict[type, type[Operator]] = {}
         self._refused: dict[type, tuple[type[Operator], ...]] = {}
         self._lost: set[type] = set()  # values of operators that refuse their settings, which nothing else makes
+        self._gone: set[type] = set()  # the same of operators that failed
         self._checked: dict[type[Operator], bool] = {}
         self._properties = properties
         self._owners = owners
@@ -118,6 +119,8 @@ class Run:
                 yield refusal
             if self._checked.get(cls, True):
                 result = self._step(cls)
+                if result.outcome == Outcome.FAILED:
+                    self._gone |= self._only_by(cls, self.plan.operators[index + 1 :])
                 self.results.append(result)
                 yield result
 
@@ -142,10 +145,16 @@ class Run:
             except (Exception, SystemExit) as error:  # a plugin does not end the host
                 interrupts.check()
                 self._checked[cls] = False
-                others = [one for one in remaining if one is not cls and will_run(one, self.data, coming)]
-                self._lost |= set(cls.provides).difference(*(one.provides for one in others))
+                self._lost |= self._only_by(cls, remaining)
                 refusals.append(self._failure(cls, error))
         return refusals
+
+    def _only_by(self, cls: type[Operator], remaining: Sequence[type[Operator]]) -> set[type]:
+        """What is missing where an operator fails, since no other one made it, or is certain to."""
+        coming = {kind for one in remaining for kind in one.provides} - self.data.keys()
+        others = [one for one in remaining if one is not cls and will_run(one, self.data, coming)]
+        made = self.data.keys() | {kind for one in others for kind in one.provides}
+        return {kind for kind in cls.provides if kind not in made or adds_up(kind)}
 
     def _is_useful(self, cls: type[Operator]) -> bool:
         """Whether an operator is still needed without the values that cannot be made.
@@ -154,7 +163,7 @@ class Run:
         """
         if self._lost.intersection(self.plan.wanted):
             return False
-        lost = self._refused.keys() | self._lost
+        lost = self._refused.keys() | self._lost | self._gone
         return not lost or cls in self.plan.useful(lost, self.data)
 
     def _step(self, cls: type[Operator]) -> OperatorResult:
@@ -171,7 +180,7 @@ class Run:
             return self._result(cls, Outcome.BLOCKED, reason=f"there is no {names}")
         if not self._is_useful(cls):
             self._failed |= set(cls.provides)
-            names = ", ".join(kind.__name__ for kind in self._refused or self._lost)
+            names = ", ".join(kind.__name__ for kind in self._refused or self._lost | self._gone)
             why = "more than one operator makes" if self._refused else "there is no"
             return self._result(cls, Outcome.BLOCKED, reason=f"{why} {names}")
         start = time.perf_counter(), _processor_time()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +13,12 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Character, TermUse
 from calmotion.model.limits.bounds import Bounds, excesses
+from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.posing import refuse_continuous
 from calmotion.retargeting.problem.problem import Evaluation
-from calmotion.retargeting.problem.robot import of_robot
+from calmotion.retargeting.problem.robot import GROUND, of_robot
 from calmotion.retargeting.quantities.base import Quantity
 from calmotion.retargeting.quantities.functions import FilteredCommands, FunctionOf
 from calmotion.retargeting.quantities.terms import AddedLimit, AddedResidual, SearchTerm
@@ -27,8 +29,16 @@ def refuse_terms(options: RunSettings, character: Character) -> None:
     """Refuse terms that a search cannot have.
 
     Raises:
-        ShotError: Two have one name, or the adjoint is continuous.
+        ShotError: One has no name, or that of another one or of a limit of the motors, or the adjoint is continuous.
     """
+    for term in options.terms:
+        name = getattr(term, "name", "")
+        if not name or name in (*kinds_of_limits(), GROUND):
+            what = "the name of a limit that every search has" if name else "no name"
+            raise ShotError(
+                f"a term of the search has {what}", path=character.path, attribute=_place(term), found=name or None,
+                remedy="Give its class another `name`, which reports show." if name else "Set `name` in its class.",
+            )  # fmt: skip
     names = [term.name for term in options.terms]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -47,8 +57,7 @@ def with_terms(at: Evaluation, character: Character, terms: Sequence[SearchTerm]
         at: At the curves of the input.
 
     Raises:
-        ShotError: The shot lacks what a term needs.
-        ValueError: A quantity, its weight or its bounds are not as they should be.
+        ShotError: The shot lacks what a term needs, or a quantity, its weight or its bounds are not as they should be.
     """
     if not terms:
         return at
@@ -57,15 +66,17 @@ def with_terms(at: Evaluation, character: Character, terms: Sequence[SearchTerm]
     for k, run in enumerate(at.runs):
         residuals, limited = list(run.robot.residuals), dict(run.robot.limited)
         for term in terms:
-            made = term.quantity(character, run.robot.model, problem.grid)
-            values = _checked(term, made.values(run.run), problem.grid)
-            if isinstance(term, AddedLimit) and k and isinstance(made, FilteredCommands):
-                continue  # all robots perform the same curves
-            if isinstance(term, AddedLimit):
-                limited[term.name] = made
-                bounds[of_robot(term.name, k)] = _bounds(term, character, values.shape[1])
-            elif isinstance(term, AddedResidual):
-                residuals.append(_weighted(term, made, problem.grid, values.shape[1]))
+            with _blamed(term, character):
+                made = term.quantity(character, run.robot.model, problem.grid)
+                values = _checked(made.values(run.run), problem.grid)
+                made.slopes(run.run)
+                if isinstance(term, AddedLimit) and k and isinstance(made, FilteredCommands):
+                    continue  # all robots perform the same curves
+                if isinstance(term, AddedLimit):
+                    limited[term.name] = made
+                    bounds[of_robot(term.name, k)] = _bounds(term, character, values.shape[1])
+                elif isinstance(term, AddedResidual):
+                    residuals.append(_weighted(term, made, problem.grid, values.shape[1]))
         robots.append(replace(run.robot, residuals=tuple(residuals), limited=limited))
     limits = LimitTerms.of(bounds, problem.grid.judged, problem.grid.h)
     return at.with_robots(replace(problem, robots=tuple(robots), limits=limits))
@@ -98,35 +109,51 @@ def _use(before: Evaluation, after: Evaluation, character: Character, term: Sear
     )  # fmt: skip
 
 
-def _checked(term: SearchTerm, values: Array, grid: TimeGrid) -> Array:
+@contextmanager
+def _blamed(term: SearchTerm, character: Character) -> Iterator[None]:
+    """Errors of a term are told as its own, not as those of the search."""
+    try:
+        yield
+    except ShotError:
+        raise
+    except Exception as error:
+        raise ShotError(
+            f"the term {term.name!r} of a plugin failed", path=character.path, attribute=_place(term),
+            found=str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}",
+            remedy="Correct the class of the term, or disable its plugin.",
+        ) from error  # fmt: skip
+
+
+def _checked(values: Array, grid: TimeGrid) -> Array:
     """Values of a term's quantity."""
     if values.ndim != 2 or len(values) != len(grid.times):
-        raise ValueError(f"{_named(term)}: values have shape {list(values.shape)} instead of [{len(grid.times)}, R]")
+        raise ValueError(f"values have shape {list(values.shape)} instead of [{len(grid.times)}, R]")
     if not np.all(np.isfinite(values)):
-        raise ValueError(f"{_named(term)}: values at the input are not finite")
+        raise ValueError("values at the input are not finite")
     return values
 
 
 def _bounds(term: AddedLimit, character: Character, count: int) -> Bounds:
     ends = [np.asarray(end, float) for end in term.bounds(character)]
     if any(end.shape not in ((), (count,)) for end in ends):
-        raise ValueError(f"{_named(term)}: bounds have shapes {[list(e.shape) for e in ends]} instead of [{count}]")
+        raise ValueError(f"bounds have shapes {[list(e.shape) for e in ends]} instead of [{count}]")
     lower, upper = (np.broadcast_to(end, count).copy() for end in ends)
     if not np.any(np.isfinite([lower, upper])):
-        raise ValueError(f"{_named(term)}: no bound is finite; add no term where there is no limit")
+        raise ValueError("no bound is finite; add no term where there is no limit")
     if not np.all(lower <= upper):
-        raise ValueError(f"{_named(term)}: the least value {lower.tolist()} is not below the largest {upper.tolist()}")
+        raise ValueError(f"the least value {lower.tolist()} is not below the largest {upper.tolist()}")
     return Bounds.between(lower, upper)
 
 
 def _weighted(term: AddedResidual, made: Quantity, grid: TimeGrid, count: int) -> Quantity:
     weight = np.asarray(term.weight(grid.times), float)
     if weight.shape not in ((), grid.times.shape) or not np.all(weight >= 0.0):
-        raise ValueError(f"{_named(term)}: weights are not {len(grid.times)} numbers of at least 0")
+        raise ValueError(f"weights are not {len(grid.times)} numbers of at least 0")
     roots = np.sqrt(weight * grid.quadrature)
     matrix = diags(np.repeat(roots, count), format="csr")
     return FunctionOf(made, lambda values: (roots[:, None] * values, matrix))
 
 
-def _named(term: SearchTerm) -> str:
-    return f"the term {term.name!r} ({type(term).__module__}.{type(term).__qualname__})"
+def _place(term: SearchTerm) -> str:
+    """Where the class of a term is."""
+    return f"{type(term).__module__}.{type(term).__qualname__}"

@@ -13,7 +13,7 @@ from calmotion.host import OperatorResult, Run
 from calmotion.model import Character, LimitUse, ModelChoices, Provenance, Result, Simplification
 from calmotion.model.character import motors_give
 from calmotion.model.limits.kinds import kinds_of_limits
-from calmotion.model.limits.use import is_exceeded
+from calmotion.model.limits.use import TermUse, is_exceeded
 from calmotion.model.motor import measure_of
 from calmotion.model.outputs import CsvFile, Figures, Recording, Rig, Verification, Video, WrittenLayer
 from calmotion.model.result import Retimed
@@ -70,6 +70,20 @@ def limit_row(character: Character, limit: LimitUse) -> dict[str, Any]:
     }
 
 
+def term_row(term: TermUse) -> dict[str, Any]:
+    """One row of `terms`, of which residuals have no limit."""
+    limits = {} if term.limit is None else {"time_s": term.time_s, "exceeded": is_exceeded(term)}
+    return {
+        "name": term.name,
+        "unit": term.unit,
+        "label": term.label,
+        "before": term.before,
+        "after": term.after,
+        "limit": term.limit,
+        **limits,
+    }
+
+
 def effort_rows(character: Character, result: Result) -> list[dict[str, Any]]:
     """The largest effort of each motor during the shot, and its estimated error by the time step."""
     motion = (result.after or result.before).motion
@@ -119,6 +133,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "parameters": result.search.parameters,
         "newton_iterations": final.newton_iterations,
         "limits": [limit_row(character, limit) for limit in result.limits],
+        "terms": [term_row(term) for term in result.terms],
         "max_joint_gap_m": final.max_joint_gap,
         "refined_steps": final.refined_steps,
         "loop_growth": final.floquet_multiplier,

@@ -3,7 +3,7 @@
 import io
 
 import pytest
-from calmotion.cli.reports.limits import print_left_out, print_limits, print_reason
+from calmotion.cli.reports.limits import print_left_out, print_limits, print_reason, print_terms
 from calmotion.cli.tables import console_on
 
 
@@ -14,9 +14,9 @@ def row(path, limit, before, after, quantity="effort", cost=None, time=0.5):
     return values | {"path": path, "quantity": quantity, "cost_m": cost, "time_s": time}
 
 
-def told(limits, before=1.0, after=2.0, interrupted=False):
+def told(limits, before=1.0, after=2.0, interrupted=False, terms=()):
     stream = io.StringIO()
-    report = {"limits": limits, "improved": after <= before, "interrupted": interrupted}
+    report = {"limits": limits, "improved": after <= before, "interrupted": interrupted, "terms": terms}
     print_reason(console_on(stream), report)
     return " ".join(stream.getvalue().split())
 
@@ -47,6 +47,17 @@ def test_curves_that_still_exceed_limits_come_with_cause_and_remedy():
 def test_worse_curves_come_with_a_reason_and_better_ones_without(rows, after, interrupted, said):
     text = told(rows, after=after, interrupted=interrupted)
     assert text.startswith(said) and bool(text) == bool(said)
+
+
+def test_terms_of_plugins_are_a_table_and_a_reason_for_worse_curves():
+    rough = {"name": "roughness", "unit": "m/s", "label": "", "before": 2.0, "after": 1.0, "limit": None}
+    power = {"name": "power", "unit": "W", "label": "/Arm", "before": -20.0, "after": -10.5, "limit": -10.0}
+    power |= {"time_s": 0.2, "exceeded": True}
+    stream = io.StringIO()
+    print_terms(console_on(stream), [rough, power])
+    rows = [line.split() for line in stream.getvalue().splitlines()[-2:]]
+    assert rows == ["roughness 2 m/s rms 1 m/s rms".split(), "power /Arm -10 W -20 W -10.5 W 0.200 s exceeded".split()]
+    assert told([], float("nan"), terms=[rough]) == "", "they are why the curves may be worse"
 
 
 def test_a_position_keeps_its_sign():

@@ -18,6 +18,7 @@ def report(**values):
     budget = [{"source": "mesh", "allowed_m": 4e-4, "estimated_m": None}]
     budget = [{"source": "time step", "allowed_m": 5e-4, "estimated_m": 3e-4}, *budget]
     known = {"error_budget": budget, "tolerance_m": 1e-3, "tolerance_kept": True, "tolerance_missed_by": None}
+    known |= {"motors": [{"path": "/Cup/Turn", "changed": True}], "terms": []}
     known |= {"shot": "shot.usda", "limits": [], "interrupted": False, "improved": True, "step_s": 2e-3, "goal_m": None}
     return (
         known
@@ -161,6 +162,8 @@ def test_each_target_has_its_own_error_before_and_after_and_the_main_one_is_firs
         "The new curves are worse than the animation.",
         "The largest error rises from 60 mm to 70 mm (at /Cup).",
     ]
+    still = printed(two_targets(0.07) | {"motors": [{"path": "/Turn", "changed": False}]}).splitlines()
+    assert still[0].startswith("No curve was changed") and still[1].endswith("stays at 60 mm (at /Cup).")
     alone = printed(report(targets=[{"path": "/Cup", "max_error_m": 0.06}]))
     assert alone.startswith("As animated, the largest error is 60 mm (at /Cup).")
 

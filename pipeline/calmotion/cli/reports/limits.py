@@ -49,6 +49,20 @@ def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: 
     print_table(console, "Active limits of motors", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
 
 
+def print_terms(console: Console, terms: Sequence[dict[str, Any]]) -> None:
+    """Residuals and limits of plugins."""
+    rows = []
+    for row in terms:
+        before, after = (f"{row[when]:.4g} {row['unit']}".rstrip() for when in ("before", "after"))
+        if row["limit"] is None:
+            rows.append([row["name"], row["label"], "", f"{before} rms", f"{after} rms", "", ""])
+        else:
+            limit, verdict = f"{row['limit']:.4g} {row['unit']}".rstrip(), "exceeded" if row["exceeded"] else "kept"
+            rows.append([row["name"], row["label"], limit, before, after, f"{row['time_s']:.3f} s", verdict])
+    heads = ["quantity", "of", "limit", "before", "after", "at", ""]
+    print_table(console, "Residuals and limits of plugins", heads, rows, texts=2)
+
+
 def print_tempo(console: Console, tempo: dict[str, Any] | None) -> None:
     """How much slower the animation would have to be for motors to keep their limits on rigid links."""
     if tempo is None:
@@ -111,7 +125,7 @@ def print_reason(console: Console, report: dict[str, Any]) -> None:
     elif worse and any(row["cost_m"] is not None for row in limits):
         say(console, "The new curves keep limits that the animation exceeds; the table of limits says what each costs.")
         say(console, "Slow the animation down there, or raise these limits, to come nearer to it.")
-    elif worse:
+    elif worse and not report["terms"]:
         how = "was interrupted" if report["interrupted"] else "ended"
         say(console, f"The search {how} before it improved on the animation: keep the shot as it is, or go on.")
 

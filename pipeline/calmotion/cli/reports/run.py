@@ -10,7 +10,7 @@ from typing import Any
 from rich.console import Console
 
 from calmotion.cli.reports.feet import print_contacts, print_support
-from calmotion.cli.reports.limits import print_left_out, print_limits, print_retiming
+from calmotion.cli.reports.limits import print_left_out, print_limits, print_retiming, print_terms
 from calmotion.cli.reports.verdict import (
     is_optimized,
     is_still,
@@ -244,6 +244,7 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
             "rest; the errors above do not include this, and no motor curve removes it",
         )
     print_limits(console, report["limits"], bool(suffix))
+    print_terms(console, report["terms"])
     sags = {target["path"]: target[f"sag{suffix}_m"] or 0.0 for target in report["targets"]}
     hanging = max(sags, key=sags.__getitem__, default="")
     if hanging and sags[hanging] > 1e-6:

@@ -52,10 +52,14 @@ def print_verdict(console: Console, report: dict[str, Any]) -> None:
     if is_still(report):
         say(console, f"{NOTHING_SHAKES[:1].upper()}{NOTHING_SHAKES[1:]}.")
     elif is_optimized(report):
+        changed = any(motor["changed"] for motor in report["motors"])
         if report["improved"] is False:
             say(console, "The new curves are worse than the animation.")
+        elif not changed:
+            say(console, "No curve was changed: what a change would gain is too little for this tolerance or goal.")
         for row in rows[:HEADLINES]:
             before, after = (length(row[f"max_error_{when}_m"]) for when in ("before", "after"))
+            after = after if changed else before  # which differ by how they were simulated
             falls = row["max_error_after_m"] < row["max_error_before_m"]
             change = f"{'falls' if falls else 'rises'} from {before} to {after}"
             _say_of(console, row, rows, "The largest error", f"stays at {after}" if before == after else change)

@@ -43,10 +43,14 @@ class EffortSlopes:
 
     def change(self, by: RobotChange) -> Array:
         """Of the motors."""
-        assert by.efforts is not None
-        return by.efforts
+        return _efforts(by)
 
     def pull(self, values: Array, onto: RobotChange) -> None:
         """By the efforts."""
-        assert onto.efforts is not None
-        onto.efforts += values
+        _efforts(onto)[...] += values
+
+
+def _efforts(by: RobotChange) -> Array:
+    if by.efforts is None:
+        raise ValueError("a quantity that uses the efforts needs `by_efforts = True`")
+    return by.efforts

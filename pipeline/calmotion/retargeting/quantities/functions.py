@@ -112,7 +112,11 @@ class FunctionOf(Quantity):
 
     def slopes(self, run: ForwardRun) -> FunctionSlopes:
         """By the chain rule."""
-        return FunctionSlopes(self.of.slopes(run), csr_matrix(self.function(self.of.values(run))[1]))
+        inner = self.of.values(run)
+        values, jacobian = self.function(inner)
+        if jacobian.shape != (values.size, inner.size):
+            raise ValueError(f"derivatives have shape {list(jacobian.shape)} instead of [{values.size}, {inner.size}]")
+        return FunctionSlopes(self.of.slopes(run), csr_matrix(jacobian))
 
 
 @dataclass(frozen=True, eq=False)
