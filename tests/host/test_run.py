@@ -128,7 +128,7 @@ def test_no_step_is_done_for_what_cannot_be_made_any_more_and_others_are():
     alloy = operator("smithy.alloy", requires=[Iron], uses=[Coal], provides=[Steel])
     run = host_of(DIG, burn, MELT, alloy).run([], [Steel]).finish()
     assert outcomes(run)["wood.burn"] is Outcome.FAILED and outcomes(run)["smithy.melt"] is Outcome.BLOCKED
-    assert "there is no Coal" in run.results[-2].reason
+    assert "there is no Coal" in [step.reason for step in run.results]
     run = host_of(DIG, burn, MELT, alloy).run([], [Steel, Iron]).finish()
     assert run.get(Iron) is not None and run.get(Steel) is None, "what else was asked for is made"
 
