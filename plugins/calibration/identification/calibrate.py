@@ -251,8 +251,9 @@ def _share(take: Take, sensor: Sensor, times: Array, off: Array) -> float:
         added = channel.values - command(times, 0)[:, None]
     else:
         return float("nan")
-    own = [part for part in (whole, sensor.validated) if part.any()]
-    return max(_rms(off[part]) / max(_rms(added[part]), 1e-300) for part in own)
+    # held-out parts are short: a signal that happens to rest in them is no scale
+    left = max(_rms(off[part]) for part in (whole, sensor.validated) if part.any())
+    return left / max(_rms(added[whole]), 1e-300)
 
 
 def _rms(values: Array) -> float:
