@@ -63,7 +63,7 @@ class Predicted:
         fitted: Names of the shots.
         error: Mean absolute error over the others [rad, m, N m].
         nominal: The same of the shots as they are.
-        estimates: As text.
+        estimates: As text, with the share of the recordings of the fit that it tells to be unexplained.
     """
 
     fitted: str
@@ -276,6 +276,8 @@ def main(arguments: list[str] | None = None) -> int:
             for item in fit.estimates
             if item.of_robot
         )
+        if share := unexplained_share(fit):
+            told = f"{100.0 * share:.2g}% left of its own; {told}"
         error = float(np.mean([machine.error(name, fit.estimates) for name in others]))
         rows.append(Predicted(", ".join(own), error, float(np.mean([nominal[name] for name in others])), told))
         say(f"{rows[-1].fitted}: {error:.4f} (as they are {rows[-1].nominal:.4f}); {told}")

@@ -251,9 +251,7 @@ def _share(take: Take, sensor: Sensor, times: Array, off: Array) -> float:
         added = channel.values - command(times, 0)[:, None]
     else:
         return float("nan")
-    # held-out parts are short: a signal that happens to rest in them is no scale
-    left = max(_rms(off[part]) for part in (whole, sensor.validated) if part.any())
-    return left / max(_rms(added[whole]), 1e-300)
+    return _rms(off[whole]) / max(_rms(added[whole]), 1e-300)
 
 
 def _rms(values: Array) -> float:

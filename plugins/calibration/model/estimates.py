@@ -94,8 +94,8 @@ class ChannelFit:
         outliers: Number of fitted values with less than full weight.
         largest: Residual of the held-out values, of the fitted ones where none were held out.
         share: Of what links and motors that give add to the motion of an ideal robot, that is not explained: root mean
-            square of the residuals, of held-out values or all of them, whichever is larger, over that of the signal
-            less an ideal robot's; NaN of a channel that does not tell.
+            square of the residuals, fitted and held-out, over that of the signal less an ideal robot's; NaN of a
+            channel that does not tell.
     """
 
     recording: str
