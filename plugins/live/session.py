@@ -6,6 +6,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -77,8 +78,11 @@ class Live:
         self._closed = len(self.model.system.rows) > len(self.model.system.parent)
         self._delay = max((motor.delay for motor in character.motors if motor.model != PRESCRIBED), default=0.0)
         self.notes = notes_of(shot, forces)
-        self.start = np.array([float(np.interp(0.0, track.times, track.values)) for track in shot.animation.current])
-        self._count_others()
+        curves = shot.animation.current
+        ends = np.linspace(0.0, float(shot.animation.frame_times[-1]), LiveSettings.POSES)
+        poses = np.stack([np.interp(ends, track.times, track.values) for track in curves], axis=1)
+        self.start: Array = poses[0]
+        self._count_others(poses)
         self.reset(self.start)
         self._refuse_slow()
 
@@ -267,19 +271,25 @@ class Live:
             limited=self._efforts.limited,
         )
 
-    def _count_others(self) -> None:
-        """Let robots of other frequencies count as they are asked for, or as much as that of the model allows."""
+    def _count_others(self, poses: Array) -> None:
+        """Let robots of other frequencies count as they are asked for, or as much as that of the model allows in poses.
+
+        Args:
+            poses: Of the shot, shape [P, M]: what is spared in one of them may be lacking in another.
+        """
         asked, alone, self._near = self.settings.uncertainty, self._weighting, None
         if asked is not None:
             self._weighting = alone.with_others(asked, EQUAL)
             return
 
-        def gains(share: float) -> Gains:
+        def gains(share: float, pose: Array) -> Gains:
             self._weighting = alone.with_others(LiveSettings.UNCERTAINTY, share)
-            return self._gains(self.start)
+            return self._gains(pose)
 
+        share = EQUAL
         try:
-            share = affordable_others(gains, self._coupling, self.tick_s)
+            for pose in poses:
+                share = affordable_others(partial(gains, pose=pose), self._coupling, self.tick_s, share)
         except SimulationFailure:
             share = 0.0
         self._weighting = alone.with_others(LiveSettings.UNCERTAINTY, share)

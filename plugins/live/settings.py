@@ -32,6 +32,7 @@ class LiveSettings:
     CLOSE = 0.01  # error over that lever for which motors may deviate by a radian, where no target moves
     HIGHEST = 1 / 3  # frequency of a mode that commands can act on, of the rate
     RENEWAL_S = 0.02  # between two renewals without a thread
+    POSES = 5  # of the shot, in which the robot of the model may not lose
     UNCERTAINTY = 0.1  # of frequencies, which is spared where the robot of the model would shake
     SLOW_GAINS_S = 0.1  # processor time of a renewal that is told; poses turn by a tenth of a radian meanwhile
 

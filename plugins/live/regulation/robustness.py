@@ -21,13 +21,14 @@ PERIODS = 3.0  # of the slowest mode, that a move of the test lasts
 LONGEST_S, HIGHEST = 6.0, 50.0  # of such a move [s]; frequency that is taken where nothing is slower [Hz]
 
 
-def affordable_others(make: Callable[[float], Gains], coupling: Array, tick: float) -> float:
+def affordable_others(make: Callable[[float], Gains], coupling: Array, tick: float, most: float = EQUAL) -> float:
     """The greatest share of other robots with which the commands leave at most `SLACK` of what a shaper does.
 
     Args:
         make: Gains in a pose, with a share of other robots in what counts.
         coupling: Of all motors with those that may deviate, shape [M, m].
         tick: [s].
+        most: The greatest share that is thought of.
     """
 
     test = None
@@ -38,11 +39,11 @@ def affordable_others(make: Callable[[float], Gains], coupling: Array, tick: flo
         test = test or Moves(gains, coupling, tick)
         return test.left_by(gains) <= SLACK * test.left_by_shaper
 
-    if affords(EQUAL):
-        return EQUAL
+    if most <= LEAST or affords(most):
+        return most
     if not affords(LEAST):
         return 0.0
-    low, high = np.log(LEAST), np.log(EQUAL)
+    low, high = np.log(LEAST), np.log(most)
     for _ in range(STEPS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if affords(float(np.exp(middle))) else (low, middle)
