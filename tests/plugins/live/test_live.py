@@ -134,9 +134,9 @@ def test_efforts_that_a_motor_does_not_have_are_told(stream, motor):
 
 def test_after_the_stream_rests_the_commands_are_its_own(stream):
     motion, *_ = stream
-    commands, _, report = streamed(robot(), motion, 8.0, lookahead=0.08)
-    np.testing.assert_allclose(commands[-1], motion(8.0), atol=1e-9)
-    assert not report["events"] and report["ticks"] == 2000 and report["renewals"] > 10
+    commands, _, report = streamed(robot(), motion, 8.5, lookahead=0.08)
+    np.testing.assert_allclose(commands[-1], motion(8.5), atol=1e-9)
+    assert not report["events"] and report["ticks"] == 2125 and report["renewals"] > 10
 
 
 def test_a_rigid_robot_gets_the_stream_as_it_is(stream):
