@@ -70,7 +70,8 @@ class RobotOptions:
 
 
 def is_named(prim: Usd.Prim, pattern: str) -> bool:
-    return fnmatch.fnmatchcase(named(prim).lower(), pattern.lower())
+    """Whether a pattern fits the name of a prim in its file, or in USD."""
+    return any(fnmatch.fnmatchcase(name.lower(), pattern.lower()) for name in (named(prim), str(prim.GetName())))
 
 
 def geoms_of(body: Usd.Prim) -> Iterable[Usd.Prim]:

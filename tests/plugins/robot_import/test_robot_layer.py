@@ -152,6 +152,8 @@ def test_targets_are_links_and_frames(make):
     character, _, _ = make(targets=("tool0", "upper-arm"))
     assert [target.path for target in character.targets] == [f"{FORE}/tool0", f"{UPPER}/CalmTarget"]
     np.testing.assert_allclose(character.targets[0].frame.position, [0.3, 0.0, 0.0])
+    character, _, _ = make(targets=("upper",))
+    assert [target.path for target in character.targets] == [f"{UPPER}/CalmTarget"], "the name that USD has for it"
 
 
 @pytest.mark.parametrize(
