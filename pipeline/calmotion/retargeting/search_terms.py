@@ -69,7 +69,7 @@ def with_terms(at: Evaluation, character: Character, terms: Sequence[SearchTerm]
             with _blamed(term, character):
                 made = term.quantity(character, run.robot.model, problem.grid)
                 values = _checked(made.values(run.run), problem.grid)
-                made.slopes(run.run)
+                made.slopes(run.run)  # so that what is wrong with them is told as the term's
                 if isinstance(term, AddedLimit) and k and isinstance(made, FilteredCommands):
                     continue  # all robots perform the same curves
                 if isinstance(term, AddedLimit):

@@ -11,7 +11,7 @@ import numpy as np
 from calmotion.arrays import Array, Indices, IntArray
 from calmotion.linear_algebra.sparse_solver import SparseSolver
 from calmotion.model.character import FlexibleSettings
-from calmotion.reduction.basis.natural_modes import lowest_modes, vector_mass
+from calmotion.reduction.basis.natural_modes import lowest_modes
 from calmotion.reduction.basis.residual_flexibility import residual_vectors
 from calmotion.reduction.basis.static_loads import ACCELERATIONS, UNIFORM, unit_accelerations
 from calmotion.reduction.elements.assembly import FEModel
@@ -132,9 +132,7 @@ class FixedInterface:
             if not self._normal or not self._is_enough(self._normal[0][0], count, below, most):
                 bound = _GRID ** np.ceil(np.log(below) / np.log(_GRID)) if below > 0.0 else None
                 count = min(max(count, _MOST), len(self.interior))
-                inside = self.interior
-                nodes = inside[::3] // 3
-                K, M = self.model.stiffness[inside][:, inside], vector_mass(self.model.mass[nodes][:, nodes])
+                K, M = self.model.among(self.interior[::3] // 3)
                 self._normal[:] = [
                     lowest_modes(K, M, count, solver=self.solver, below=bound, most=most and max(most, count))
                 ]

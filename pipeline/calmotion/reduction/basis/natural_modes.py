@@ -9,20 +9,13 @@ import numpy as np
 from calmotion.arrays import Array, Indices
 from calmotion.linear_algebra.block_lanczos import lowest_by_lanczos
 from calmotion.linear_algebra.sparse_solver import SparseSolver
-from calmotion.reduction.elements.assembly import FEModel
+from calmotion.reduction.elements.assembly import FEModel, vector_mass
 
 __all__ = ["SparseSolver", "clamped_modes", "lowest_modes", "vector_mass"]
 
 _RIGID = 6  # modes of a free body without frequency
 _BELOW = 0.01  # shift over the square of a frequency above the first elastic one
 _DENSE = 60  # degrees of freedom up to which a dense solver is as fast
-
-
-def vector_mass(mass: Any) -> Any:
-    """m (x) E, sparse CSR, shape [3n, 3n], from the scalar mass matrix m, shape [n, n]."""
-    from scipy.sparse import identity, kron
-
-    return kron(mass, identity(3), format="csr")
 
 
 def lowest_modes(
@@ -62,7 +55,7 @@ def lowest_modes(
     return lowest_by_lanczos(K, M, max(count, 1), shift, solver, below, most)
 
 
-def shift_of_free(model: FEModel, M: Any) -> float:
+def shift_of_free(model: FEModel) -> float:
     """A shift [1/s^2] for the modes of a free body: below its first elastic mode, far above the rounding of rigid ones.
 
     The lowest elastic frequency of displacements that are polynomials of degree 2 is above that of the body. The
@@ -71,7 +64,6 @@ def shift_of_free(model: FEModel, M: Any) -> float:
 
     Args:
         model: Its matrices.
-        M: `vector_mass` of its mass.
     """
     from scipy.linalg import eigh
 
@@ -81,7 +73,7 @@ def shift_of_free(model: FEModel, M: Any) -> float:
     terms = np.hstack([np.ones((len(x), 1)), x, x[:, i] * x[:, j]])
     fields = np.einsum("nk,cd->nckd", terms, np.eye(3)).reshape(3 * len(x), -1)
     fields, _ = np.linalg.qr(fields)  # flat bodies: some of them are nothing
-    values = eigh(fields.T @ (model.stiffness @ fields), fields.T @ (M @ fields), eigvals_only=True)
+    values = eigh(fields.T @ (model.stiffness @ fields), fields.T @ model.momentum(fields), eigvals_only=True)
     return _BELOW * float(values[_RIGID])
 
 
@@ -94,16 +86,14 @@ def clamped_modes(model: FEModel, count: int, clamped: Indices | None = None) ->
         clamped: Clamped nodes; None for a free body.
     """
     n = len(model.mesh.nodes)
-    M = vector_mass(model.mass)
     free = np.ones(n, dtype=bool)
     if clamped is not None and len(clamped):
         free[clamped] = False
         rigid, shift = 0, 0.0
     else:
-        rigid, shift = 6, shift_of_free(model, M)
-    dofs = np.flatnonzero(np.repeat(free, 3))
-    K, M = model.stiffness[dofs][:, dofs], M[dofs][:, dofs]
+        rigid, shift = 6, shift_of_free(model)
+    K, M = model.among(np.flatnonzero(free))
     values, vectors = lowest_modes(K, M, rigid + count, shift=shift, points=model.mesh.nodes[free])
     modes = np.zeros((3 * n, vectors.shape[1]))
-    modes[dofs] = vectors
+    modes[np.repeat(free, 3)] = vectors
     return np.sqrt(np.maximum(values[rigid:], 0.0)) / (2.0 * np.pi), modes.reshape(n, 3, -1)[:, :, rigid:]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.arrays import Array, IntArray
+from calmotion.arrays import Array, Indices, IntArray
 from calmotion.mesh.parts import Filling, element_masses, filling_of, makeup_of
 from calmotion.mesh.quadratic import QuadraticMesh, quadratic_mesh
 from calmotion.mesh.tetrahedra import tet_volumes, without_unused_points
@@ -33,12 +33,24 @@ class FEModel:
         """The vector mass matrix times columns, both of shape [3n, k]."""
         return np.asarray((self.mass @ columns.reshape(len(self.mesh.nodes), -1)).reshape(columns.shape))
 
+    def among(self, nodes: Indices) -> tuple[Any, Any]:
+        """Stiffness and vector mass matrix of some of the nodes, the others fixed; sparse, shape [3k, 3k] each."""
+        dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+        return self.stiffness[dofs][:, dofs], vector_mass(self.mass[nodes][:, nodes])
+
     def stiffened(self, factor: float) -> FEModel:
         """The same model with its stiffness times a factor."""
         from scipy.sparse import csr_matrix
 
         own = self.stiffness
         return replace(self, stiffness=csr_matrix((factor * own.data, own.indices, own.indptr), shape=own.shape))
+
+
+def vector_mass(mass: Any) -> Any:
+    """m (x) E, sparse CSR, shape [3n, 3n], from the scalar mass matrix m, shape [n, n]."""
+    from scipy.sparse import identity, kron
+
+    return kron(mass, identity(3), format="csr")
 
 
 def assemble_mass(mesh: QuadraticMesh, density: float) -> Any:
