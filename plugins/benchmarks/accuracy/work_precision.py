@@ -5,6 +5,7 @@ settings: step and integrator, reduction, POD subspace, elastic law, and the cho
 error is the largest distance of any target, at any frame, to a reference with a much smaller step and many more
 coordinates. The error of the reference is shown as its error bar; smaller errors cannot be compared. Times are medians
 of the simulation. The choices for each tolerance are compared with the fastest setting that keeps the tolerance.
+All settings have the first meshes of the shot: what meshes cost is measured by `calmotion bench tolerances`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from functools import partial
 
-from calmotion.model import RunSettings, tolerance_of
+from calmotion.model import FEMeshes, RunSettings, tolerance_of
 from calmotion.simulation import MAX_STEP, CompiledShot, reduction_for
 from calmotion.tolerance import by_fast_scheme, chosen_step, converged_reduction, project_to_tolerance
 
@@ -64,13 +65,14 @@ def forward_points(bench: Bench, reference: Reference) -> list[Point]:
 
 
 def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float] = TOLERANCES) -> list[Point]:
-    """The choices of the program, without a tolerance and with several."""
+    """The choices of the program, without a tolerance and with several, all on the meshes of the reference."""
     shot = bench.shot
+    meshes = FEMeshes(tuple(replace(mesh, given=True) for mesh in shot.meshes.meshes))  # or they would be refined
     default = bench.bodies(tolerance_of(shot.character))
     points = [bench.measure(reference, "default", "default", default, MAX_STEP)]
     for tolerance in tolerances:
         options = RunSettings(tolerance=tolerance)
-        reduction = reduction_for(shot.character, shot.animation, shot.meshes, options, repeats=True)
+        reduction = reduction_for(shot.character, shot.animation, meshes, options, repeats=True)
         converged = converged_reduction(bench.compiled(reduction.bodies(tolerance)), reduction, options)
         held = project_to_tolerance(converged.shot, options, converged.known)
         choice = partial(_step_and_integrator, held.shot, converged.error_m + held.error_m)

@@ -1,19 +1,23 @@
 """Error against run time: references that are converged, errors that fall as settings are finer, and the front."""
 
+from dataclasses import replace
+
 import pytest
+from calmotion.model import FEMeshes
 from calmotion.testing import beam_arm, quintic, shot_of
 from calmotion.tolerance.step_error import distance
 from calmotion_plugins.benchmarks.accuracy import reference_bench, work_precision
 from calmotion_plugins.benchmarks.accuracy.figure import draw_work_precision
 from calmotion_plugins.benchmarks.accuracy.reference_bench import Bench
-from calmotion_plugins.benchmarks.accuracy.work_precision import forward_points
+from calmotion_plugins.benchmarks.accuracy.work_precision import chosen_points, forward_points
 from calmotion_plugins.benchmarks.common.shots import Unreduced
 
 
 @pytest.fixture(scope="module")
 def bench():
     character, meshes = beam_arm(payload=0.1, damping=0.02)
-    shot = Unreduced("arm", character, shot_of(quintic(0.8, 0.35, 0.1), 0.75), meshes)
+    rough = [replace(mesh, quality=replace(mesh.quality, frequency_error=0.02)) for mesh in meshes.meshes]
+    shot = Unreduced("arm", character, shot_of(quintic(0.8, 0.35, 0.1), 0.75), FEMeshes(tuple(rough)))
     return Bench(shot, repeats=1)
 
 
@@ -46,6 +50,12 @@ def of(points, series):
 def test_the_error_bar_of_the_reference_covers_a_finer_one(bench, reference):
     finer = bench.run(bench.bodies(1e-7), 1 / 7680)
     assert distance(finer.positions, reference.positions) < 1.5 * reference.bar_m < 2e-4
+
+
+def test_choices_are_compared_on_the_meshes_of_the_reference(bench, reference):
+    """On meshes that were refined for the tolerance they would differ by what the first meshes are wrong."""
+    kept = [point for point in chosen_points(bench, reference, [1e-4, 3e-5]) if point.series == "tolerance"]
+    assert [point.error_m < allowed for point, allowed in zip(kept, (1e-4, 3e-5), strict=True)] == [True, True]
 
 
 def test_a_linear_arm_is_farther_off_than_a_nonlinear_one(points):
