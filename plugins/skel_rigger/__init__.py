@@ -1,4 +1,4 @@
-"""Robots from skinned characters."""
+"""Robots from skinned characters and animated parts."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from calmotion.model import OutputPaths, Rig, Source
 
 
 class RigSkeleton(Operator):
-    """Bodies cut from the skin by its weights, the fewest hinges that follow each joint, masses of a material."""
+    """Bodies cut from the skin by its weights, or animated parts; the fewest hinges that follow each, masses of a
+    material."""
 
     idname = "rig.skeleton"
-    label = "Make a robot from the skeleton"
+    label = "Make a robot from the animation"
     requires = (Source, OutputPaths)
     provides = (Rig,)
     properties = (

@@ -55,3 +55,9 @@ def test_a_matrix_that_is_not_affine_is_refused(row):
     matrix[3] = row
     with pytest.raises(ShotError, match="not affine"):
         transforms.pose_from_matrix(matrix, "/A")
+
+
+def test_a_matrix_of_single_precision_is_affine():
+    matrix = np.eye(4)
+    matrix[3, 3] = np.float32(1.0) - np.float32(1.2e-7)
+    assert np.allclose(transforms.pose_from_matrix(matrix, "/A").rotation, np.eye(3))

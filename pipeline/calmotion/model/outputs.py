@@ -36,16 +36,18 @@ class RiggedJoint:
 
 @dataclass(frozen=True)
 class Rig:
-    """The robot that is made from a skinned character.
+    """The robot that is made from a skinned character, or from animated parts.
 
     Attributes:
         layer: Path of the layer, which opens with the shot beneath it.
         robot: Prim path of the robot.
-        joints: The joints of the skeleton with their motors.
+        joints: The joints of the skeleton, or the parts, with their motors.
         bodies: Number of bodies, servos included.
         mass: Of all of them [kg].
         targets: Prim paths.
         flexible: Prim paths of the flexible bodies.
+        off: Largest distance of an animated part from where the joints have it [m].
+        notes: Sentences for the user.
     """
 
     layer: str
@@ -55,6 +57,8 @@ class Rig:
     mass: float
     targets: tuple[str, ...]
     flexible: tuple[str, ...] = ()
+    off: float = 0.0
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def make_links(
             )
             if parents[joint] < 0 or len(row.axes):
                 link_of[joint] = len(links)
-                links.append(Link(joint, _unique(name, names), above, row, None))
+                links.append(Link(joint, unique_name(name, names), above, row, None))
     # the joints of one link are cut as one piece
     together = np.zeros((len(weights), len(links)))
     for joint, link in enumerate(link_of):
@@ -83,7 +83,8 @@ def _none(count: int) -> tuple[Array, Array, Array]:
     return np.zeros((0, 3)), np.zeros((count, 0)), np.zeros(count)
 
 
-def _unique(joint: str, taken: set[str]) -> str:
+def unique_name(joint: str, taken: set[str]) -> str:
+    """A name for a link from the last word of a path, and none of those that are taken; it is added to these."""
     stem = re.sub(r"\W", "_", joint.split("/")[-1])
     stem = f"_{stem}" if stem[:1].isdigit() or not stem else stem
     name, number = stem, 1

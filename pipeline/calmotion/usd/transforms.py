@@ -11,7 +11,7 @@ from calmotion.errors import ShotError
 from calmotion.model.character import Frame
 
 _HUGE = 1e30
-_AFFINE = 1e-9
+_AFFINE = 1e-6  # matrices that were computed in single precision have 0.9999999 in the corner
 _SHEAR_TOLERANCE = 1e-4  # xforms are often authored in single precision
 
 

@@ -205,10 +205,10 @@ def rig(
     progress: ProgressCallback | None = None,
     on_operator: OperatorCallback | None = None,
 ) -> Rig:
-    """Make a robot from a skinned character: bodies, joints, motors and targets.
+    """Make a robot from a skinned character, or from animated parts: bodies, joints, motors and targets.
 
     Args:
-        shot: USD file of a UsdSkel character.
+        shot: USD file of a UsdSkel character, or of meshes below Xforms with keys.
         layer: USD layer to write; it opens the shot.
         operators, settings, progress, on_operator: As of `simulate`; see the properties of `rig.skeleton`.
 

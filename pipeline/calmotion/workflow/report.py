@@ -331,9 +331,11 @@ def rig_report(made: Rig) -> dict[str, Any]:
         "mass_kg": made.mass,
         "motors": sum(len(joint.motors) for joint in made.joints),
         "max_angle_error_rad": max((joint.off for joint in made.joints), default=0.0),
+        "max_error_m": made.off,
         "joints": [
             {"joint": j.joint, "body": j.body, "motors": j.motors, "angle_error_rad": j.off} for j in made.joints
         ],
         "targets": made.targets,
         "flexible": made.flexible,
+        "notes": made.notes,
     }

@@ -1,4 +1,4 @@
-"""`calmotion rig`: a robot from a skinned character."""
+"""`calmotion rig`: a robot from a skinned character, or from parts with keys."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from calmotion.cli import (
     Output,
     angle,
     conclude,
+    length,
     opened_shot,
     print_table,
     progress_display,
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = (
     ("calmotion rig skinned.usda -o robot.usda", "a robot from a UsdSkel character"),
+    ("calmotion rig parts.usda -o robot.usda", "a robot from meshes under Xforms with keys"),
     ("calmotion rig skinned.usda -o robot.usda --set rig.skeleton.flexible=all", "with links that bend"),
 )
 OPERATORS = ("rig.skeleton",)
@@ -50,13 +52,16 @@ def _print(report: dict[str, Any], console: Console) -> None:
     say(
         console,
         f"{report['robot']}: {report['bodies']} bodies, {report['motors']} motors, {report['mass_kg']:.4g} kg; "
-        f"largest residual angle {angle(report['max_angle_error_rad'])}",
+        f"largest residual angle {angle(report['max_angle_error_rad'])}"
+        + (f", largest distance {length(report['max_error_m'])}" if report["max_error_m"] else ""),
     )
     rows = [
         [j["joint"].split("/")[-1], j["body"], str(len(j["motors"])), angle(j["angle_error_rad"])]
         for j in report["joints"]
     ]
-    print_table(console, "Rotating joints", ["joint", "body", "hinges", "residual angle"], rows, texts=2)
+    print_table(console, "Moving joints", ["joint", "body", "hinges", "residual angle"], rows, texts=2)
+    for note in report["notes"]:
+        say(console, note)
     for target in report["targets"]:
         say(console, f"target: {target}")
     say(console, f"wrote {report['layer']}, which is a shot")

@@ -12,7 +12,7 @@ from calmotion.errors import ShotError
 from calmotion.model.tempo import TimeMap
 from calmotion.usd.clock import Clock
 from calmotion.usd.gf import matrix
-from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
+from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below, prims_of
 
 if TYPE_CHECKING:
     from pxr import Ts, Usd
@@ -91,6 +91,24 @@ def codes_of(prim: Usd.Prim) -> list[float]:
     if xform.TransformMightBeTimeVarying():
         codes.update(code for one in xform.GetOrderedXformOps() for code in animation_codes(one.GetAttr()))
     return sorted(codes)
+
+
+def moving_prims(stage: Usd.Stage) -> list[Usd.Prim]:
+    """The prims with animated transforms that carry geometry, and those below them that reset their transforms."""
+    from pxr import UsdGeom
+
+    found: list[Usd.Prim] = []
+    for prim in prims_of(stage):
+        xform = UsdGeom.Xformable(prim)
+        resets = bool(xform) and xform.GetResetXformStack()
+        below = resets and any(prim.GetPath().HasPrefix(other.GetPath()) for other in found)
+        if (below or codes_of(prim)) and any(one.IsA(UsdGeom.Gprim) for one in prims_below(prim, _is_pattern)):
+            found.append(prim)
+    return found
+
+
+def _is_pattern(prim: Usd.Prim) -> bool:
+    return bool(prim.GetTypeName() == "PointInstancer")
 
 
 def has_splines(prim: Usd.Prim) -> bool:

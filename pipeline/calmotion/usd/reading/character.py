@@ -120,9 +120,10 @@ def read_skeleton(
     order = {id(joint): k for k, joint in enumerate(joints)}
     drives = sorted((d for d in drives if id(d.joint) in order), key=lambda d: order[id(d.joint)])
     tell_what_swings(reading, joints, [drive.joint for drive in drives])
-    fixed = {j.body1: j.path for j in joints if j.body0 == "" and j.prim is not None and not on_moving_prim(reading, j)}
+    posing = {drive.joint.path for drive in drives if drive.source == motors.BODIES}
+    held_still = [j for j in joints if j.body0 == "" and j.prim is not None and j.path not in posing]
+    fixed = {j.body1: j.path for j in held_still if not on_moving_prim(reading, j)}
     roots = {j.body1 for j in joints if j.body0 == ""}
-    posing = any(drive.source == motors.BODIES for drive in drives)
     with reading.collecting_problems():
         others = [] if posing else [prims[b] for b in bodies if b in prims and b not in roots]
         refuse_moving(reading, {prims[b]: fixed[b] for b in fixed if b in prims}, others)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError, each, raise_all
 from calmotion.usd.diagnostics import quiet
+from calmotion.usd.reading.animated import moving_prims
 from calmotion.usd.reading.context import RIGID_BODY, prims_of
 from calmotion.usd.schemas import is_applied
 
@@ -36,6 +38,14 @@ def no_bodies(stage: Usd.Stage) -> ShotError:
         found = _reason(prim)
         if found:
             return ShotError(_PROBLEM, path=str(prim.GetPath()), attribute=found[0], found=found[1], remedy=found[2])
+    moving = moving_prims(stage)
+    if moving:
+        return ShotError(
+            _PROBLEM,
+            path=str(moving[0].GetPath()),
+            found=f"animated transforms without physics ({len(moving)} of them)",
+            remedy=f"Run `calmotion rig {os.path.basename(file)} -o LAYER`, and open the layer that it writes",
+        )
     remedy = "Apply PhysicsRigidBodyAPI to the moving parts of the character"
     return ShotError(_PROBLEM, path=file, remedy=remedy)
 

@@ -1,4 +1,4 @@
-"""From a skinned UsdSkel character without physics to a layer with bodies, joints, motors and targets."""
+"""From a skinned UsdSkel character, or animated parts, to a layer with bodies, joints, motors and targets."""
 
 from calmotion.usd.rigging.rig import RigOptions, rig_shot
 

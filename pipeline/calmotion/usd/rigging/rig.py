@@ -1,9 +1,10 @@
-"""Rigging: a file with a skinned character becomes a layer with a robot."""
+"""Rigging: a file with a skinned character or animated parts becomes a layer with a robot."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,8 @@ from calmotion.catalogs.materials import MATERIALS
 from calmotion.errors import ShotError
 from calmotion.model.outputs import Rig, RiggedJoint
 from calmotion.rigging.links import Link, make_links, targets_of
+from calmotion.rigging.part_joints import SINGLE
+from calmotion.rigging.part_trees import PartMotions
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
 from calmotion.usd.diagnostics import quiet
@@ -21,8 +24,11 @@ from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.reading.provenance import provenance_of
 from calmotion.usd.reading.shot import read_shot, shot_clock
 from calmotion.usd.reading.skeletons import BoundSkeleton, bound_skeletons
-from calmotion.usd.rigging.layer import RobotLayer
-from calmotion.usd.rigging.skins import read_skin
+from calmotion.usd.rigging.parts import Parts, read_parts
+from calmotion.usd.rigging.posed_bodies import posed_bodies
+from calmotion.usd.rigging.posed_robot import PosedRobot
+from calmotion.usd.rigging.skinned_robot import SkinnedRobot
+from calmotion.usd.rigging.skins import read_skin, skinned_meshes
 from calmotion.usd.transforms import pose_from_matrix
 
 if TYPE_CHECKING:
@@ -47,18 +53,22 @@ class RigOptions:
 
 
 def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
-    """Make a robot from a skinned character.
+    """Make a robot from a skinned character, or from rigid parts with animated transforms where nothing is skinned.
 
     The bodies stand as the skeleton does at the first frame. Each joint that turns gets the fewest hinges that follow
     it, each with a motor that names the joint of the skeleton, so that the animation stays where it is and results are
     written back to it. A root that moves is carried by its transform.
+
+    Parts become bodies where they are, with the joints of the fewest freedoms that follow their motion, which is that
+    of the motors.
 
     Args:
         path: File of the shot.
         output: Layer to write; it has the shot as its sublayer.
 
     Raises:
-        ShotError: No skeleton is animated, the shot has physics already, a name is wrong, or nothing can be written.
+        ShotError: Nothing is animated, a part moves as no joint allows, the shot has physics already, a name is wrong,
+            or nothing can be written.
     """
     options = options or RigOptions()
     if options.material not in MATERIALS:
@@ -74,23 +84,23 @@ def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
             remedy="Name the file of the skinned character without a robot",
         )
     with quiet():
-        skeleton, clock = _animated_skeleton(stage, path)
-        codes = clock.merged(skeleton.codes())
-        links = _links(stage, skeleton, codes, options.angle_tolerance)
-        layer = RobotLayer(stage, skeleton, codes, links, MATERIALS[options.material], options.material)
-        names = [link.name for link in links]
-        flexible = names if options.flexible == ("all",) else list(options.flexible)
-        unknown = [name for name in flexible if name not in names]
-        if unknown:
-            raise ShotError(
-                "there is no such link",
-                attribute="rig.skeleton.flexible",
-                found=unknown[0],
-                remedy=f"Use {', '.join(names)}, or all",
-            )
-        layer.author(options.servo_share, flexible, targets_of(links, skeleton.joints))
-    layer.finish(provenance_of(path, stage, clock), output)
-    write_layer(layer.layer, output, lambda temporary: _validate(temporary, len(layer.motors)))
+        skeletons = bound_skeletons(stage)
+        skinned = any(len(one.codes()) and any(skinned_meshes(stage, one)) for one in skeletons)
+        parts = None if skinned else read_parts(stage)
+        rig = _rig_skinned if parts is None else partial(_rig_parts, parts)
+        return rig(stage, path, output, options)
+
+
+def _rig_skinned(stage: Usd.Stage, path: str, output: str, options: RigOptions) -> Rig:
+    skeleton, clock = _animated_skeleton(stage, path)
+    codes = clock.merged(skeleton.codes())
+    links = _links(stage, skeleton, codes, options.angle_tolerance)
+    layer = SkinnedRobot(stage, skeleton, codes, links, MATERIALS[options.material], options.material)
+    names = [link.name for link in links]
+    flexible = _flexible(options, names)
+    layer.author(options.servo_share, flexible, targets_of(links, skeleton.joints))
+    written = layer.finish(provenance_of(path, stage, clock), output, "the skinned character")
+    write_layer(written, output, lambda temporary: _validate(temporary, len(layer.motors)))
     joints = tuple(
         RiggedJoint(
             skeleton.joints[link.joint], layer.body(k), tuple(layer.motors_of[k]), float(link.hinges.residual.max())
@@ -102,6 +112,41 @@ def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
     return Rig(output, layer.robot, joints, layer.body_count, layer.mass, tuple(layer.targets), bending)
 
 
+def _rig_parts(parts: Parts, stage: Usd.Stage, path: str, output: str, options: RigOptions) -> Rig:
+    rounding = SINGLE * float(np.abs(parts.positions).max())
+    motions = PartMotions(parts.rotations, parts.positions, options.angle_tolerance, rounding)
+    bodies, off, notes = posed_bodies(stage, parts, motions)
+    layer = PosedRobot(stage, path, parts, motions, bodies, MATERIALS[options.material], options.material)
+    names = [body.name for body in bodies]
+    flexible = _flexible(options, names)
+    layer.author(options.servo_share, flexible)
+    written = layer.finish(provenance_of(path, stage, parts.clock), output, "the animated parts")
+    write_layer(written, output, lambda temporary: _validate(temporary, len(layer.motors)))
+    joints = tuple(
+        RiggedJoint(body.path, body.path, tuple(layer.motors_of[k]), float(body.joint.tilt.max()))
+        for k, body in enumerate(bodies)
+        if body.joint is not None and layer.motors_of[k]
+    )
+    bending = tuple(body.path for body in bodies if body.name in flexible)
+    return Rig(
+        output, layer.robot, joints, layer.body_count, layer.mass, tuple(layer.targets), bending, off, tuple(notes)
+    )
+
+
+def _flexible(options: RigOptions, names: list[str]) -> list[str]:
+    """Names of the links that bend."""
+    flexible = names if options.flexible == ("all",) else list(options.flexible)
+    unknown = [name for name in flexible if name not in names]
+    if unknown:
+        raise ShotError(
+            "there is no such link",
+            attribute="rig.skeleton.flexible",
+            found=unknown[0],
+            remedy=f"Use {', '.join(names)}, or all",
+        )
+    return flexible
+
+
 def _animated_skeleton(stage: Usd.Stage, path: str) -> tuple[BoundSkeleton, Clock]:
     """The one skeleton that is animated, and the clock of the shot."""
     skeletons = bound_skeletons(stage)
@@ -109,12 +154,15 @@ def _animated_skeleton(stage: Usd.Stage, path: str) -> tuple[BoundSkeleton, Cloc
     if not animated:
         place = str(skeletons[0].prim.GetPath()) if skeletons else path
         raise ShotError(
-            "the skeleton is not animated" if skeletons else "the shot has no skeleton",
+            "the skeleton is not animated"
+            if skeletons
+            else "the shot has neither a skeleton nor parts with animated transforms",
             path=place,
             attribute="skel:animationSource" if skeletons else "",
             remedy="Bind a SkelAnimation with time samples to it"
             if skeletons
-            else "Name the file of a character with a UsdSkel Skeleton and a skinned mesh",
+            else "Name the file of a character with a UsdSkel Skeleton and a skinned mesh, or of meshes below "
+            "Xforms with keys",
         )
     if len(animated) > 1:
         raise ShotError(

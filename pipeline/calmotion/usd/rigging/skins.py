@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -35,27 +36,28 @@ class Skin:
     meshes: tuple[str, ...]
 
 
+def skinned_meshes(stage: Usd.Stage, skeleton: BoundSkeleton) -> Iterator[UsdSkel.SkinningQuery]:
+    """The meshes that a skeleton moves; one that several roots hold comes several times."""
+    from pxr import Usd, UsdSkel
+
+    cache, every = UsdSkel.Cache(), Usd.TraverseInstanceProxies()
+    for prim in prims_of(stage):
+        if not prim.IsA(UsdSkel.Root):
+            continue
+        cache.Populate(UsdSkel.Root(prim), every)
+        for binding in cache.ComputeSkelBindings(UsdSkel.Root(prim), every):
+            if binding.GetSkeleton().GetPrim() == skeleton.prim:
+                yield from (one for one in binding.GetSkinningTargets() if one.GetPrim().GetTypeName() == "Mesh")
+
+
 def read_skin(stage: Usd.Stage, skeleton: BoundSkeleton, code: float) -> Skin:
     """The skin of a skeleton at a time code.
 
     Raises:
         ShotError: A mesh that cannot be skinned.
     """
-    from pxr import Usd, UsdSkel
-
-    cache, every = UsdSkel.Cache(), Usd.TraverseInstanceProxies()
-    parts, names = [], []
-    for prim in prims_of(stage):
-        if not prim.IsA(UsdSkel.Root):
-            continue
-        cache.Populate(UsdSkel.Root(prim), every)
-        for binding in cache.ComputeSkelBindings(UsdSkel.Root(prim), every):
-            if binding.GetSkeleton().GetPrim() != skeleton.prim:
-                continue
-            for target in binding.GetSkinningTargets():
-                if target.GetPrim().GetTypeName() == "Mesh" and str(target.GetPrim().GetPath()) not in names:
-                    parts.append(_skinned(skeleton, target, code))
-                    names.append(str(target.GetPrim().GetPath()))
+    targets = {str(target.GetPrim().GetPath()): target for target in skinned_meshes(stage, skeleton)}
+    parts, names = [_skinned(skeleton, target, code) for target in targets.values()], list(targets)
     if not parts:
         return Skin(np.zeros((0, 3)), np.zeros((0, 3), np.int32), np.zeros((0, len(skeleton.joints))), ())
     offsets = np.cumsum([0, *(len(points) for points, _, _ in parts[:-1])])
