@@ -130,18 +130,16 @@ class Animation:
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
-    """When a joint to the world holds: a foot that stands, a hand that holds on.
+class Schedule:
+    """When something holds that comes and goes.
 
     Attributes:
         times: [s] after the first frame of the shot, strictly increasing, shape [k].
         active: Whether it holds from each time on, and before the first as from it, shape [k], bool.
-        friction: Coefficient of friction with the ground; -1: not known.
     """
 
     times: Array
     active: BoolArray
-    friction: float = -1.0
 
     def holds_at(self, time: float) -> bool:
         """Whether it holds from a time [s] on."""
@@ -152,3 +150,14 @@ class Contact:
         at = np.maximum(np.searchsorted(self.times, times, "right") - 1, 0)
         held: BoolArray = self.active[at]
         return held
+
+
+@dataclass(frozen=True, eq=False)
+class Contact(Schedule):
+    """When a joint to the world holds: a foot that stands, a hand that holds on.
+
+    Attributes:
+        friction: Coefficient of friction with the ground; -1: not known.
+    """
+
+    friction: float = -1.0

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from calmotion.arrays import Array
-from calmotion.model.animation import Animation, FreeTrack, MovingFrame, Track
+from calmotion.model.animation import Animation, Contact, FreeTrack, MovingFrame, Schedule, Track
 from calmotion.model.character import Character
 from calmotion.model.result import MotorCurve, Result
 from calmotion.model.tempo import TimeMap
+
+_Schedule = TypeVar("_Schedule", Contact | None, Schedule | None)
 
 Sample = Callable[[Array, int], Array]  # times [s], order of the derivative -> values of shape [n, ...]
 TURN = 2.0 * np.pi
@@ -205,15 +208,15 @@ def retimed(animation: Animation, tempo: TimeMap, frame_times: Array) -> Animati
     )  # fmt: skip
 
 
-def with_contacts_at(character: Character, tempo: TimeMap) -> Character:
-    """The character whose feet come and go at a tempo."""
-    joints = tuple(
-        joint
-        if joint.contact is None
-        else replace(joint, contact=replace(joint.contact, times=tempo.performed(joint.contact.times)))
-        for joint in character.joints
-    )
-    return replace(character, joints=joints)
+def with_schedules_at(character: Character, tempo: TimeMap) -> Character:
+    """The character whose feet come and go, and whose motors are switched, at a tempo."""
+
+    def at(schedule: _Schedule) -> _Schedule:
+        return None if schedule is None else replace(schedule, times=tempo.performed(schedule.times))
+
+    joints = tuple(replace(joint, contact=at(joint.contact)) for joint in character.joints)
+    motors = tuple(replace(motor, powered=at(motor.powered)) for motor in character.motors)
+    return replace(character, joints=joints, motors=motors)
 
 
 def _divided(frames: Array, parts: int) -> Array:

@@ -7,6 +7,8 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from calmotion.model.animation import Schedule
+
 PRESCRIBED, DRIVE, SERVO = MODELS = ("prescribed", "drive", "servo")  # models of motors
 ON_JOINT, ON_ERROR = "joint", "error"  # what a velocity gain multiplies
 FRICTION_SPEED = float(np.radians(5.0))  # within which Coulomb friction changes its sign, where none is given [rad/s]
@@ -242,6 +244,7 @@ class Motor:
         delay: Time after which the command acts [s]; not of a PRESCRIBED motor, which does not use it.
         backlash: Play between the motor and the joint, from one end to the other [rad]; it is not simulated.
         kind: Name of the real motor that it is, or empty; its rotor is then known, whatever the model.
+        powered: When a SERVO is on, as it is at the first frame; off, it exerts no torque. None: always.
     """
 
     joint: int
@@ -265,6 +268,7 @@ class Motor:
     delay: float = 0.0
     backlash: float = 0.0
     kind: str = ""
+    powered: Schedule | None = None
 
     def with_gain(self, position_gain: float) -> Motor:
         """The motor with another position gain; where it is fed with a voltage, with a winding that makes it so: the

@@ -58,9 +58,9 @@ def prepare(shot: CompiledShot, options: RunSettings) -> Prepared:
     character, animation = shot.character, shot.animation
     refuse_unsupported(character, animation, options)
     grid = grid_of(character, animation, options)
-    # only contacts need the model, which is compiled when it is first used
-    contacts = contact_joints(character)
-    world = sample_world(character, animation, shot.model, grid) if contacts else sample_roots(animation.moving, grid)
+    # only what comes and goes needs the model, which is compiled when it is first used
+    changing = contact_joints(character) or any(motor.powered is not None for motor in character.motors)
+    world = sample_world(character, animation, shot.model, grid) if changing else sample_roots(animation.moving, grid)
     return Prepared(shot, grid, world)
 
 

@@ -11,7 +11,7 @@ from calmotion.multibody.analysis.kinematics import target_frames
 from calmotion.multibody.integrators.simulation import simulate_from
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model
-from calmotion.multibody.model.phases import has_contacts
+from calmotion.multibody.model.phases import has_phases
 from calmotion.multibody.sensitivity.adjoint import adjoint
 from calmotion.multibody.sensitivity.block_tangent import block_tangent, can_be_blocked
 from calmotion.multibody.sensitivity.continuous_adjoint import continuous_adjoint
@@ -163,7 +163,7 @@ class Simulator:
     def goes_on(self) -> bool:
         """Whether motions may go on from others: loops have no beginning that could stay, and with contacts all is
         simulated from its start."""
-        return self._steady is None and not has_contacts(self.model.system)
+        return self._steady is None and not has_phases(self.model.system)
 
     def of(self, model: Model) -> Simulator:
         """The same of another model of the same character; its loops begin near those of this one."""

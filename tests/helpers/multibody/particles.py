@@ -144,6 +144,7 @@ def particle_system(
         servo=np.zeros((joints, SERVO_COLUMNS)),
         sliding=np.isin(np.arange(joints), sliding).astype(np.int32),
         moving=np.array([moving.index(j) if j in moving else -1 for j in range(joints)], dtype=np.int32),
+        switch=np.full(joints, -1, dtype=np.int32),
         contact=np.zeros(joints, dtype=np.int32),
         held=np.trace(Z, axis1=1, axis2=2),
         mass=mass,

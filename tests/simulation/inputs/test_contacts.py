@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.model.animation import Contact
-from calmotion.simulation.inputs.contacts import held_steps
+from calmotion.simulation.inputs.contacts import active_steps
 from calmotion.simulation.inputs.time_grid import make_grid
 from steppers import ROBOT, write_stepper
 
@@ -16,7 +16,7 @@ def test_a_contact_holds_in_the_steps_that_begin_while_it_is_active():
     grid = make_grid(np.arange(5) / 24.0, 1 / 48, 1 / 24)
     contact = Contact(np.array([0.0, 1 / 24, 3 / 24]), np.array([True, False, True]))
     # two steps of pre-roll, then two a frame: row n is about the step to instant n
-    assert held_steps(contact, grid).tolist() == [True] * 5 + [False] * 4 + [True] * 2
+    assert active_steps(contact, grid).tolist() == [True] * 5 + [False] * 4 + [True] * 2
 
 
 def setting(name, value):

@@ -60,7 +60,9 @@ def _reactions(system: System, states: State, inputs: Inputs, work: Work, out: R
             t = 0.0
             for i in range(3):
                 t += axes[i, 2] * source[n, joint, i]
-            if system.rotor[joint] >= 0:
+            if system.switch[joint] >= 0 and not np.any(inputs.world[n, system.switch[joint], 9:]):
+                t = 0.0
+            elif system.rotor[joint] >= 0:
                 t = rotor_effort(system, joint, inputs.angles[n, joint], inputs.rates[n, joint], instant_of(states, n))
             efforts[n, joint] = t
             for i in range(3):

@@ -20,7 +20,7 @@ from calmotion.multibody.integrators.simulation import largest_gap, simulate
 from calmotion.multibody.integrators.trajectory import Inputs, Trajectory, copy_of_instant
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.moving_markers import rooted
-from calmotion.multibody.model.phases import has_contacts
+from calmotion.multibody.model.phases import has_phases
 from calmotion.multibody.model.system import BEYOND_COULOMB, State, System
 from calmotion.multibody.motors.between_instants import hermite_drive, stage_inputs
 from calmotion.multibody.statics.equilibrium import equilibrium
@@ -44,11 +44,15 @@ def integrate(
     knots on instants.
 
     Raises:
-        IntegrationError: Contacts, by another integrator than BDF2; friction that depends on accelerations, by RK4.
+        IntegrationError: Contacts or switched motors, by another integrator than BDF2; friction that depends on
+            accelerations, by RK4.
     """
-    if has_contacts(system) and integrator != "bdf2":
+    if has_phases(system) and integrator != "bdf2":
         raise IntegrationError(
-            "only bdf2 simulates contacts", attribute="--integrator", found=integrator, remedy="Leave it out."
+            "only bdf2 simulates contacts and motors that are switched off",
+            attribute="--integrator",
+            found=integrator,
+            remedy="Leave it out.",
         )
     if integrator == "rk4" and np.any(system.servo[:, BEYOND_COULOMB]):
         raise IntegrationError(

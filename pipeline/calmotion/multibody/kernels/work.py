@@ -99,8 +99,9 @@ def allocate_law_work(r: int, p: int, cubature: bool) -> LawWork:
 
 
 def _first_markers(system: System) -> Array:
-    """Moving markers of the world before they are given: zeros, and contacts where the shot was authored."""
-    markers = np.zeros((int(system.moving.max(initial=-1)) + 1, WORLD_MARKER))
+    """Moving markers of the world before they are given: zeros, contacts where the shot was authored, and motors on."""
+    markers = np.zeros((int(max(system.moving.max(initial=-1), system.switch.max(initial=-1))) + 1, WORLD_MARKER))
+    markers[system.switch[system.switch >= 0], 9:] = np.eye(3).ravel()
     for joint in np.flatnonzero(system.contact):
         markers[system.moving[joint], :3] = system.position[joint, 0]
         markers[system.moving[joint], 9:] = system.rotation[joint, 0].ravel()

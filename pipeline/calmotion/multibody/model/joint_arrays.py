@@ -71,7 +71,7 @@ def joint_arrays(
 
     Args:
         moving: Joints whose world-side frame has a prescribed motion, in the order of `work.Work.world`, which
-            contacts follow.
+            contacts follow, and after them the motors that are switched.
     """
     component_of = {WORLD: -1} | {b: k for k, b in enumerate(tree.body)}
     order = [*tree.joint, *tree.closing]
@@ -81,9 +81,11 @@ def joint_arrays(
     moved, contact = np.full(count, -1, np.int32), np.zeros(count, np.int32)
     contacts = [k for k in order if character.joints[k].contact is not None]
     moving = [*moving, *contacts]
+    switched = [k for k, item in enumerate(character.motors) if item.powered is not None]
     position, rotation = np.zeros((count, 2, 3)), np.zeros((count, 2, 3, 3))
     Phi, Psi = np.zeros((count, 2, 3, r_max)), np.zeros((count, 2, 3, r_max))
     rest = np.zeros(count)
+    switch = np.full(count, -1, np.int32)
     motor_of = {motor.joint: k for k, motor in enumerate(character.motors)}
     for k, index in enumerate(order):
         joint = character.joints[index]
@@ -108,6 +110,8 @@ def joint_arrays(
             rotation[k, 1] = turns[1].T @ turns[0] @ rotation[k, 0]
         sign[k] = -1.0 if flipped else 1.0
         motor[k] = motor_of.get(index, -1)
+        if motor[k] in switched:
+            switch[k] = len(moving) + switched.index(motor[k])
         sliding[k] = joint.kind == "prismatic"
         moved[k] = moving.index(index) if index in moving else -1
         rows[k] = _ROWS[joint.kind] if motor[k] < 0 else 6
@@ -116,8 +120,8 @@ def joint_arrays(
         rest[k] = _rest_value(character, bodies_of, position[k], rotation[k], joint.kind == "prismatic")
     arrays = {
         "side": side, "rows": rows, "servos": np.zeros(0, np.int32), "rotor": np.full(count, -1, np.int32),
-        "servo": np.zeros((count, SERVO_COLUMNS)), "sliding": sliding, "moving": moved, "contact": contact,
-        "position": position, "rotation": rotation, "Phi": Phi, "Psi": Psi,
+        "servo": np.zeros((count, SERVO_COLUMNS)), "sliding": sliding, "moving": moved, "switch": switch,
+        "contact": contact, "position": position, "rotation": rotation, "Phi": Phi, "Psi": Psi,
     }  # fmt: skip
     return JointArrays(arrays, motor, sign, rest)
 

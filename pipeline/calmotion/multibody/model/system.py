@@ -46,6 +46,8 @@ class System(NamedTuple):
             whether friction has more terms than Coulomb's, and these (`model.motor.FrictionTerms`).
         sliding: Whether a joint has a length along its axis instead of an angle, shape [J].
         moving: Row of `work.Work.world` that moves the world-side marker of a joint, -1 for none, shape [J].
+        switch: Row of `work.Work.world` that tells whether the servo of a joint is on, -1 where it always is, shape
+            [J]; see `phases`.
         contact: Rows of a joint that comes and goes while it holds, 0 for other joints, shape [J]; see `phases`.
         held: Inertia by which the regularised statics hold a component on a free joint [kg m^2], or its mass on a free
             slider [kg], shape [B]; see `statics.regularized_statics`.
@@ -81,6 +83,7 @@ class System(NamedTuple):
     servo: Array
     sliding: IntArray
     moving: IntArray
+    switch: IntArray
     contact: IntArray
     held: Array
     mass: Array

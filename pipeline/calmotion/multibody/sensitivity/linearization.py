@@ -26,7 +26,7 @@ from calmotion.multibody.kernels.assembly import assemble
 from calmotion.multibody.linear_solver.closed_chains import copy_rows, factor_closed_chains
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.step_matrix import StepMatrix, matrix_at
-from calmotion.multibody.model.phases import EULER, has_contacts, phases_of
+from calmotion.multibody.model.phases import EULER, has_phases, phases_of
 from calmotion.multibody.model.system import Blocks, Instants, Integrator, State, System
 from calmotion.multibody.sensitivity.linearized_steps import (
     LinearizedSteps,
@@ -150,12 +150,13 @@ def linearize(
 
     Raises:
         SimulationFailure: A singular step, or one that had to be refined: its equations are not those of the others.
-        ValueError: A simulation by another integrator than BDF2; contacts and the continuous adjoint.
+        ValueError: A simulation by another integrator than BDF2; contacts or switched motors, and the continuous
+            adjoint.
     """
     if trajectory.integrator != "bdf2":
         raise ValueError("only BDF2 has derivatives")
-    if continuous and has_contacts(system):
-        raise ValueError("the continuous adjoint does not support contacts")
+    if continuous and has_phases(system):
+        raise ValueError("the continuous adjoint supports neither contacts nor motors that are switched")
     if trajectory.refined:
         raise SimulationFailure(trajectory.refined[0] * trajectory.h, 0, Reason.REFINED)
     reused = 0 if previous is None else previous.size * bytes_of_an_instant(system)

@@ -15,7 +15,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model import Character, Result
-from calmotion.model.curves import commanded_curves, retimed, with_contacts_at
+from calmotion.model.curves import commanded_curves, retimed, with_schedules_at
 from calmotion.model.limits.use import LimitUse
 from calmotion.model.result import Retimed
 from calmotion.model.run import RunSettings
@@ -162,7 +162,7 @@ class _Performance:
         tempo = found.map or TimeMap(given.times, given.times)
         frames = np.arange(found.frames, dtype=np.float64) * given.frame
         performed = retimed(made.animation, tempo, frames)
-        performance = Retimed(performed, with_contacts_at(made.character, tempo), found.report)
+        performance = Retimed(performed, with_schedules_at(made.character, tempo), found.report)
         return cls(made.character, performance, made.at(performance))
 
     def with_curves(self, result: Result) -> _Performance:

@@ -161,7 +161,7 @@ def moves_on_body(prim: Usd.Prim) -> bool:
 _PREFIXES = ("physics:", "calm:", "drive:", "limit:")
 _ANIMATED = (
     "physics:targetPosition", "physics:targetVelocity", "calm:contact:active", "calm:motor:optimize",
-    "calm:target:positionWeight", "calm:target:rotationWeight",
+    "calm:motor:powered", "calm:target:positionWeight", "calm:target:rotationWeight",
 )  # fmt: skip
 
 

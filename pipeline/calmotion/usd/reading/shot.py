@@ -11,7 +11,7 @@ import numpy as np
 
 from calmotion.errors import raise_all
 from calmotion.model import Animation, Character, MotorTracks, MovingFrame, Provenance, Track
-from calmotion.model.curves import retimed, with_contacts_at
+from calmotion.model.curves import retimed, with_schedules_at
 from calmotion.support.naming import as_written, grouped_notes
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock, clock_of, still_clock
@@ -26,7 +26,7 @@ from calmotion.usd.reading.joints.roots import moving_frames
 from calmotion.usd.reading.motors.driven_motors import BODIES, CONSTANT, DRIVE, GIVEN, Drive, to_si
 from calmotion.usd.reading.motors.given_tracks import given_tracks, length_note
 from calmotion.usd.reading.motors.holds import held
-from calmotion.usd.reading.motors.motor_limits import free_tracks
+from calmotion.usd.reading.motors.motor_limits import free_tracks, with_power
 from calmotion.usd.reading.motors.posed_motors import joint_motions, pose_codes, posed_track
 from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stacks, performed_on, skeletal_tracks
 from calmotion.usd.reading.motors.tracks import read_track, sample_codes
@@ -90,6 +90,7 @@ def read_shot(
         of_results = notes_of_results(composed, path, earlier, provenance.layers)
         weights = weight_tracks(part, character.targets, clock)
         free = free_tracks(part, character.motors, clock)
+        character = with_power(part, character, clock)
         unread = grouped_notes([error.message() for error in (*unread_attributes(part), *misplaced_schemas(part))])
     notes = (f"{place}: {message}" for place, message in with_places(messages, part, prims_of(part)))
     told = (*character.notes, *of_results, *unread, *notes)
@@ -97,7 +98,7 @@ def read_shot(
     animation = Animation(clock.frame_times(), tracks, current, read.moving, weights, free)
     if tempo is not None:
         made = retimed(dataclasses.replace(animation, current=tracks), tempo, shown.frame_times())
-        character, animation = with_contacts_at(character, tempo), dataclasses.replace(made, current=current)
+        character, animation = with_schedules_at(character, tempo), dataclasses.replace(made, current=current)
     return character, animation, provenance
 
 

@@ -1,14 +1,17 @@
-"""Limits of a motor in any supported dialect, and when it may be changed."""
+"""Limits of a motor in any supported dialect, when it may be changed, and when it is on."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calmotion.model import FreeTrack, Motor
+from calmotion.model import Character, FreeTrack, Motor
+from calmotion.model.animation import Schedule
+from calmotion.model.motor import SERVO
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, authored, number_of
@@ -25,7 +28,7 @@ from calmotion.usd.reading.joints.joint_prims import JointPrim
 if TYPE_CHECKING:
     from pxr import Usd
 
-_SCHEMA, _FREE = "CalmMotorAPI", "calm:motor:optimize"
+_SCHEMA, _FREE, _POWERED = "CalmMotorAPI", "calm:motor:optimize", "calm:motor:powered"
 _SAME = 1e-4  # of a range: what a conversion rounds
 
 
@@ -137,12 +140,13 @@ def limits_of_commands(reading: Reading, joint: JointPrim, actuator: str) -> tup
 
 def may_change(prim: Usd.Prim) -> bool:
     """Whether a motor may be changed at all."""
-    samples = _free_samples(prim)
+    samples = _switched(prim, _FREE)
     return any(value for _, value in samples) if samples else bool(schemas.value(prim, _SCHEMA, _FREE))
 
 
-def _free_samples(prim: Usd.Prim) -> list[tuple[float, bool]]:
-    attribute = prim.GetAttribute(_FREE)
+def _switched(prim: Usd.Prim, name: str) -> list[tuple[float, bool]]:
+    """Samples of an attribute, by time codes."""
+    attribute = prim.GetAttribute(name)
     if not attribute or not schemas.is_applied(prim, _SCHEMA):
         return []
     return [(code, bool(attribute.Get(code))) for code in attribute.GetTimeSamples()]
@@ -153,8 +157,33 @@ def free_tracks(stage: Usd.Stage, motors: Sequence[Motor], clock: Clock) -> tupl
     the next."""
     ranges = []
     for index, motor in enumerate(motors):
-        samples = _free_samples(stage.GetPrimAtPath(motor.prim_path))
+        samples = _switched(stage.GetPrimAtPath(motor.prim_path), _FREE)
         if len({value for _, value in samples}) > 1:
             codes, values = zip(*samples, strict=True)
             ranges.append(FreeTrack(index, clock.seconds(np.array(codes, dtype=np.float64)), np.array(values, bool)))
     return tuple(ranges)
+
+
+def with_power(stage: Usd.Stage, character: Character, clock: Clock) -> Character:
+    """The character with the times at which its motors are on, of those for which the shot animates calm:motor:powered:
+    each sample holds until the next.
+
+    Raises:
+        ShotError: A motor that is off at the first frame, or that is switched and no servo.
+    """
+    motors = list(character.motors)
+    for index, motor in enumerate(motors):
+        prim = stage.GetPrimAtPath(motor.prim_path)
+        samples = _switched(prim, _POWERED) or [(clock.start, schemas.value(prim, _SCHEMA, _POWERED) is not False)]
+        codes, values = zip(*samples, strict=True)
+        if all(values):
+            continue
+        powered = Schedule(clock.seconds(np.array(codes, dtype=np.float64)), np.array(values, bool))
+        problem = "the motor is off at the first frame, where the robot rests"
+        remedy = "Begin the shot while it is on; a joint that no motor ever turns needs no drive and no CalmMotorAPI"
+        schemas.require(powered.holds_at(0.0), prim, _POWERED, False, problem, remedy)
+        problem = "only a servo can be switched off: the joint of this motor follows its curve"
+        remedy = "Set calm:motor:model to servo, with the gains of its controller, or remove calm:motor:powered"
+        schemas.require(motor.model == SERVO, prim, _POWERED, motor.model, problem, remedy)
+        motors[index] = replace(motor, powered=powered)
+    return replace(character, motors=tuple(motors))
