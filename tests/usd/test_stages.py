@@ -58,6 +58,31 @@ def test_a_missing_layer_deep_in_a_reference_names_the_prim_of_the_shot(tmp_path
     assert "mesh.usd" in caught.value.found and "robot.usda" in caught.value.found
 
 
+@pytest.mark.parametrize("arc", ["references", "payload"])
+def test_looks_that_usd_cannot_read_are_left_out(tmp_path, arc):
+    """Documents of MaterialX, which USD from PyPI does not open, whether they are there or not."""
+    (tmp_path / "look.mtlx").write_text('<?xml version="1.0"?>\n<materialx version="1.38"/>\n')
+    looks = (
+        f'def "Looks" ({arc} = @./look.mtlx@</MaterialX>) {{}}\ndef "More" ({arc} = @./gone.mtlx@</MaterialX>) {{}}\n'
+    )
+    (tmp_path / "shot.usda").write_text(f'#usda 1.0\n{looks}def Xform "A" {{}}\n')
+    assert stages.open_stage(str(tmp_path / "shot.usda")).GetPrimAtPath("/A")
+
+
+@pytest.mark.parametrize(
+    ("content", "remedy"),
+    [("Ogawa", "convert it to .usd"), ("version https://git-lfs.github.com/spec/v1\n", "git lfs pull")],
+)
+@pytest.mark.parametrize("arc", ["references", "sublayers"])
+def test_a_file_that_is_there_and_that_usd_cannot_read_is_told_as_that(tmp_path, arc, content, remedy):
+    (tmp_path / "mesh.abc").write_text(content)
+    text = "(subLayers = [@./mesh.abc@])" if arc == "sublayers" else 'def "A" (references = @./mesh.abc@</M>) {}'
+    (tmp_path / "shot.usda").write_text(f"#usda 1.0\n{text}\n")
+    with pytest.raises(ShotError) as caught:
+        stages.open_stage(str(tmp_path / "shot.usda"))
+    assert remedy in caught.value.remedy and "mesh.abc" in caught.value.found
+
+
 def test_the_file_on_disk_counts_not_what_was_opened_before(tmp_path):
     shot = tmp_path / "shot.usda"
     shot.write_text('#usda 1.0\ndef Xform "Old" {}\n')

@@ -29,6 +29,8 @@ CURVES, MOTION, ROOT, RIG, CALIBRATION = "curves", "motion", "root", "rig", "cal
 RESULTS = (CURVES, MOTION, CALIBRATION)  # which a root layer opens with their shot
 
 _ARCS = {"reference": "references", "payload": "payload", "sublayer": "subLayers", "variant": "variants"}
+# Documents of MaterialX describe looks alone, and USD as it is installed by pip has no reader for them.
+_LOOKS = (".mtlx", ".mtlx]")
 _REFUSED = (
     "ErrorInvalidAssetPath",
     "ErrorInvalidSublayerPath",
@@ -221,6 +223,9 @@ def _refusal(error: Pcp.ErrorBase, shot: str) -> ShotError | None:
     prim = site.group(1) if site else str(error.rootSite.path)
     assets = re.findall(r"@([^@]*)@", text)
     arc = next((name for name in _ARCS if name in text.lower()), "reference")
+    file = assets[0] if assets else ""
+    if arc != "sublayer" and file.lower().endswith(_LOOKS):
+        return None
     if "Expression" in type(error).__name__:
         place = re.search(r" at (/[^ ]*) in @", text)
         return ShotError(
@@ -236,7 +241,7 @@ def _refusal(error: Pcp.ErrorBase, shot: str) -> ShotError | None:
             path=assets[-1] if assets else shot,
             attribute=_ARCS[arc],
             found=f"@{assets[0]}@" if assets else text,
-            remedy="Put the file there, or correct or remove the sublayer",
+            remedy=_missing(file, arc),
         )
     if "UnresolvedPrimPath" in type(error).__name__:
         problem, remedy = f"its {arc} names a prim that does not exist", f"Correct the prim path of the {arc}"
@@ -245,9 +250,18 @@ def _refusal(error: Pcp.ErrorBase, shot: str) -> ShotError | None:
         problem, remedy, found = "its composition refers to itself", "Remove the cycle", text
     else:
         problem = f"its {arc} cannot be opened"
-        remedy = f"Put the file there, or correct or remove the {arc}"
+        remedy = _missing(file, arc)
         found = f"@{assets[0]}@, introduced by {assets[1]}" if len(assets) > 1 else text
     return ShotError(problem, path=prim, attribute=_ARCS[arc], found=found, remedy=remedy)
+
+
+def _missing(file: str, arc: str) -> str:
+    """What to do with a file that USD cannot open."""
+    if not os.path.isfile(file):
+        return f"Put the file there, or correct or remove the {arc}"
+    return remedy_for(file, "usd") or (
+        f"The file is there, but USD cannot read it: convert it to .usd if it is of another kind, or remove the {arc}"
+    )
 
 
 def role_of(layer: Sdf.Layer) -> str:
