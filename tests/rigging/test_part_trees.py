@@ -97,10 +97,18 @@ def test_a_chain_that_the_tree_leaves_open_is_found():
     assert closed_chains(*seated(R, p)) == []
 
 
-@pytest.mark.parametrize("ratio", [1.0, -2.0])
-def test_wheels_on_one_axle_close_no_chain(ratio):
+@pytest.mark.parametrize(("ratio", "pairs"), [(1.0, [(1, 2)]), (-2.0, [])])
+def test_wheels_on_one_axle_are_told_where_they_turn_as_one(ratio, pairs):
     R, p = chain(angles=np.outer([1.0, 1.0, ratio, 1.0], T) * [[0], [1], [1], [0]])
     R[2] = R[0] @ Rotation.from_rotvec(ratio * T[:, None] * [0, 1.0, 0]).as_matrix()
     p[2] = p[1] + R[0] @ [0.0, 0.2, 0.0]
     motions, seats = seated(R[:3], p[:3], above=[WORLD, 0, 0])
-    assert closed_chains(motions, seats) == []
+    assert closed_chains(motions, seats) == pairs
+
+
+def test_of_two_that_turn_as_one_in_the_world_one_carries_the_other():
+    R, p = chain()
+    R, p = np.concatenate([R[:1], R]), np.concatenate([p[:1] + R[0] @ [0.1, 0.0, 0.0], p])
+    _, seats = seated(R, p, sizes=[0.1, 0.5, 0.5, 0.5, 0.5])
+    assert seats[0].carrier == 1 and seats[0].joint.kind == FIXED
+    assert [seat.carrier for seat in seats[1:]] == [WORLD, 1, 2, 3]

@@ -117,10 +117,13 @@ def _chain(links: Sequence[Link], k: int) -> list[int]:
 
 
 def tip_of(piece: Piece, origin: Array) -> Array:
-    """Center of the tip of a link, the part farthest from its origin [m], world, shape [3]."""
+    """Center of the tip of a link, the part farthest from its origin [m], world, shape [3]; the farthest point of one
+    that is around its origin."""
     points, _ = piece
     away = np.linalg.norm(points - origin, axis=1)
-    return np.asarray(points[away >= (1.0 - _TIP) * away.max()].mean(axis=0), dtype=np.float64)
+    tip = points[away >= (1.0 - _TIP) * away.max()].mean(axis=0)
+    around = np.linalg.norm(tip - origin) < 0.5 * away.max()
+    return np.asarray(points[int(np.argmax(away))] if around else tip, dtype=np.float64)
 
 
 _FLAT = 1e-7  # volume of a negligible piece, of that of all pieces

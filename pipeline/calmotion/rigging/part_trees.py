@@ -97,7 +97,7 @@ def seat_parts(motions: PartMotions, above: Sequence[int], sizes: Sequence[float
         sizes: Of the parts: of two that move as one the larger carries the other.
 
     Returns:
-        Seats with at most one freedom on the part above where there are such, else those of the fewest freedoms; a part
+        Seats with at most one freedom on the part above where there is one, else those of the fewest freedoms; a part
         that fits nowhere is free on the part above it.
     """
     seats: dict[int, Seat] = {}
@@ -110,7 +110,7 @@ def seat_parts(motions: PartMotions, above: Sequence[int], sizes: Sequence[float
     while len(seats) < motions.count:
         waiting = [k for k in range(motions.count) if k not in seats]
         ready = [k for k in waiting if above[k] == WORLD or above[k] in seats]
-        near = [k for k in ready if motions.freedoms(k, above[k]) <= FREEDOMS[REVOLUTE]]
+        near = [k for k in ready if motions.freedoms(k, above[k]) <= (FREEDOMS[REVOLUTE] if above[k] != WORLD else 0)]
         for k in near:
             seats[k] = Seat(above[k], motions.joint(k, above[k]))
         if near:
@@ -139,12 +139,11 @@ def closed_chains(motions: PartMotions, seats: Sequence[Seat]) -> list[tuple[int
     there."""
     chains = [_chain(seats, k) for k in range(motions.count)]
     moving = [k for k in range(motions.count) if seats[k].joint.kind != FIXED]
+    apart = [(j, k) for k in moving for j in moving if j < k and j not in chains[k] and k not in chains[j]]
     return [
         (j, k)
-        for k in moving
-        for j in moving
-        if j < k and j not in chains[k] and k not in chains[j] and seats[j].carrier != seats[k].carrier
-        if motions.joint(k, j).kind in (FIXED, REVOLUTE)
+        for j, k in apart
+        if (kind := motions.joint(k, j).kind) == FIXED or (kind == REVOLUTE and seats[j].carrier != seats[k].carrier)
     ]
 
 

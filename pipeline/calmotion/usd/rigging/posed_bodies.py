@@ -75,7 +75,7 @@ def posed_bodies(stage: Usd.Stage, parts: Parts, motions: PartMotions) -> tuple[
             remedy="Animate parts that are parented to each other, each about its pivot",
         )
     raise_all([parts.problems[k] for k in kept if k in parts.problems])
-    notes += [problem.message() for k, problem in parts.problems.items()]
+    notes += [f"{one.path}: {one.problem} ({one.found}), so it is left out" for one in parts.problems.values()]
     raise_all([_no_joint(parts, k, seats[k]) for k in kept if seats[k].joint.kind == FREE and on[k] != WORLD])
     bodies: list[PosedBody] = []
     names, index = set[str](), dict[str, int]()
