@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model.animation import Animation
 from calmotion.model.character import Character
-from calmotion.model.limits.use import LimitUse, TermUse
+from calmotion.model.limits.use import LimitUse, TermUse, is_kept
 from calmotion.model.run import SearchRecord
 from calmotion.model.tempo import TempoReport
 from calmotion.model.tolerance import BudgetEntry
@@ -152,7 +152,8 @@ class Simplification:
     skipped: bool = False
 
 
-GOAL_REACHED = "goal reached"  # why a search ended
+GOAL_REACHED, LIMITS_EXCEEDED = "goal reached", "limits exceeded"  # why a search ended
+_AT_AN_END = ("converged", "no further decrease", GOAL_REACHED)
 _NOTICED_RISE = 0.01  # of the tolerance
 
 
@@ -300,6 +301,13 @@ class Result:
     def interrupted(self) -> bool:
         """Whether the user ended the search; the best curves so far are here."""
         return self.search.interrupted
+
+    def with_limits_told(self) -> Result:
+        """This result, whose search is not said to be at an end where limits of motors or plugins are not kept."""
+        kept = all(map(is_kept, self.limits)) and all(map(is_kept, self.terms))
+        if kept or self.search.stopped not in _AT_AN_END:
+            return self
+        return replace(self, search=replace(self.search, stopped=LIMITS_EXCEEDED))
 
     def performed_animation(self, animation: Animation) -> Animation:
         """An animation at the tempo of this result."""

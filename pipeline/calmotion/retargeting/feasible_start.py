@@ -18,7 +18,7 @@ from calmotion.model.limits.base import CurveLimit
 from calmotion.model.limits.bounds import Bounds
 from calmotion.model.limits.kinds import kinds_of_limits
 from calmotion.retargeting.problem.adaptive_knots import converted, halved
-from calmotion.retargeting.problem.limits import FIRST_PENALTY, MARGIN
+from calmotion.retargeting.problem.limits import MARGIN
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on
 from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
 from calmotion.retargeting.solver.elastic_program import elastic_minimum
@@ -101,7 +101,7 @@ def onto_limits(at: Evaluation, fixed: BoolArray) -> tuple[RetargetProblem, Arra
         return problem, x
     moved, required, found = _nearest(problem, x, fixed)
     # the robot may have almost no error without limits, so that their penalty follows from the error that they require
-    rho = max(limits.rho, FIRST_PENALTY * required / problem.grid.end)
+    rho = max(limits.rho, limits.penalty_beside(required))
     multipliers = {name: y.copy() for name, y in limits.multipliers.items()}
     for (name, motor, side), values in found.items():
         multipliers[name][side, limits.judged, motor] = values / (rho * limits.h)

@@ -72,7 +72,7 @@ def idle_gain(at: Evaluation, linear: LinearProblem, character: Character) -> fl
         residual = residual - length * product
         before, square = square, float(residual @ residual)
         direction = residual + (square / before) * direction
-    return at.gain(decrease, at.objective_value)
+    return at.gain(decrease)
 
 
 BLOCK = 8  # neighbouring coefficients of a motor that vanish together; four already make a curve vanish

@@ -143,7 +143,7 @@ def _optimized(
         performed=performed_motion(prepared, after.curves),
         goal_m=goal_of(character, options.goal),
         terms=term_uses(before, after, character, options.terms),
-    )
+    ).with_limits_told()
 
 
 def _used(at: Evaluation, character: Character) -> list[Excess]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model import Character, Result, Simulation, is_exceeded, is_reached
-from calmotion.model.result import GOAL_REACHED
+from calmotion.model.result import GOAL_REACHED, LIMITS_EXCEEDED
 from calmotion.model.uncertainty import CURVES
 
 _STILL = 1e-3  # of the tolerance: what moves by less stands still
@@ -113,9 +113,10 @@ def remaining_errors(character: Character, result: Result) -> list[dict[str, Any
     motors = sum(motor.optimize and not motor.idle and motor.follows is None for motor in character.motors)
     weights = [target.position_weight for target in character.targets]
     directions = 3 * sum((t.position_weight > 0.0) + (t.rotation_weight > 0.0) for t in character.targets)
-    common = ["limits"] * any(limit.cost_m is not None for limit in result.limits)
+    stopped = result.search.stopped
+    common = ["limits"] * (stopped == LIMITS_EXCEEDED or any(limit.cost_m is not None for limit in result.limits))
     common += ["plugins"] * any(term.limit is None or is_reached(term) for term in result.terms)
-    common += ["search"] * (result.search.stopped not in ("", "converged", GOAL_REACHED))
+    common += ["search"] * (stopped not in ("", "converged", GOAL_REACHED, LIMITS_EXCEEDED))
     rows = []
     for k in np.flatnonzero(largest > (result.goal_m or result.tolerance_m)):
         causes = [*common, *["sag"] * bool(min(resting[k], sag[k]) >= 0.5 * largest[k])]

@@ -45,7 +45,7 @@ class Point:
         J = self.problem.jacobian(self.x)
         return Linear(self.problem, self.x, J, J.T @ self.problem.residual(self.x))
 
-    def gain(self, decrease, value):
+    def gain(self, decrease):
         return decrease
 
     def merit_of_gain(self, gain):

@@ -9,6 +9,7 @@ from rich.console import Console
 
 from calmotion.cli.reports.limits import print_reason
 from calmotion.cli.tables import about, counted, length, say
+from calmotion.model.result import LIMITS_EXCEEDED
 from calmotion.model.tolerance import CHOICES, MEASURED, MESH, REDUCTION, STEP, SUBSPACE
 from calmotion.support.naming import distinct_names
 
@@ -91,7 +92,7 @@ def _print_goal(console: Console, report: dict[str, Any]) -> None:
         rows = [row for row in main_target_first(report) if not row["goal_kept"]]
         left = ", ".join(f"{length(row['max_error_after_m'])} at {row['path']}" for row in rows[:HEADLINES])
         more = f" and {counted(len(rows) - HEADLINES, 'more target')}" if len(rows) > HEADLINES else ""
-        ended = report["stopped"] in ("converged", "no further decrease")
+        ended = report["stopped"] in ("converged", "no further decrease", LIMITS_EXCEEDED)
         how = "is out of reach with these motors, limits and weights" if ended else "is not reached"
         say(console, f"The goal of {length(goal)} {how}: {left}{more}.")
     error, worst = report["simulation_error_m"], max(row["max_error_after_m"] for row in report["targets"])

@@ -54,6 +54,7 @@ class TermUse:
 
 
 _REACHED = 1e-3  # of the size of a limit: what is nearer touches it
+_KEPT = 1e-3  # of the size of a limit: what exceeds it by less keeps it
 _ROUNDING = 1e-6  # of the size of a limit
 
 
@@ -61,6 +62,11 @@ def is_reached(limit: LimitUse | TermUse) -> bool:
     """Whether a quantity goes up to a limit, or the limit costs something; not whether there merely is one."""
     costs = isinstance(limit, LimitUse) and limit.cost_m is not None
     return costs or limit.excess > -_REACHED
+
+
+def is_kept(limit: LimitUse | TermUse) -> bool:
+    """Whether a quantity keeps a limit, as well as a search can say."""
+    return limit.excess <= _KEPT
 
 
 def is_exceeded(limit: LimitUse | TermUse) -> bool:

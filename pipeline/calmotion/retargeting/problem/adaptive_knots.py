@@ -63,7 +63,7 @@ def refined_breaks(
     decrease = 0.5 * gradient * fine.precondition(fixed)(gradient)
     by_function = decrease.reshape(finer.count, -1).sum(axis=1)
     total = float(by_function.sum())
-    if not total > 0.0 or at.gain(total, at.objective_value) < gain:
+    if not total > 0.0 or at.gain(total) < gain:
         return None
     refined = halved(grid, basis.breaks, _contributing(grid, basis, finer, np.maximum(by_function, 0.0)))
     return refined if len(refined) > len(basis.breaks) else None

@@ -36,5 +36,5 @@ def limit_costs(at: Evaluation, fixed: BoolArray) -> dict[tuple[int, str], float
     for motor, name in sorted(weights, key=lambda key: -weights[key])[:ESTIMATED_LIMITS]:
         without = at.with_limits(limits.without(motor, name))
         step = limited_step(without.linearized(), fixed, STEP_SHARE, 0.0, STEP_PRODUCTS)
-        costs[motor, name] = max(0.0, at.gain(step.eased, at.objective_value))
+        costs[motor, name] = max(0.0, at.gain(step.eased))
     return costs

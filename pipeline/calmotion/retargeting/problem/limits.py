@@ -18,10 +18,10 @@ import numpy as np
 from calmotion.arrays import Array, BoolArray
 from calmotion.model.limits.bounds import Bounds
 
-FIRST_PENALTY = 1e3  # over the objective of the input for each second
+FIRST_PENALTY = 1e3  # over the objective for each second
 MARGIN = 1e-4  # share by which a limit is narrowed
 GROWTH, SLOW = 10.0, 0.25  # the penalty grows by the first if an update leaves more than the second of the violation
-MOST = 1e8  # of the first penalty, which it may reach: rounding of larger ones hides the objective
+MOST = 1e3  # of the penalty beside the objective: a larger one leaves short steps, of each of which little holds
 STALLED, PATIENCE = 0.8, 3  # updates end after so many minima in a row that each leave more than this share of it
 
 
@@ -100,28 +100,42 @@ class LimitTerms:
         """Largest excess over the narrowed limits; at most 0 if all are kept."""
         return max((float(np.max(self._sides(name, values[name]))) for name in self.bounds), default=-np.inf)
 
-    def tightened(self, values: dict[str, Array]) -> LimitTerms | None:
+    def tightened(self, values: dict[str, Array], objective: float) -> LimitTerms | None:
         """The terms switched on if limits are violated, or with new multipliers at a minimum with the terms; None if
-        all limits are kept or further updates do not help."""
+        all limits are kept or further updates do not help.
+
+        Args:
+            values, objective: As of `updated`.
+        """
         if not self.on:
             return None if self.kept(values) else replace(self, on=True)
         excess = self.excess(values)
         stalled = self.stalled + 1 if excess > STALLED * self.reached else 0
-        return replace(self, stalled=stalled, reached=excess).updated(values) if stalled < PATIENCE else None
+        return replace(self, stalled=stalled, reached=excess).updated(values, objective) if stalled < PATIENCE else None
 
-    def updated(self, values: dict[str, Array]) -> LimitTerms | None:
-        """With new multipliers after a minimum of the model; None if all limits are kept."""
+    def updated(self, values: dict[str, Array], objective: float) -> LimitTerms | None:
+        """With new multipliers after a minimum of the model; None if all limits are kept.
+
+        Args:
+            values: Of the limited quantities there, by name, shape [T, M] each.
+            objective: The objective there, without the terms. That of the input says little of the penalty that counts
+                beside it: a stiff robot has almost no error before limits bend its motion.
+        """
         excess = self.excess(values)
         if excess <= MARGIN:
             return None
         multipliers = {
             name: np.maximum(0.0, self._sides(name, values[name]) + y) for name, y in self.multipliers.items()
         }
-        first, rho = self.first or self.rho, self.rho
+        first, rho = max(self.first or self.rho, self.penalty_beside(objective)), self.rho
         if excess > SLOW * self.left and rho < MOST * first:
             rho *= GROWTH
             multipliers = {name: y / GROWTH for name, y in multipliers.items()}  # y rho stays the same
         return replace(self, multipliers=multipliers, first=first, rho=rho, left=excess)
+
+    def penalty_beside(self, objective: float) -> float:
+        """The penalty with which a search begins that has an objective."""
+        return FIRST_PENALTY * objective / (self.h * np.count_nonzero(self.judged))
 
     def without(self, motor: int, quantity: str) -> LimitTerms:
         """The same terms without one limit of one motor."""

@@ -16,7 +16,7 @@ from calmotion.arrays import Array, IntArray
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.parallel import in_parallel
-from calmotion.retargeting.problem.limits import FIRST_PENALTY, LimitTerms
+from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.linear_problem import LinearProblem
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
@@ -154,11 +154,6 @@ class RetargetProblem:
         targets = max(1, 3 * len(self.model.targets.component))
         return max(float(np.sum(self.objective.weights**2)) / targets, 1e-300)
 
-    def gain(self, decrease: float, value: float) -> float:
-        """Decrease of the root-mean-square error that corresponds to a decrease of the merit [m]."""
-        now = np.sqrt(2.0 * max(value, 0.0) / self.unit)
-        return float(now - np.sqrt(2.0 * max(value - decrease, 0.0) / self.unit))
-
     def lever(self) -> float:
         """Largest lever arm of a motor: weighted root-mean-square motion of the targets per angle [m/rad]."""
         weighted = self.rigid.response.targets * self.objective.weights[..., None]
@@ -247,12 +242,17 @@ class Evaluation:
 
     def tightened(self) -> Evaluation | None:
         """With limits switched on if they are violated, or their multipliers updated; None if that changes nothing."""
-        limits = None if self.problem.limits is None else self.problem.limits.tightened(self.limited)
-        return None if limits is None else self.with_limits(limits)
+        limits = self.problem.limits
+        tightened = None if limits is None else limits.tightened(self.limited, self.objective_value)
+        return None if tightened is None else self.with_limits(tightened)
 
-    def gain(self, decrease: float, value: float) -> float:
-        """Decrease of the root-mean-square error that corresponds to a decrease of the merit [m]."""
-        return self.problem.gain(decrease, value)
+    def gain(self, decrease: float) -> float:
+        """Decrease of the root-mean-square error that corresponds to a decrease of the merit [m].
+
+        One of the terms of limits may be larger than the objective, and the merit with them below zero.
+        """
+        value = max(self.objective_value, decrease)
+        return float(np.sqrt(2.0 * value / self.problem.unit) - np.sqrt(2.0 * (value - decrease) / self.problem.unit))
 
     def merit_of_gain(self, gain: float) -> float:
         """Decrease of the merit that reduces the root-mean-square error by `gain` [m], from here."""
@@ -283,5 +283,6 @@ def with_first_penalty(at: Evaluation, tolerance: float) -> Evaluation:
     limits = at.problem.limits
     if limits is None:
         return at
-    value = max(at.objective_value, at.merit_of_gain(1e-3 * tolerance))
-    return at.with_limits(replace(limits, rho=FIRST_PENALTY * value / at.problem.grid.end))
+    # limits may cost far more than a robot errs before: one on stiff links by nothing
+    value = max(at.objective_value, at.merit_of_gain(tolerance))
+    return at.with_limits(replace(limits, rho=limits.penalty_beside(value)))

@@ -38,6 +38,7 @@ from calmotion.tolerance.step_error import order_of
 
 LIMITED_SEARCHES = 4  # at most that keep all limits by themselves
 BETWEEN = 5e-4  # share of a limit by which it counts as kept between the instants of a search
+HALVED = 3  # most times that steps are halved for the efforts
 FINE = 32  # instants of a frame at which curves are compared with their limits
 
 
@@ -120,7 +121,7 @@ def _search_within_limits(performance: _Performance, searches: _Searches) -> Non
             break
         shares = {name: share / np.maximum(1.0, used[name]) for name, share in shares.items()}
         shot = shot.with_tracks(found_tracks(done, shot.animation))
-    searches.done = replace(searches.done, limits=told_between(searches.done.limits, used))
+    searches.done = replace(searches.done, limits=told_between(searches.done.limits, used)).with_limits_told()
 
 
 def told_between(limits: Sequence[LimitUse], used: dict[str, Array]) -> tuple[LimitUse, ...]:
@@ -179,23 +180,33 @@ class _Performance:
         frames = animation.frame_times
         times = np.linspace(0.0, frames[-1], FINE * (len(frames) - 1) + 1)
         curves = commanded_curves(self.character, replace(animation, current=animation.tracks), result)
-        values = [curves(times, 1), curves(times, 2), curves(times, 3), self._efforts(result)]
-        return {
-            name: np.max(np.abs(v), axis=0, initial=0.0) / getattr(limits, name)
-            for name, v in zip(TEMPO_LIMITS, values, strict=True)
+        used = {
+            name: np.max(np.abs(curves(times, order)), axis=0, initial=0.0) / getattr(limits, name)
+            for order, name in enumerate(TEMPO_LIMITS[:3], 1)
         }
+        return used | {TEMPO_LIMITS[3]: self._used_efforts(result, limits.effort)}
 
-    def _efforts(self, result: Result) -> Array:
-        """Efforts in a result, and as ever shorter steps would have them, shape [n, M]."""
+    def _used_efforts(self, result: Result, limits: Array) -> Array:
+        """Largest efforts as ever shorter steps have them, as shares of the limits, shape [M].
+
+        A chosen step has positions right to the tolerance, and peaks of efforts to one or two hundredths. Steps are
+        halved until what they change is no more than counts.
+        """
         assert result.after is not None
         own = result.after.motion.motor_efforts[result.after.motion.judged]
-        if not np.any(np.isfinite(tempo_limits(self.character).effort)) or result.interrupted:
-            return own
+        used: Array = np.max(np.abs(own), axis=0, initial=0.0) / limits
+        if not np.any(np.isfinite(limits)) or result.interrupted:
+            return used
         shot = self.with_curves(result).shot
-        half, quarter = (self._efforts_at(shot, share * result.step_s, result.pre_roll_s) for share in (0.5, 0.25))
-        # a chosen step has positions right to the tolerance, and peaks of efforts to one or two hundredths
-        extrapolated = quarter[::2] + (quarter[::2] - half) / (2.0 ** order_of(shot.character) - 1.0)
-        return np.concatenate([own, quarter, extrapolated])
+        coarse = self._efforts_at(shot, result.step_s, result.pre_roll_s)
+        for halved in range(1, HALVED + 1):
+            fine = self._efforts_at(shot, 0.5**halved * result.step_s, result.pre_roll_s)
+            limit = fine[::2] + (fine[::2] - coarse) / (2.0 ** order_of(shot.character) - 1.0)
+            last, used = used, np.max(np.abs(np.concatenate([fine, limit])), axis=0) / limits
+            if halved > 1 and np.all(np.abs(used - last) <= np.maximum(BETWEEN, 1.0 - used)):
+                break
+            coarse = fine
+        return used
 
     def _efforts_at(self, shot: CompiledShot, step: float, pre_roll: float) -> Array:
         options = RunSettings(step=step, pre_roll=pre_roll)

@@ -18,7 +18,7 @@ from calmotion.model.uncertainty import Scenario
 from calmotion.retargeting.avoided_reversals import play_of, with_reversals
 from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.kept_feet import with_kept_feet
-from calmotion.retargeting.problem.limits import FIRST_PENALTY, MARGIN, LimitTerms
+from calmotion.retargeting.problem.limits import MARGIN, LimitTerms
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
 from calmotion.retargeting.robust.measure import largest_errors
@@ -199,7 +199,7 @@ def _posed(
         at = with_reversals(at, play_of(prepared.character), options.avoid_reversals)
     at = with_terms(with_kept_feet(prepared, at), prepared.character, options.terms)
     limits = at.problem.limits or LimitTerms({}, grid.judged, grid.h, 1.0)
-    limits = replace(limits, on=True, rho=FIRST_PENALTY * at.objective_value / grid.end)
+    limits = replace(limits, on=True, rho=limits.penalty_beside(at.objective_value))
     fixed = locked_coefficients(shot.animation, problem.space.basis, problem.space.motors, grid.end)
     return replace(at.problem, limits=limits).at(start, at), fixed
 

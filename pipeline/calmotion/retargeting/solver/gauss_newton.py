@@ -76,7 +76,7 @@ class Evaluated(Protocol):
     def tightened(self) -> Any:
         """At a minimum: the same point of a merit that changed because limits are violated; None if it does not."""
 
-    def gain(self, decrease: float, value: float) -> float:
+    def gain(self, decrease: float) -> float:
         """Decrease of the root-mean-square error that corresponds to a decrease of the merit [m]."""
 
     def merit_of_gain(self, gain: float) -> float:
@@ -231,7 +231,7 @@ class _GaussNewton:
         return ""
 
     def _gain_of(self, decrease: float) -> float:
-        return float(self._at.gain(decrease, self._at.merit))
+        return float(self._at.gain(decrease))
 
     @property
     def _enough(self) -> float:
@@ -279,7 +279,7 @@ class _GaussNewton:
             if not TRUSTED[0] < ratio < TRUSTED[1]:
                 self._responses = None
             if ratio > ACCEPTED_RATIO:
-                brought = at.gain(at.merit - there.merit, at.merit)
+                brought = at.gain(at.merit - there.merit)
                 self._stalled = 0 if brought >= self._ends.gain else self._stalled + 1
                 self._at, self._radius, self._share = there, np.inf, t
                 return self._stalled < STALLED

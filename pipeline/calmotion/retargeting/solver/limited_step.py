@@ -58,7 +58,7 @@ class Limits(Protocol):
     def excess(self, values: Values) -> float:
         """Largest excess of a limit."""
 
-    def updated(self, values: Values) -> Self | None:
+    def updated(self, values: Values, objective: float) -> Self | None:
         """With new multipliers after a minimum; None where all limits are kept."""
 
 
@@ -212,7 +212,7 @@ def limited_step(
             break
         if decrease <= max(enough, share * gained) and (not is_matrix or not used or model.acting(point) == acted):
             stalled = stalled + 1 if (excess := model.limits.excess(point.values)) > STALLED * left else 0
-            left, updated = excess, model.limits.updated(point.values)
+            left, updated = excess, model.limits.updated(point.values, model.objective(point))
             if updated is None or stalled >= PATIENCE:
                 break
             model = LimitedModel(linear, updated)
