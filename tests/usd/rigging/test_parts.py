@@ -10,7 +10,7 @@ import pytest
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
 from calmotion.usd.rigging import RigOptions, rig_shot
-from performing import worst_gap
+from performing import result_with, worst_gap
 from pxr import Gf, Sdf, Usd, UsdGeom
 
 FRAMES = 36
@@ -272,13 +272,30 @@ def test_an_xform_without_geometry_between_two_is_a_servo(tmp_path):
     assert [body.mass.mass for body in character.bodies] == pytest.approx([0.05 * 1.01, 1.01], rel=1e-4)
 
 
-def test_one_part_may_turn_in_the_world(tmp_path):
+def test_parts_may_turn_in_the_world(tmp_path):
     scene = Scene(tmp_path / "door.usda")
     keys(scene.xform("/Scene/Door", (0.2, 0, 1.0)).AddRotateZOp(), 40.0 * np.sin(TURN) ** 2)
     scene.box("/Scene/Door/mesh", (0.8, 0.04, 2.0), (0.4, 0, 0))
-    _, output = rigged(scene.saved())
+    keys(scene.xform("/Scene/Other", (0.2, 3.0, 1.0)).AddRotateZOp(), 30.0 * np.sin(TURN) ** 2)
+    scene.box("/Scene/Other/mesh", (0.8, 0.04, 2.0), (0.4, 0, 0))
+    rig, output = rigged(scene.saved())
+    assert rig.targets == ("/Scene/Door/target", "/Scene/Other/target")
     character, animation = reproduced(output)
-    assert [joint.kind for joint in character.joints] == ["revolute"] and len(animation.tracks) == 1
+    assert [joint.kind for joint in character.joints] == ["revolute"] * 2 and len(animation.tracks) == 2
+
+
+def test_results_that_are_baked_move_the_parts(tmp_path):
+    from calmotion.usd.writing import WriteOptions, write_result
+
+    _, output = rigged(Scene(tmp_path / "arm.usda", 0.01).arm(fore="mirrored").saved())
+    character, animation, provenance = read_shot(str(output))
+    result = result_with(character, animation, {1: 0.1, 3: 0.01})
+    options = WriteOptions(bake="motors")
+    _, root = write_result(character, animation, provenance, result, str(tmp_path / "calm.usda"), options)
+    _, again, _ = read_shot(root)
+    assert np.abs(again.current[1].values - animation.tracks[1].values).max() == pytest.approx(0.1, rel=1e-2)
+    assert worst_gap(root, character, animation)[0] > 1e-2
+    assert worst_gap(root, character, animation, again.current)[0] < 1e-6
 
 
 def test_a_hinge_that_hardly_turns_is_told(tmp_path):

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from calmotion.arrays import Array, IntArray
+from calmotion.arrays import Array
 from calmotion.catalogs.materials import Material
 from calmotion.model import MassProperties, SurfaceMesh
 from calmotion.rigging.hinge_rows import HingeRow
-from calmotion.rigging.links import Link, targets_of, tip_of
+from calmotion.rigging.links import Link, Piece, targets_of, tip_of
 from calmotion.rigging.part_joints import FIXED, FREE, PRISMATIC
 from calmotion.rigging.part_trees import PartMotions
 from calmotion.usd.reading.bodies.mass import mass_of
@@ -91,13 +91,26 @@ class PosedRobot(RobotLayer):
             if mass is None:
                 self._author_mass(prim, light)
             self._attach(k, poses, light)
-        links = [Link(k, body.name, body.carrier, _NO_HINGES, pieces[k]) for k, body in enumerate(self._bodies)]
-        for k in targets_of(links, [body.path for body in self._bodies]):
-            piece, joint = pieces[k], self._bodies[k].joint
-            if piece is not None and joint is not None and joint.kind != FIXED:
+        for k in targets_of(self._links(pieces), [*(body.path for body in self._bodies), ""]):
+            piece = pieces[k]
+            if piece is not None:
                 away = self._meters * poses[k].to_local(self._point(k)[None])[0]
                 tip = tip_of(piece, away) / self._meters
                 self._author_target(self._bodies[k].path, tip / poses[k].scale)
+
+    def _links(self, pieces: Sequence[Piece | None]) -> list[Link]:
+        """The bodies as links whose tips may be targets, and the world as the last one: it carries what has a joint to
+        it. What is fixed to another body counts as a part of it, without a tip of its own."""
+        fixed = [body.joint is not None and body.joint.kind == FIXED for body in self._bodies]
+        links = []
+        for k, body in enumerate(self._bodies):
+            carrier = body.carrier
+            while carrier >= 0 and fixed[carrier]:
+                carrier = self._bodies[carrier].carrier
+            if carrier < 0 and body.joint is not None and body.joint.kind != FREE:
+                carrier = len(self._bodies)
+            links.append(Link(k, body.name, -1 if fixed[k] else carrier, _NO_HINGES, None if fixed[k] else pieces[k]))
+        return [*links, Link(len(links), "", -1, _NO_HINGES, None)]
 
     def _editable(self, path: str) -> Usd.Prim:
         """A prim, no longer in an instance or one itself, so that it and those below it can be edited."""
@@ -159,7 +172,7 @@ class PosedRobot(RobotLayer):
         return path, poses[0]
 
 
-def _together(surfaces: Sequence[SurfaceMesh]) -> tuple[Array, IntArray] | None:
+def _together(surfaces: Sequence[SurfaceMesh]) -> Piece | None:
     """The surfaces of a body as one."""
     if not surfaces:
         return None
