@@ -71,23 +71,6 @@ class PartMotions:
         R, _ = relative(self.R[seat.carrier], self.p[seat.carrier], self.R[part], self.p[part])
         return Seat(seat.carrier, with_hinges(seat.joint, R, self.tolerance))
 
-    def performed(self, seats: Sequence[Seat], parts: Sequence[int]) -> float:
-        """How far the origins of parts are, at most, from where joints and their values have them [m]."""
-        done: dict[int, tuple[Array, Array]] = {WORLD: (self.R[WORLD], self.p[WORLD])}
-
-        def world(part: int) -> tuple[Array, Array]:
-            if part not in done:
-                seat = seats[part]
-                if seat.joint.kind == FREE:
-                    return self.R[part], self.p[part]
-                R0, p0 = world(seat.carrier)
-                R, p = relative(self.R[seat.carrier], self.p[seat.carrier], self.R[part], self.p[part])
-                R, p = seat.joint.moved(R[0], p[0])
-                done[part] = R0 @ R, p0 + np.einsum("nij,nj->ni", R0, p)
-            return done[part]
-
-        return max(float(np.abs(world(k)[1] - self.p[k]).max()) for k in parts)
-
 
 def seat_parts(motions: PartMotions, above: Sequence[int], sizes: Sequence[float]) -> list[Seat]:
     """The carrier of each part, without cycles.

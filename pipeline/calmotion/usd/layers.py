@@ -52,7 +52,7 @@ def refuse_input_as_output(output: str, inputs: Iterable[str]) -> None:
             )
 
 
-def write_layer(layer: Sdf.Layer, output: str, validate: Callable[[str], None]) -> None:
+def write_layer(layer: Sdf.Layer, output: str, validate: Callable[[str], object]) -> None:
     """Write an anonymous layer to a file, atomically.
 
     It is exported to a temporary file, opened again and validated before it replaces `output`, see `replaced`.

@@ -284,6 +284,28 @@ def test_parts_may_turn_in_the_world(tmp_path):
     assert [joint.kind for joint in character.joints] == ["revolute"] * 2 and len(animation.tracks) == 2
 
 
+def test_what_resets_its_transforms_below_a_part_stands_still(tmp_path):
+    scene = Scene(tmp_path / "arm.usda").arm()
+    sign = scene.xform("/Scene/Robot/Base/Table/Upper/Sign", (2.0, 0, 0))
+    sign.SetResetXformStack(True)
+    scene.box("/Scene/Robot/Base/Table/Upper/Sign/mesh", (1, 1, 1))
+    rig, output = rigged(scene.saved())
+    character, _ = reproduced(output)
+    assert not rig.notes and len(rig.joints) == 4
+    upper = next(body for body in character.bodies if body.path.endswith("/Upper"))
+    assert upper.mass.mass == pytest.approx(1010.0 * 0.05**2 * 0.5, rel=1e-4)  # without the sign
+
+
+def test_the_distance_that_is_told_is_that_of_the_written_robot(tmp_path):
+    scene = Scene(tmp_path / "arm.usda").arm()
+    # joints have single precision, which is microns at hundreds of metres
+    UsdGeom.Xformable(scene.stage.GetPrimAtPath("/Scene/Robot")).AddTranslateOp().Set(Gf.Vec3d(200, 300, 0))
+    rig, output = rigged(scene.saved())
+    character, animation, _ = read_shot(str(output))
+    far, _ = worst_gap(output, character, animation)
+    assert 1e-6 < far < 1e-4 and rig.off == pytest.approx(far, rel=1e-3)
+
+
 def test_results_that_are_baked_move_the_parts(tmp_path):
     from calmotion.usd.writing import WriteOptions, write_result
 

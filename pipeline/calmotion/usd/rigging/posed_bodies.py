@@ -41,9 +41,8 @@ class PosedBody:
     joint: PartJoint | None
 
 
-def posed_bodies(stage: Usd.Stage, parts: Parts, motions: PartMotions) -> tuple[list[PosedBody], float, list[str]]:
-    """The bodies of a robot, carriers first, how far the parts are, at most, from where their joints have them [m], and
-    notes for the user.
+def posed_bodies(stage: Usd.Stage, parts: Parts, motions: PartMotions) -> tuple[list[PosedBody], list[str]]:
+    """The bodies of a robot, carriers first, and notes for the user.
 
     A part that does not move on its carrier belongs to it. A part without joint to anything, and without parts that it
     carries, is no part of the robot.
@@ -95,13 +94,15 @@ def posed_bodies(stage: Usd.Stage, parts: Parts, motions: PartMotions) -> tuple[
     for k in kept:
         add(k)
     notes += [note for body in bodies for note in _unsure(body, motions)]
-    for one, other in closed_chains(motions, seats):
-        if one in kept and other in kept:
-            notes.append(
-                f"{parts.paths[one]} and {parts.paths[other]} stay together although none carries the other; if they "
-                "are coupled, author the joint that closes this chain in a layer over the robot"
-            )
-    return bodies, motions.performed(seats, kept), notes
+    pairs = [pair for pair in closed_chains(motions, seats) if set(pair) <= set(kept)]
+    if pairs:
+        one, other = (parts.paths[k] for k in pairs[0])
+        more = f", and {len(pairs) - 1} more pairs," if pairs[1:] else ""
+        notes.append(
+            f"{one} and {other}{more} stay together although none carries the other; where they are coupled, author "
+            "the joint that closes this chain in a layer over the robot"
+        )
+    return bodies, notes
 
 
 def _resolved(seats: Sequence[Seat], still: set[int], part: int) -> int:

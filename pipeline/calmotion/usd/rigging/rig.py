@@ -12,6 +12,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.catalogs.materials import MATERIALS
 from calmotion.errors import ShotError
+from calmotion.model import Animation, Character
 from calmotion.model.outputs import Rig, RiggedJoint
 from calmotion.rigging.links import Link, make_links, targets_of
 from calmotion.rigging.part_joints import SINGLE
@@ -27,6 +28,7 @@ from calmotion.usd.reading.skeletons import BoundSkeleton, bound_skeletons
 from calmotion.usd.rigging.parts import Parts, read_parts
 from calmotion.usd.rigging.posed_bodies import posed_bodies
 from calmotion.usd.rigging.posed_robot import PosedRobot
+from calmotion.usd.rigging.reproduction import largest_distance
 from calmotion.usd.rigging.skinned_robot import SkinnedRobot
 from calmotion.usd.rigging.skins import read_skin, skinned_meshes
 from calmotion.usd.transforms import pose_from_matrix
@@ -115,13 +117,18 @@ def _rig_skinned(stage: Usd.Stage, path: str, output: str, options: RigOptions) 
 def _rig_parts(parts: Parts, stage: Usd.Stage, path: str, output: str, options: RigOptions) -> Rig:
     rounding = SINGLE * float(np.abs(parts.positions).max())
     motions = PartMotions(parts.rotations, parts.positions, options.angle_tolerance, rounding)
-    bodies, off, notes = posed_bodies(stage, parts, motions)
+    bodies, notes = posed_bodies(stage, parts, motions)
     layer = PosedRobot(stage, path, parts, motions, bodies, MATERIALS[options.material], options.material)
     names = [body.name for body in bodies]
     flexible = _flexible(options, names)
     layer.author(options.servo_share, flexible)
     written = layer.finish(provenance_of(path, stage, parts.clock), output, "the animated parts")
-    write_layer(written, output, lambda temporary: _validate(temporary, len(layer.motors)))
+    off: list[float] = []
+    write_layer(
+        written,
+        output,
+        lambda temporary: off.append(largest_distance(*_validate(temporary, len(layer.motors)), parts, bodies)),
+    )
     joints = tuple(
         RiggedJoint(body.path, body.path, tuple(layer.motors_of[k]), float(body.joint.tilt.max()))
         for k, body in enumerate(bodies)
@@ -129,7 +136,7 @@ def _rig_parts(parts: Parts, stage: Usd.Stage, path: str, output: str, options: 
     )
     bending = tuple(body.path for body in bodies if body.name in flexible)
     return Rig(
-        output, layer.robot, joints, layer.body_count, layer.mass, tuple(layer.targets), bending, off, tuple(notes)
+        output, layer.robot, joints, layer.body_count, layer.mass, tuple(layer.targets), bending, off[0], tuple(notes)
     )
 
 
@@ -199,10 +206,11 @@ def _links(stage: Usd.Stage, skeleton: BoundSkeleton, codes: Array, tolerance: f
     return links
 
 
-def _validate(temporary: str, motors: int) -> None:
+def _validate(temporary: str, motors: int) -> tuple[Character, Animation]:
     """Read what was written: it must load, with all of its motors."""
-    character, _, _ = read_shot(temporary)
+    character, animation, _ = read_shot(temporary)
     if len(character.motors) != motors:
         raise ShotError(
             "motors are missing from the written layer", path=os.path.basename(temporary), found=len(character.motors)
         )
+    return character, animation

@@ -1,0 +1,60 @@
+"""How well the robot that was written does what the parts do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from calmotion.arrays import Array
+from calmotion.model import Animation, Character, Track
+from calmotion.model.character import Frame
+from calmotion.usd.rigging.parts import Parts
+from calmotion.usd.rigging.posed_bodies import PosedBody
+from calmotion.usd.transforms import rotation_from_quaternion
+
+Motion = tuple[Array, Array]  # rotations [n, 3, 3] and origins [n, 3] [m]
+
+
+def largest_distance(character: Character, animation: Animation, parts: Parts, bodies: Sequence[PosedBody]) -> float:
+    """The largest distance of a part's origin from where joints and tracks of the robot have it [m].
+
+    Args:
+        character, animation: As read from the written layer; tracks have a sample at each time code of the parts.
+        parts: As animated.
+        bodies: Which of them are bodies.
+    """
+    times, numbers = parts.clock.seconds(parts.codes), {body.path: k for k, body in enumerate(character.bodies)}
+    tracks = {motor.joint: track for motor, track in zip(character.motors, animation.tracks, strict=True)}
+    carried = {frame.joint for frame in animation.moving}
+    motions: dict[int, Motion] = {-1: (np.eye(3)[None], np.zeros((1, 3)))}
+    simulated = [body for body in bodies if body.part >= 0 and body.path in numbers]
+    given = {numbers[body.path]: (parts.rotations[body.part], parts.positions[body.part]) for body in simulated}
+    for index, joint in enumerate(character.joints):
+        if index in carried:
+            motions[joint.body1] = given[joint.body1]  # by its transform
+            continue
+        inwards = joint.body0 not in motions
+        known, other = (joint.body1, joint.body0) if inwards else (joint.body0, joint.body1)
+        frames = (joint.frame1, joint.frame0) if inwards else (joint.frame0, joint.frame1)
+        values = _values(tracks.get(index), times) * (-1.0 if inwards else 1.0)
+        motions[other] = _beyond(motions[known], *frames, joint.kind, values)
+    return max(float(np.linalg.norm(motions[k][1] - p, axis=1).max()) for k, (_, p) in given.items())
+
+
+def _values(track: Track | None, times: Array) -> Array:
+    return np.zeros(len(times)) if track is None else np.interp(times, track.times, track.values)
+
+
+def _beyond(motion: Motion, near: Frame, far: Frame, kind: str, values: Array) -> Motion:
+    """Motion of the body behind a joint, from that of the body before it and the frames of the joint on both."""
+    R, p = motion
+    p = p + R @ near.position
+    R = R @ rotation_from_quaternion(near.rotation)
+    if kind == "prismatic":
+        p = p + values[:, None] * R[:, :, 2]
+    elif kind == "revolute":
+        R = R @ Rotation.from_rotvec(values[:, None] * np.array([0.0, 0.0, 1.0])).as_matrix()
+    R = R @ rotation_from_quaternion(far.rotation).T
+    return R, p - R @ far.position
