@@ -17,7 +17,9 @@ import pytest
 REPOSITORY = Path(__file__).resolve().parents[1]
 DOCS = REPOSITORY / "docs"
 PAGES = DOCS / "tutorials"
-FOLLOWED = ("usd", "urdf", "skinned_character", "calibration", "two_workers", "puppeteer", "diagnosis")
+FOLLOWED = (
+    "usd", "urdf", "animated_parts", "skinned_character", "calibration", "two_workers", "puppeteer", "diagnosis",
+)  # fmt: skip
 HOW_TO = (
     "arduino", "phone", "weights", "remaining_error", "offline_or_live", "slow_motors", "diagnose", "shows", "workers",
     "clips",
@@ -28,6 +30,7 @@ TASKS = {
     "see it work, and show it in a browser": "./quickstart",
     "make a robot of a URDF calm": "tutorials/urdf",
     "make a robot in USD calm": "tutorials/usd",
+    "make a robot of animated parts": "tutorials/animated_parts",
     "make a robot of a skinned character": "tutorials/skinned_character",
     "play the result on an Arduino": "how_to/arduino",
     "say which target counts when": "how_to/weights",
@@ -207,6 +210,21 @@ def test_a_robot_from_urdf(tmp_path):
     assert 4.0 < before < 9.0 and after < 2.0
     assert "The lowest rate that keeps it: " in printed
     assert "joint_names: ['turn', 'lift']" in (tmp_path / "work" / "trajectory.yaml").read_text()
+
+
+def test_a_robot_of_animated_parts(tmp_path):
+    """The result is baked: the head goes where the motors lead it, not where it was animated."""
+    printed = follow("animated_parts", tmp_path)
+    before, after = errors_of(printed)[0]
+    assert after < 0.1 * before
+    from pxr import Usd, UsdGeom
+
+    places = []
+    for name in ("lamp.usda", "calm_root.usda"):
+        stage = Usd.Stage.Open(str(tmp_path / "work" / name))
+        head = stage.GetPrimAtPath("/Lamp/Foot/Stalk/Arm/Head")
+        places.append(np.array(UsdGeom.XformCache(12).GetLocalToWorldTransform(head).ExtractTranslation()))
+    assert 1e-3 < np.linalg.norm(places[1] - places[0]) < 0.1
 
 
 @pytest.mark.long
