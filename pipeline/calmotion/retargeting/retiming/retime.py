@@ -33,10 +33,11 @@ from calmotion.tolerance.motors.animation_limits import tempo_limits
 from calmotion.tolerance.pod_subspace import ReferenceRun
 from calmotion.tolerance.reduced_bodies import RunMemory
 from calmotion.tolerance.simulation import found_tracks
-from calmotion.tolerance.step_choice import chooses_step
+from calmotion.tolerance.step_choice import LAST, chooses_step
 from calmotion.tolerance.step_error import order_of
 
 LIMITED_SEARCHES = 4  # at most that keep all limits by themselves
+COARSE = 5e-3  # excess of an effort between instants from which shorter steps help, and narrower limits bend curves
 BETWEEN = 5e-4  # share of a limit by which it counts as kept between the instants of a search
 HALVED = 3  # most times that steps are halved for the efforts
 FINE = 32  # instants of a frame at which curves are compared with their limits
@@ -61,7 +62,8 @@ def optimize_with_tempo(
     if found.map is None:
         result = optimize_to_tolerance(shot, replace(options, retime=None), progress, checkpoint, known, memory)
         return replace(result, retimed=Retimed(shot.animation, shot.character, found.report))
-    searches, performance = _Searches(options, progress, checkpoint), _Performance.of(shot, given, found)
+    searches = _Searches(shot.character, options, progress, checkpoint)
+    performance = _Performance.of(shot, given, found)
     kept = False
     if found.excess <= NOTICED:  # where nothing may be slower, limits are no longer left to the tempo
         done = searches.searched(performance.shot, limited_by_tempo=True)
@@ -84,8 +86,8 @@ class _Searches:
 
     done: Result
 
-    def __init__(self, options: RunSettings, progress: Progress, checkpoint: Path | None):
-        self._options = replace(options, robust=None)
+    def __init__(self, character: Character, options: RunSettings, progress: Progress, checkpoint: Path | None):
+        self._character, self._options = character, replace(options, robust=None)
         self._progress, self._checkpoint, self._memory, self._count = progress, checkpoint, RunMemory(), 0
 
     @property
@@ -102,6 +104,13 @@ class _Searches:
         self._count += 1
         return self.done
 
+    def with_half_the_step(self) -> bool:
+        """Let further searches have half the step of the last, and whether they have: not where the user chose it."""
+        chosen = chooses_step(self._character, self._options) and self.done.step_s > LAST
+        if chosen:
+            self._memory.step = 0.5 * self.done.step_s
+        return chosen
+
     def with_input_resolved(self) -> Result:
         """The result, whose input is simulated as well as that of a single search, with the bodies of the last one."""
         shot = self._memory.searched
@@ -111,7 +120,8 @@ class _Searches:
 
 
 def _search_within_limits(performance: _Performance, searches: _Searches) -> None:
-    """Search with all limits. Those that curves exceed between the instants of a search are narrowed by the excess."""
+    """Search with all limits. Those that curves exceed between the instants of a search are narrowed by the excess;
+    efforts that these instants have far too low, by shorter steps."""
     shot = performance.shot
     shares = {name: np.ones(len(shot.character.motors)) for name in TEMPO_LIMITS}
     for _ in range(LIMITED_SEARCHES):
@@ -119,7 +129,10 @@ def _search_within_limits(performance: _Performance, searches: _Searches) -> Non
         used = performance.used(done)
         if done.interrupted or _excess(used) <= BETWEEN:
             break
-        shares = {name: share / np.maximum(1.0, used[name]) for name, share in shares.items()}
+        over = {name: np.maximum(1.0, used[name]) for name in shares}
+        if np.max(over["effort"]) > 1.0 + COARSE and searches.with_half_the_step():
+            over["effort"] = shares["effort"]
+        shares = {name: share / over[name] for name, share in shares.items()}
         shot = shot.with_tracks(found_tracks(done, shot.animation))
     searches.done = replace(searches.done, limits=told_between(searches.done.limits, used)).with_limits_told()
 
@@ -190,12 +203,12 @@ class _Performance:
         """Largest efforts as ever shorter steps have them, as shares of the limits, shape [M].
 
         A chosen step has positions right to the tolerance, and peaks of efforts to one or two hundredths. Steps are
-        halved until what they change is no more than counts.
+        halved until what they change is no more than counts; not where the search's own instants are far beyond.
         """
         assert result.after is not None
         own = result.after.motion.motor_efforts[result.after.motion.judged]
         used: Array = np.max(np.abs(own), axis=0, initial=0.0) / limits
-        if not np.any(np.isfinite(limits)) or result.interrupted:
+        if not np.any(np.isfinite(limits)) or np.max(used) > 1.0 + COARSE or result.interrupted:
             return used
         shot = self.with_curves(result).shot
         coarse = self._efforts_at(shot, result.step_s, result.pre_roll_s)
