@@ -11,7 +11,7 @@ from calmotion import ShotError
 from calmotion.usd.reading import read_shot
 from calmotion.usd.rigging import RigOptions, rig_shot
 from performing import result_with, worst_gap
-from pxr import Gf, Sdf, Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 
 FRAMES = 36
 TURN = 2.0 * np.pi * np.arange(FRAMES + 1) / FRAMES
@@ -169,6 +169,22 @@ def test_parts_with_one_hinge_each_become_an_arm(tmp_path, fore, meters, up):
     assert np.degrees(np.ptp(table)) == pytest.approx(200.0, abs=1e-4)
     volume = 0.3 * 0.3 * 0.1 + 0.2 * 0.2 * 0.05 + 0.02**3 + 0.05**2 * 0.5 + 0.04**2 * 0.4 + 0.02**2 * 0.05
     assert rig.mass == pytest.approx(1010.0 * volume, rel=1e-4)
+
+
+def test_bodies_without_joints_are_parts_that_keep_their_masses(tmp_path):
+    """As Omniverse exports bodies with keys: kinematic. Those that no joint connects are switched off."""
+    scene = Scene(tmp_path / "arm.usda").arm()
+    scene.box("/Scene/Crate", (0.2, 0.2, 0.2), (2, 0, 0))
+    base = "/Scene/Robot/Base"
+    names = ("Table", "Table/Upper", "Table/Upper/Fore", "Table/Upper/Fore/Finger", "Table/bolt")
+    for path in (base, *(f"{base}/{name}" for name in names), "/Scene/Crate"):
+        prim = scene.stage.GetPrimAtPath(path)
+        UsdPhysics.RigidBodyAPI.Apply(prim).CreateKinematicEnabledAttr(True)
+        UsdPhysics.MassAPI.Apply(prim).CreateMassAttr(0.25)
+    rig, output = rigged(scene.saved())
+    character, _ = reproduced(output)
+    assert rig.bodies == 5 and [body.mass.mass for body in character.bodies] == pytest.approx([0.25] * 5)
+    assert not any(body.path.endswith(("Crate", "bolt")) for body in character.bodies)
 
 
 def test_the_hinge_is_where_the_pivot_is(tmp_path):

@@ -94,7 +94,8 @@ def read_skeleton(
         raise ShotError(
             "no joints: the shot has no enabled PhysicsRevoluteJoint or PhysicsFixedJoint",
             path=topology.common_path(list(prims)),
-            remedy="Connect the bodies with joints, and the first one with the world",
+            remedy="Connect the bodies with joints, and the first one with the world; where bodies have keys, "
+            "`calmotion rig FILE -o LAYER` finds the joints from their motion",
         )
     poses = dict(reading.each(prims, lambda path: (path, reading.pose(prims[path]))))
     raise_all(reading.problems)  # joints refer to poses

@@ -18,7 +18,7 @@ from calmotion.rigging.part_joints import FIXED, FREE, PRISMATIC
 from calmotion.rigging.part_trees import PartMotions
 from calmotion.usd.reading.bodies.mass import mass_of
 from calmotion.usd.reading.bodies.shapes import shapes_of
-from calmotion.usd.reading.context import Reading
+from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
 from calmotion.usd.rigging.layer import WORLD, RobotLayer, rigid
 from calmotion.usd.rigging.parts import Parts
 from calmotion.usd.rigging.posed_bodies import PosedBody
@@ -72,7 +72,13 @@ class PosedRobot(RobotLayer):
 
         self._author_robot()
         prims = [self._editable(body.path) for body in self._bodies]
+        others = [prim for prim in prims_of(self._stage) if is_rigid_body(prim) and prim not in prims]
+        for prim in others:  # which no joint connects
+            UsdPhysics.RigidBodyAPI(self._editable(str(prim.GetPath()))).CreateRigidBodyEnabledAttr(False)
         for prim, body in zip(prims, self._bodies, strict=True):
+            if prim.HasAPI(UsdPhysics.RigidBodyAPI):  # often kinematic, as it has keys
+                UsdPhysics.RigidBodyAPI(prim).CreateRigidBodyEnabledAttr(True)
+                UsdPhysics.RigidBodyAPI(prim).CreateKinematicEnabledAttr(False)
             UsdPhysics.RigidBodyAPI.Apply(prim)
             self._author_solid(prim, body.name in flexible)
         self.body_count += len(prims)

@@ -22,6 +22,7 @@ from calmotion.usd.clock import Clock
 from calmotion.usd.diagnostics import quiet
 from calmotion.usd.layers import refuse_input_as_output, write_layer
 from calmotion.usd.reading.context import is_rigid_body, prims_of
+from calmotion.usd.reading.joints.joint_prims import joint_prims
 from calmotion.usd.reading.provenance import provenance_of
 from calmotion.usd.reading.shot import read_shot, shot_clock
 from calmotion.usd.reading.skeletons import BoundSkeleton, bound_skeletons
@@ -77,17 +78,20 @@ def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
         raise ShotError("there is no such material", found=options.material, remedy=f"Use {', '.join(MATERIALS)}")
     stage = stages.open_stage(path)
     refuse_input_as_output(output, [layer.realPath for layer in stage.GetUsedLayers(True) if layer.realPath])
-    bodies = [prim for prim in prims_of(stage) if is_rigid_body(prim)]
-    if bodies:
-        raise ShotError(
-            "the shot has physics already",
-            path=bodies[0].GetPath(),
-            found="PhysicsRigidBodyAPI",
-            remedy="Name the file of the skinned character without a robot",
-        )
+    joints = joint_prims(stage)
     with quiet():
         skeletons = bound_skeletons(stage)
         skinned = any(len(one.codes()) and any(skinned_meshes(stage, one)) for one in skeletons)
+        # bodies without joints are parts as others are
+        physics = joints or [prim for prim in prims_of(stage) if skinned and is_rigid_body(prim)]
+        if physics:
+            raise ShotError(
+                "the shot has physics already",
+                path=physics[0].GetPath(),
+                found=physics[0].GetTypeName() if joints else "PhysicsRigidBodyAPI",
+                remedy="It is a shot where its joints connect all bodies: calmotion inspect tells what is missing. To "
+                "have joints made from the motion, name the file without a robot",
+            )
         parts = None if skinned else read_parts(stage)
         rig = _rig_skinned if parts is None else partial(_rig_parts, parts)
         return rig(stage, path, output, options)
