@@ -89,8 +89,7 @@ def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
                 "the shot has physics already",
                 path=physics[0].GetPath(),
                 found=physics[0].GetTypeName() if joints else "PhysicsRigidBodyAPI",
-                remedy="It is a shot where its joints connect all bodies: calmotion inspect tells what is missing. To "
-                "have joints made from the motion, name the file without a robot",
+                remedy="Run calmotion inspect on it. To have joints found from motion, name the file without a robot",
             )
         parts = None if skinned else read_parts(stage)
         rig = _rig_skinned if parts is None else partial(_rig_parts, parts)
