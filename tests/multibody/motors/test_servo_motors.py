@@ -82,6 +82,16 @@ def test_pendulum_on_a_servo_moves_as_its_differential_equations_say():
     assert errors[1] < 3e-3 and np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3), errors
 
 
+def test_a_rotor_without_inertia_between_two_springs_has_the_frequency_of_both():
+    """Of `k` and the gear in series: the rotor follows in equilibrium."""
+    k, gear = 90.0, 300.0
+    frequencies, damping = system_modes(pendulum(k, 1.5, gravity=0.0, gear_stiffness=gear), np.zeros(1))
+    both = k * gear / (k + gear)
+    assert 2 * np.pi * frequencies == pytest.approx([np.sqrt(both / INERTIA)], rel=1e-6)
+    # at low speed the damper has the share of the motion that the rotor makes
+    assert damping == pytest.approx([1.5 * (gear / (k + gear)) ** 2 / (2 * np.sqrt(both * INERTIA))], rel=1e-6)
+
+
 def test_servo_without_rotor_and_gear_is_a_drive():
     character = chain(2, driven=(0, 1), length=0.3)
     times = np.arange(0.0, 0.4, 2e-3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cholesky, eigh, null_space, solve_triangular, svd
+from scipy.linalg import cholesky, eigh, lstsq, null_space, solve_triangular, svd
 
 from calmotion.arrays import Array, IntArray
 from calmotion.multibody.analysis.kinematics import rigid_state
@@ -16,6 +16,7 @@ from calmotion.multibody.model.phases import system_held
 from calmotion.multibody.model.system import VELOCITY_GAIN, State, System
 from calmotion.multibody.statics.equilibrium import equilibrium, linearize
 
+_MASSLESS = 1e-14  # of the largest inertia of a motion: what has less has none
 _SINGULAR = 1e8  # condition of the rows of a joint for its child, beyond which they do not tell all six coordinates
 
 
@@ -67,7 +68,7 @@ def elastic_modes(model: Model) -> tuple[Array, list[Array]]:
     system = model.system._replace(gravity=np.zeros(3))
     angles = model.rest_angles
     found = matrices_at(system, rigid_state(model, angles), angles, Workspace.for_system(system))
-    K, M, allowed = found.stiffness, found.mass, found.allowed
+    K, M, allowed = found.stiffness, found.mass, found.with_inertia()
     parts = [slice(end - r, end) for end, r in zip(system.starts[1:], system.elastic, strict=True)]
     size = allowed.shape[1]
     if not size:
@@ -137,9 +138,23 @@ class Matrices(NamedTuple):
     allowed: Array
     rows: Array
 
+    def with_inertia(self) -> Array:
+        """A basis of the allowed motions that have inertia; those that have none follow them in equilibrium, such as a
+        rotor whose armature is not known, between its controller and its gear."""
+        allowed = self.allowed
+        if not allowed.shape[1]:
+            return allowed
+        values, vectors = eigh(allowed.T @ self.mass @ allowed)
+        none = values <= _MASSLESS * values[-1]
+        if not np.any(none):
+            return allowed
+        still, moving = allowed @ vectors[:, none], allowed @ vectors[:, ~none]
+        follows = lstsq(still.T @ self.stiffness @ still, still.T @ self.stiffness @ moving)[0]
+        return np.asarray(moving - still @ follows)
+
     def modes(self) -> tuple[Array, Array]:
         """Squares of the angular frequencies [1/s^2], ascending, and modes of mass one, shape [N, n]."""
-        allowed = self.allowed
+        allowed = self.with_inertia()
         if not allowed.shape[1]:
             return np.zeros(0), allowed
         stiffness = allowed.T @ self.stiffness @ allowed
