@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from arms import chain, compiled, frame
 from calmotion.model import Body, Character, Joint, MassProperties, Motor
+from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.modes import system_modes
+from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.motors.servos import motor_effort
+from calmotion.multibody.statics.equilibrium import equilibrium
 from motor_runs import INERTIA, LENGTH, MASS, G, pendulum, pitch, run, servo, smooth
 from scipy.integrate import solve_ivp
 
@@ -40,6 +43,16 @@ def test_two_masses_on_a_slider_have_their_closed_form_frequencies_and_sag():
     found, loads = run(model, still, still, 1e-2)
     assert found.states.c[0, 0, 2] == pytest.approx(-mass * G * (1 / k + 1 / gear), rel=1e-9)
     assert loads.efforts[0] == pytest.approx([mass * G], rel=1e-9)
+
+
+@pytest.mark.parametrize("rotor", [{}, {"armature": 0.03, "gear_stiffness": 400.0}])
+def test_a_pose_far_from_the_last_one_has_its_equilibrium_though_the_motor_is_weak(rotor):
+    """The rotor would stand where it was: a hundred times as far as the largest torque reaches."""
+    model, command = pendulum(900.0, 1.0, 9.0, gravity=0.0, **rotor), np.array([1.1])
+    workspace = Workspace.for_system(model.system)
+    last, _ = equilibrium(model.system, rigid_state(model, np.zeros(1)), np.zeros(1), workspace)
+    found, _ = equilibrium(model.system, last, command, workspace)
+    assert 2 * np.arctan2(found.q[0, 2], found.q[0, 0]) == pytest.approx(1.1, abs=1e-7)
 
 
 def slope_of(k, d, limit, rotor):

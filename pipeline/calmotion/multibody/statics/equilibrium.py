@@ -12,7 +12,7 @@ from calmotion.multibody.kernels.assembly import assemble, joint_rows
 from calmotion.multibody.linear_solver.closed_chains import factor_closed_chains, solve_system
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.least_multipliers import least_multipliers
-from calmotion.multibody.model.system import Integrator, State, System, allocate_state
+from calmotion.multibody.model.system import LARGEST_EFFORT, POSITION_GAIN, Integrator, State, System, allocate_state
 from calmotion.multibody.statics.regularized_statics import (
     is_regularized,
     moves_nothing,
@@ -26,6 +26,7 @@ CREEP = 0.5  # of the correction before it, above which the weak springs of free
 LIMIT = 400  # iterations
 LOAD_STEP_LIMIT = 30  # of a load step
 PSEUDO_TIME = (1e2, 1e4, 1e6)  # first factors of the mass matrix, 1/time^2
+NEAR_LIMIT = 0.5  # of a motor's largest torque: up to there the smooth limit has its slope
 OPEN = 2e-3  # joints that stay open by more do not meet: share of a length of the mechanism [rad]
 FIRST_LOAD_STEP, SMALLEST_LOAD_STEP = 0.2, 1e-3  # fractions of gravity
 
@@ -64,6 +65,7 @@ def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tu
             was found, and the state is that of the largest fraction of gravity that has one.
     """
     used, gaps = 0, None
+    start = _within_limits(system, start, angle)
     reached, share, component = start, 0.0, 0
     free = bool(np.any((system.rows > 0) & (system.rows < 6)))
     for method in ("pseudo-transient", "load stepping") if free else ("newton", "load stepping", "pseudo-transient"):
@@ -84,12 +86,23 @@ def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tu
                 if gaps is None:
                     state.turn[:] = 0.0
                     return state, used
-    if gaps is None:
+    if gaps is None and len(system.rows) > len(system.parent):  # else joints meet wherever there is an equilibrium
         gaps = open_without_gravity(system, start, angle, ws)
     if gaps is not None:
         joint = int(np.argmax(np.abs(gaps).max(axis=1)))
         raise SimulationFailure(0.0, joint, Reason.OPEN, gap=gaps[joint])
     raise SimulationFailure(0.0, max(component, 0), Reason.NO_EQUILIBRIUM, reached if share else None, share)
+
+
+def _within_limits(system: System, start: State, angle: Array) -> State:
+    """The start with the rotors of servos at their commands that are so far away that their motors would be at the
+    limit of their torque, whatever the pose: that has no slope."""
+    servos = system.servos
+    place = system.side[servos, 1], system.rotor[servos]
+    far = system.servo[servos, POSITION_GAIN] * np.abs(angle[servos] - start.u[place])
+    u = start.u.copy()
+    u[place] = np.where(far > NEAR_LIMIT * system.servo[servos, LARGEST_EFFORT], angle[servos], u[place])
+    return start._replace(u=u)
 
 
 def _at_rest(start: State) -> State:
