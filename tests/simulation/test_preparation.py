@@ -1,12 +1,16 @@
 """Failures of a simulation in the user's words."""
 
+import numpy as np
 import pytest
+from arms import frame
 from calmotion.errors import IntegrationError, ShotError
+from calmotion.model import Body, Character, Joint, MassProperties, Motor
 from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.open_chains import open_joints
-from calmotion.simulation.preparation import failure_error, prepare
+from calmotion.simulation.preparation import failure_error, pose_modes, prepare
+from calmotion.testing import quintic, shot_of
 
 
 @pytest.fixture(scope="module")
@@ -38,3 +42,15 @@ def test_a_missing_equilibrium_names_the_joint_and_what_would_hold_the_body(prep
         driven = any(motor.joint == tree.joint[component] for motor in arm.motors)
         assert ("a motor" in error.remedy) == (not driven and joint.kind != "fixed")
         assert ("physics:youngsModulus" in error.remedy) == (body.flexible is not None)
+
+
+def test_a_motor_that_cannot_hold_its_load_is_named_with_its_force():
+    """A lift: a hinge would let its load hang."""
+    bodies = (Body("/C/A", frame(), MassProperties(2.0, np.zeros(3), 0.01 * np.eye(3))),)
+    joints = (Joint("/C/J", "prismatic", -1, 0, frame(), frame()),)
+    motors = (Motor(0, "/C/J", "linear", linear=True, model="servo", position_gain=500.0, max_torque=0.02),)
+    lift = Character("/C", bodies, joints, motors, (), np.array([0.0, 0.0, -9.81]))
+    with pytest.raises(ShotError) as refused:
+        pose_modes(compile_shot(lift, shot_of(quintic(0.1, 0.3, 0.1), 0.5), None))
+    assert refused.value.problem.endswith("under less than 1% of gravity it fails, first at the joint /C/J")
+    assert refused.value.remedy.startswith("Raise calm:motor:maxTorque of /C/J, whose 0.02 N cannot hold it")

@@ -10,6 +10,7 @@ from calmotion.arrays import Array
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.model import Animation, Character
 from calmotion.model.character import contact_joints
+from calmotion.model.motor import SERVO, Motor
 from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.deflection import largest_deflection
 from calmotion.multibody.analysis.modes import system_modes
@@ -153,7 +154,7 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
     if static:
         return ShotError(
             "the robot has no static equilibrium in the pose of its first frame: "
-            f"{_weight_at_failure(failure)}, first at the joint {joint.path}",
+            f"{_weight_at_failure(prepared, failure)}, first at the joint {joint.path}",
             path=body,
             remedy=_remedy_at_rest(prepared, failure.component),
         )
@@ -170,11 +171,19 @@ def _remedy(closed: bool) -> str:
     return "Use a smaller --step or --integrator bdf2" + (f"; check {_CLOSED}." if closed else ".")
 
 
-def _weight_at_failure(failure: SimulationFailure) -> str:
+def _weight_at_failure(prepared: Prepared, failure: SimulationFailure) -> str:
     """The share of gravity that a robot without static equilibrium bears, as a clause."""
-    if failure.share < 0.005:
+    if failure.share < 0.005 and _weak_motor(prepared, failure.component) is None:
         return "nothing holds it, so that it gives way under the smallest load"
-    return f"under {failure.share:.0%} of gravity it fails"
+    share = f"{failure.share:.0%}" if failure.share >= 0.01 else "less than 1%"
+    return f"under {share} of gravity it fails"
+
+
+def _weak_motor(prepared: Prepared, component: int) -> Motor | None:
+    """The servo with a limited torque that holds a component; None where none does."""
+    joint = prepared.model.tree.joint[component]
+    servos = (m for m in prepared.character.motors if m.model == SERVO and np.isfinite(m.max_torque))
+    return next((motor for motor in servos if motor.joint == joint), None)
 
 
 def _remedy_at_rest(prepared: Prepared, component: int) -> str:
@@ -182,6 +191,7 @@ def _remedy_at_rest(prepared: Prepared, component: int) -> str:
     tree, character = prepared.model.tree, prepared.character
     joint, body = character.joints[tree.joint[component]], character.bodies[tree.body[component]]
     driven = {motor.joint for motor in character.motors}
+    motor = _weak_motor(prepared, component)
     free = [other.path for k, other in enumerate(character.joints) if k not in driven and other.kind in _FREE]
     free.sort(key=lambda path: path != joint.path)  # another one may give way with it, or carry it
     ways = []
@@ -190,6 +200,11 @@ def _remedy_at_rest(prepared: Prepared, component: int) -> str:
     elif free:
         more = f" and {len(free) - _SHOWN} more" if len(free) > _SHOWN else ""
         ways.append(f"give {', '.join(free[:_SHOWN])}{more} motors (drives), or fixed joints where they do not move")
+    if motor is not None:
+        unit = "N" if motor.linear else "N m"
+        ways.insert(
+            0, f"raise calm:motor:maxTorque of {motor.path}, whose {motor.max_torque:.3g} {unit} cannot hold it"
+        )
     if body.flexible is not None:
         ways.append("raise physics:youngsModulus of its material (in the stage's units)")
     ways.append("check physics:mass and physics:centerOfMass of what it carries, and the joints that close its chain")
