@@ -1,5 +1,7 @@
 """Failures of a simulation in the user's words."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from arms import frame
@@ -11,6 +13,7 @@ from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.open_chains import open_joints
 from calmotion.simulation.preparation import failure_error, pose_modes, prepare
 from calmotion.testing import quintic, shot_of
+from calmotion.tolerance.simulation import intended_positions
 
 
 @pytest.fixture(scope="module")
@@ -45,12 +48,15 @@ def test_a_missing_equilibrium_names_the_joint_and_what_would_hold_the_body(prep
 
 
 def test_a_motor_that_cannot_hold_its_load_is_named_with_its_force():
-    """A lift: a hinge would let its load hang."""
+    """A lift: a hinge would let its load hang. The static reference has the same error as the frequencies."""
     bodies = (Body("/C/A", frame(), MassProperties(2.0, np.zeros(3), 0.01 * np.eye(3))),)
     joints = (Joint("/C/J", "prismatic", -1, 0, frame(), frame()),)
     motors = (Motor(0, "/C/J", "linear", linear=True, model="servo", position_gain=500.0, max_torque=0.02),)
     lift = Character("/C", bodies, joints, motors, (), np.array([0.0, 0.0, -9.81]))
-    with pytest.raises(ShotError) as refused:
-        pose_modes(compile_shot(lift, shot_of(quintic(0.1, 0.3, 0.1), 0.5), None))
-    assert refused.value.problem.endswith("under less than 1% of gravity it fails, first at the joint /C/J")
-    assert refused.value.remedy.startswith("Raise calm:motor:maxTorque of /C/J, whose 0.02 N cannot hold it")
+    lift = replace(lift, retarget=replace(lift.retarget, reference="static"))
+    shot = compile_shot(lift, shot_of(quintic(0.1, 0.3, 0.1), 0.5), None)
+    for fails in (pose_modes, lambda shot: intended_positions(shot, RunSettings())):
+        with pytest.raises(ShotError) as refused:
+            fails(shot)
+        assert refused.value.problem.endswith("under less than 1% of gravity it fails, first at the joint /C/J")
+        assert refused.value.remedy.startswith("Raise calm:motor:maxTorque of /C/J, whose 0.02 N cannot hold it")

@@ -16,13 +16,14 @@ from calmotion.model import Accuracy, Animation, Character, MotorCurve, Result, 
 from calmotion.model.curves import optimized_curve
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import STEP, SUBSPACE, tolerance_of
+from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.parallel import at_once
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.simulation.bodies import mode_tables
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.time_grid import MAX_STEP
-from calmotion.simulation.preparation import prepare
+from calmotion.simulation.preparation import failure_error, prepare
 from calmotion.simulation.simulate import Progress, intended_motion, simulate_shot
 from calmotion.tolerance.integrator_choice import by_fast_scheme
 from calmotion.tolerance.meshes.mesh_budget import mesh_error
@@ -236,9 +237,16 @@ def _accuracy(step: float, left_out: float, shot: CompiledShot, options: RunSett
 
 
 def intended_positions(shot: CompiledShot, options: RunSettings) -> Array:
-    """Intended positions of the targets at the frames [m], shape [f, K, 3]."""
+    """Intended positions of the targets at the frames [m], shape [f, K, 3].
+
+    Raises:
+        ShotError: A pose whose sag counts has no static equilibrium.
+    """
     prepared = prepare(shot, replace(options, step=FIRST))
-    intended = intended_motion(prepared, *sample_tracks(shot.animation.tracks, prepared.grid))
+    try:
+        intended = intended_motion(prepared, *sample_tracks(shot.animation.tracks, prepared.grid))
+    except SimulationFailure as failure:
+        raise failure_error(prepared, failure) from failure
     return intended.target_positions[prepared.grid.frames]
 
 
