@@ -213,7 +213,7 @@ def test_a_robot_from_urdf(tmp_path):
 
 
 def test_a_robot_of_animated_parts(tmp_path):
-    """The result is baked: the head goes where the motors lead it, not where it was animated."""
+    """The result is in the Xforms: the head goes where the motors lead it, not where it was animated."""
     printed = follow("animated_parts", tmp_path)
     before, after = errors_of(printed)[0]
     assert after < 0.1 * before

@@ -37,6 +37,14 @@ def parts_of(character: bpy.types.Object) -> list[bpy.types.Object]:
     return parts + moved if character.type == "ARMATURE" else parts
 
 
+def links_of(character: bpy.types.Object) -> list[str]:
+    """What can be flexible: the bones of an armature with a skin, else the objects that have geometry."""
+    parts = parts_of(character)
+    if any(part.find_armature() is character for part in parts):
+        return [bone.name for bone in character.data.bones]
+    return [part.name for part in parts if part.type == "MESH"]
+
+
 def exported_name(name: str) -> str:
     """The name of a bone or an object as Blender's exporter writes it, since USD allows no dots (`arm.L`: `arm_L`)."""
     return re.sub(r"^(?=\d)", "_", re.sub(r"\W", "_", name))
@@ -49,6 +57,7 @@ def export_character(context: bpy.types.Context, character: bpy.types.Object, pa
     # Before 4.3 the exporter writes the scene's scale as metersPerUnit; later it takes a unit of the scene for a metre.
     converts = "convert_scene_units" in bpy.ops.wm.usd_export.get_rna_type().properties
     units = {"convert_scene_units": "METERS"} if converts else {}
+    # A matrix keeps the shear that a part has on one whose scale is not applied.
     try:
         for obj in selected:
             obj.select_set(False)
@@ -57,7 +66,7 @@ def export_character(context: bpy.types.Context, character: bpy.types.Object, pa
         context.view_layer.objects.active = character
         bpy.ops.wm.usd_export(
             filepath=str(path), selected_objects_only=True, export_animation=True, export_armatures=True,
-            export_materials=False, evaluation_mode="RENDER", **units,
+            export_materials=False, evaluation_mode="RENDER", xform_op_mode="MAT", **units,
         )  # fmt: skip
     finally:
         for obj in parts:

@@ -10,9 +10,10 @@ from pathlib import Path
 import bpy
 
 from .bring_back import bring_back
-from .character import character_of, export_character, exported_name, is_animated
+from .character import character_of, export_character, exported_name, is_animated, links_of, parts_of
 from .error_table import read_errors
 from .errors import show_errors, worst_frame
+from .keys import put_on, take_off
 from .pipeline import PipelineRun, job_for
 from .preferences import command_of, preferences_of
 
@@ -34,10 +35,10 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
             return False
         character = character_of(context)
         if character is None or not is_animated(character):
-            cls.poll_message_set("Select an armature with an action, or one of several animated objects")
+            cls.poll_message_set("Nothing selected is animated: select an armature with an action, or an animated part")
             return False
-        if character.type != "ARMATURE" and not context.scene.calmotion.robot_layer:
-            cls.poll_message_set("Choose a robot layer for animated objects")
+        if len(parts_of(character)) == 1 and not context.scene.calmotion.robot_layer:
+            cls.poll_message_set("A robot has several parts: parent objects to the selected one, or to its bones")
             return False
         return True
 
@@ -82,7 +83,12 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
         character = character_of(context)
         assert character is not None  # poll
         self._character, self._folder = character.name, _folder(context)
-        shot = export_character(context, character, self._folder / "shot.usda")
+        earlier = take_off(parts_of(character))  # the animation is what the animator made
+        try:
+            shot = export_character(context, character, self._folder / "shot.usda")
+        finally:
+            put_on(earlier)
+            context.scene.frame_set(context.scene.frame_current)
         job = job_for(
             command, shot, self._folder, robot=bpy.path.abspath(settings.robot_layer) if settings.robot_layer else "",
             material=settings.material, flexible=",".join(map(exported_name, picked_bones(settings))),
@@ -104,7 +110,8 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
                     self.report({"ERROR"}, error)
                 return {"CANCELLED"}
             try:
-                changed = bring_back(context, bpy.data.objects[self._character], run.job.root)
+                character = bpy.data.objects[self._character]
+                changed = bring_back(context, character, self._folder / "shot.usda", run.job.root)
                 if settings.show_errors:
                     _show(context, run.job.table)
             except (RuntimeError, OSError, ValueError) as error:
@@ -126,15 +133,15 @@ def picked_bones(settings: bpy.types.PropertyGroup) -> list[str]:
 
 
 def _bones(self: bpy.types.Operator, context: bpy.types.Context) -> list[tuple[str, str, str]]:
-    """The bones to choose from; kept, since Blender does not keep the strings of a list."""
+    """The bones or parts to choose from; kept, since Blender does not keep the strings of a list."""
     character = character_of(context)
-    bones = character.data.bones if character is not None and character.type == "ARMATURE" else ()
-    _bones.kept = [("all", "All bones", "")] + [(bone.name, bone.name, "") for bone in bones]
+    links = links_of(character) if character is not None else ()
+    _bones.kept = [("all", "All", "")] + [(link, link, "") for link in links]
     return _bones.kept
 
 
 class CALMOTION_OT_pick_bone(bpy.types.Operator):
-    """Make the link of a bone flexible, or rigid again"""
+    """Make the link of a bone, or a part of a robot of rigid objects, flexible, or rigid again"""
 
     bl_idname = "calmotion.pick_bone"
     bl_label = "Pick Bone"
@@ -145,9 +152,8 @@ class CALMOTION_OT_pick_bone(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether an armature is selected."""
-        character = character_of(context)
-        return character is not None and character.type == "ARMATURE"
+        """Whether a character is selected."""
+        return character_of(context) is not None
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Search in the list of bones."""
@@ -169,7 +175,7 @@ class CALMOTION_OT_pick_bone(bpy.types.Operator):
 
 
 class CALMOTION_OT_pick_selected(bpy.types.Operator):
-    """Make the links of the selected bones flexible, and all others rigid"""
+    """Make the links of the selected bones, or the selected parts, flexible, and all others rigid"""
 
     bl_idname = "calmotion.pick_selected"
     bl_label = "Selected Bones"
@@ -177,12 +183,12 @@ class CALMOTION_OT_pick_selected(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether bones are selected."""
-        return bool(context.selected_pose_bones)
+        """Whether links are selected."""
+        return bool(_selected_links(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Take their names."""
-        context.scene.calmotion.flexible = ", ".join(bone.name for bone in context.selected_pose_bones)
+        context.scene.calmotion.flexible = ", ".join(_selected_links(context))
         return {"FINISHED"}
 
 
@@ -218,6 +224,12 @@ class CALMOTION_OT_cancel(bpy.types.Operator):
         """Ask the process to stop."""
         _RUNNING[context.scene.name].cancel()
         return {"FINISHED"}
+
+
+def _selected_links(context: bpy.types.Context) -> list[str]:
+    character = character_of(context)
+    selected = {one.name for one in (*(context.selected_pose_bones or ()), *context.selected_objects)}
+    return [link for link in links_of(character) if link in selected] if character is not None else []
 
 
 def _show(context: bpy.types.Context, table: Path) -> None:

@@ -58,8 +58,8 @@ def job_for(
         command: The words that start calmotion.
         shot: The exported character.
         folder: Where layers go.
-        robot: Layer with a robot; empty: a robot is made from the skin.
-        material, flexible: Of a robot that is made from the skin.
+        robot: Layer with a robot; empty: a robot is made from the skin or the parts.
+        material, flexible: Of a robot that is made.
         tolerance: [m].
     """
     rigged, result, table = folder / "robot.usda", folder / "calm.usda", folder / "errors.csv"

@@ -36,17 +36,17 @@ class CalmotionSettings(bpy.types.PropertyGroup):
 
     robot_layer: bpy.props.StringProperty(
         name="Robot",
-        description="USD layer with the robot of the exported character; empty: make a robot from the skin",
+        description="USD layer with the robot of the exported character; empty: make one of the skin or parts",
         subtype="FILE_PATH",
     )
     material: bpy.props.EnumProperty(
         name="Material",
-        description="Material of the links of a robot that is made from the skin",
+        description="Material of the links of a robot that is made from the skin or of the parts",
         items=[(name, name.capitalize(), "") for name in MATERIALS],
     )
     flexible: bpy.props.StringProperty(
         name="Flexible",
-        description="Bones with flexible links, separated by commas, or all; the buttons below it pick them",
+        description="Bones or parts that bend, separated by commas, or all; the buttons below it pick them",
         default="all",
     )
     tolerance: bpy.props.FloatProperty(

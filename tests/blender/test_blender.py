@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import json
 import os
 import re
 import shlex
@@ -255,6 +256,32 @@ def test_the_whole_way_there_and_back(tmp_path):
     (meant,), (back,) = (bound_skeletons(stage) for stage in stages)
     for code in range(1, 26):
         assert np.abs(meant.locals_at(float(code)) - back.locals_at(float(code))).max() < 2e-5
+
+
+@needs_blender
+def test_robots_of_parented_objects_move_as_the_result_says(tmp_path):
+    from pxr import Usd, UsdGeom
+
+    printed = blender(
+        HERE / "parts_in_blender.py", EXTENSION, tmp_path, CALMOTION_COMMAND=f"{sys.executable} -m calmotion"
+    )
+    assert "all is well" in printed
+    for kind in ("objects", "bones", "constraint"):
+        folder = tmp_path / kind / "scene_calmotion"
+        worlds = json.loads((tmp_path / kind / "worlds.json").read_text())
+        shot, root = (Usd.Stage.Open(str(folder / name)) for name in ("shot.usda", "calm_root.usda"))
+        prims = {prim.GetName(): prim for prim in shot.Traverse() if prim.GetTypeName() == "Xform"}
+        moved = 0.0
+        for name in ("Base", "Table", "Upper Arm", "Fore.L", "Bracket"):
+            path = prims[re.sub(r"\W", "_", name)].GetPath()
+            for code, world in enumerate(worlds[name], start=1):
+                before, after = (
+                    np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(stage.GetPrimAtPath(path))).T
+                    for stage in (shot, root)
+                )
+                assert np.abs(after - world).max() < 1e-5, (kind, name, code)
+                moved = max(moved, np.abs(after - before).max())
+        assert moved > 1e-3, kind
 
 
 @needs_blender
