@@ -54,8 +54,10 @@ def put_on_parts(
 def _worlds(layer: Path, parts: Sequence[bpy.types.Object], frames: range) -> dict[str, Motion]:
     """World transforms in a layer of the parts that it has. Blender's importer would take shear and names away."""
     getattr(bpy.utils, "expose_bundled_modules", lambda: None)()  # of Blender as a module
-    from pxr import Usd, UsdGeom
-
+    try:
+        from pxr import Usd, UsdGeom
+    except ImportError as error:  # bpy 4.2 from PyPI
+        raise RuntimeError("this Blender has no USD for Python (pxr): use that of blender.org") from error
     paths = {part.name: _path(part) for part in parts}
     if len(set(paths.values())) < len(parts):
         raise RuntimeError(

@@ -1,5 +1,6 @@
 """Run by Blender's Python, with the folder of the extension, a folder for files, and the zip to install (or -)."""
 
+import importlib.util
 import math
 import os
 import sys
@@ -8,6 +9,8 @@ from pathlib import Path
 import bpy
 from mathutils import Quaternion, Vector
 
+getattr(bpy.utils, "expose_bundled_modules", lambda: None)()
+HAS_USD = importlib.util.find_spec("pxr") is not None  # not in bpy 4.2 from PyPI; robots of objects need it
 BONES, LENGTH, WIDTH = ("root", "upper", "hand"), 0.4, 0.015
 
 
@@ -288,7 +291,8 @@ def main() -> None:
         check_wrong_bone(folder / "work")
         (folder / "units").mkdir()
         check_other_units_and_names(folder / "units")
-        check_objects(folder / "work")
+        if HAS_USD:
+            check_objects(folder / "work")
         calmotion_extension.unregister()
         assert not hasattr(bpy.types.Scene, "calmotion") and not hasattr(bpy.types, "CALMOTION_OT_optimize")
         calmotion_extension.register()

@@ -265,6 +265,8 @@ def test_robots_of_parented_objects_move_as_the_result_says(tmp_path):
     printed = blender(
         HERE / "parts_in_blender.py", EXTENSION, tmp_path, CALMOTION_COMMAND=f"{sys.executable} -m calmotion"
     )
+    if "no USD" in printed:
+        pytest.skip("this module of Blender has no USD for Python")
     assert "all is well" in printed
     for kind in ("objects", "bones", "constraint"):
         folder = tmp_path / kind / "scene_calmotion"
