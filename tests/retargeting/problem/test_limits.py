@@ -8,7 +8,7 @@ from calmotion.model.limits.bounds import motor_bounds
 from calmotion.model.limits.use import LimitUse, TermUse
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.retargeting.problem.limits import MARGIN, LimitTerms
+from calmotion.retargeting.problem.limits import MARGIN, MOST, LimitTerms
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.testing import small_shot
@@ -104,7 +104,7 @@ def weak_arm(share):
 def test_robots_without_error_keep_limits_that_cost_a_hundred_times_their_tolerance(share, tolerance):
     options = RunSettings(step=0.01, tolerance=tolerance)
     found = optimize_shot(weak_arm(share), options, ignore_progress)
-    assert found.search.stopped == "converged" and found.search.forward_simulations <= 16
+    assert found.search.stopped == "converged" and found.search.forward_simulations <= 45
     assert max(use.excess for use in found.limits) <= 1e-3
 
 
@@ -164,11 +164,11 @@ def test_the_penalty_grows_no_further_than_short_steps_allow(terms):
     limits, values = terms
     for _ in range(30):  # an excess that stays
         limits = limits.updated(values, 0.0)
-    assert 1e3 <= limits.rho / 7.0 <= 1e4
+    assert MOST <= limits.rho / 7.0 <= 10.0 * MOST
     beside = limits.penalty_beside(1e6)
     for _ in range(30):  # where limits cost much more than the input told
         limits = limits.updated(values, 1e6)
-    assert 1e3 <= limits.rho / beside <= 1e4
+    assert MOST <= limits.rho / beside <= 10.0 * MOST
 
 
 def test_multipliers_grow_where_limits_are_exceeded_and_off_terms_are_nothing(terms):

@@ -21,7 +21,7 @@ from calmotion.model.limits.bounds import Bounds
 FIRST_PENALTY = 1e3  # over the objective for each second
 MARGIN = 1e-4  # share by which a limit is narrowed
 GROWTH, SLOW = 10.0, 0.25  # the penalty grows by the first if an update leaves more than the second of the violation
-MOST = 1e3  # of the penalty beside the objective: a larger one leaves short steps, of each of which little holds
+MOST = 1e6  # of the penalty beside the objective: with less, the terms of limits keep curves away from them
 STALLED, PATIENCE = 0.8, 3  # updates end after so many minima in a row that each leave more than this share of it
 
 
