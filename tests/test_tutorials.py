@@ -212,6 +212,7 @@ def test_a_robot_from_urdf(tmp_path):
     assert "joint_names: ['turn', 'lift']" in (tmp_path / "work" / "trajectory.yaml").read_text()
 
 
+@pytest.mark.long
 def test_a_robot_of_animated_parts(tmp_path):
     """The result is in the Xforms: the head goes where the motors lead it, not where it was animated."""
     printed = follow("animated_parts", tmp_path)
