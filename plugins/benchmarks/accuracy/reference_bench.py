@@ -189,8 +189,9 @@ def with_more_nodes(reduction: BodyReduction, times: float = TIMES, tolerance: f
 def front(points: Sequence[Point]) -> list[Point]:
     """Those than which none is both faster and better, by run time."""
     front: list[Point] = []
-    for point in sorted(points, key=lambda p: (p.wall_s, p.error_m)):
-        if np.isfinite(point.error_m) and (not front or point.error_m < front[-1].error_m):
+    done = [point for point in points if np.isfinite(point.error_m)]  # a run that failed has no time by which to sort
+    for point in sorted(done, key=lambda p: (p.wall_s, p.error_m)):
+        if not front or point.error_m < front[-1].error_m:
             front.append(point)
     return front
 

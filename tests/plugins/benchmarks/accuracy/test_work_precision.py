@@ -63,6 +63,13 @@ def test_a_linear_arm_is_farther_off_than_a_nonlinear_one(points):
     assert law["stvk"] < 0.5 * law["linear"] and abs(law["neohookean"] - law["stvk"]) < 0.2 * law["linear"]
 
 
+def test_a_run_that_failed_does_not_disturb_the_front():
+    nan = float("nan")
+    runs = [(0.3, 1.0), (nan, nan), (0.2, 3.0), (0.1, 2.0), (nan, nan), (0.4, 0.5), (0.05, 9.0)]
+    found = reference_bench.front([reference_bench.Point("a", "b", "c", 0.1, 1, *run) for run in runs])
+    assert [(p.wall_s, p.error_m) for p in found] == [(0.05, 9.0), (0.1, 2.0), (0.3, 1.0), (0.4, 0.5)]
+
+
 def test_the_figure_has_all_points(points, tmp_path):
     assert draw_work_precision(str(tmp_path), points, 1e-5).endswith("work_precision_arm.png")
     assert (tmp_path / "work_precision_arm.png").stat().st_size > 10_000
