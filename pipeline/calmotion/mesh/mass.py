@@ -46,7 +46,7 @@ def mass_of_solid(points: Array, triangles: Indices, density: float, mass: float
     return moments.mass_properties(density if mass is None else mass / moments.volume)
 
 
-def joined_surfaces(surfaces: Sequence[SurfaceMesh]) -> tuple[Array, Indices] | None:
+def joined_surfaces(surfaces: Sequence[SurfaceMesh]) -> tuple[Array, IntArray] | None:
     """Points and triangles of surfaces with triangles, at least one; None where a triangle has a point that is not
     there."""
     counts = [len(surface.points) for surface in surfaces]

@@ -9,7 +9,9 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
+from calmotion.model.animation import Schedule
 from calmotion.model.tempo import TimeMap
+from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.gf import matrix
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below, prims_of
@@ -91,6 +93,20 @@ def codes_of(prim: Usd.Prim) -> list[float]:
     if xform.TransformMightBeTimeVarying():
         codes.update(code for one in xform.GetOrderedXformOps() for code in animation_codes(one.GetAttr()))
     return sorted(codes)
+
+
+def switched(prim: Usd.Prim, schema: str, name: str) -> list[tuple[float | None, bool]]:
+    """What a switch says at the time codes of its samples, each until the next; without samples its value, at None."""
+    attribute = prim.GetAttribute(name)
+    codes = attribute.GetTimeSamples() if attribute and schemas.is_applied(prim, schema) else []
+    return [(code, bool(attribute.Get(code))) for code in codes] or [(None, bool(schemas.value(prim, schema, name)))]
+
+
+def schedule_of(prim: Usd.Prim, schema: str, name: str, clock: Clock) -> Schedule:
+    """The same over time; a switch without samples is as it is from the first frame on."""
+    codes, values = zip(*switched(prim, schema, name), strict=True)
+    times = np.zeros(1) if codes[0] is None else clock.seconds(np.array(codes, dtype=np.float64))
+    return Schedule(times, np.array(values, bool))
 
 
 def moving_prims(stage: Usd.Stage) -> list[Usd.Prim]:

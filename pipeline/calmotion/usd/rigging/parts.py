@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ from calmotion.usd.transforms import pose_from_matrix
 from calmotion.usd.units import units_of
 
 if TYPE_CHECKING:
-    from pxr import Usd
+    from pxr import Sdf, Usd
 
 _STRETCH = 1e-4  # a part whose scale changes by more, relative to it, is no rigid body: rounding errors are a tenth
 
@@ -65,8 +66,8 @@ def read_parts(stage: Usd.Stage) -> Parts | None:
     codes = clock.merged(np.array(sorted(keys)))
     index = {str(prim.GetPath()): k for k, prim in enumerate(prims)}
 
-    def first_of(above: list[Usd.Prim]) -> int:
-        return next((index[str(p.GetPath())] for p in above if str(p.GetPath()) in index), -1)
+    def first_of(above: Iterable[Sdf.Path]) -> int:
+        return next((index[str(path)] for path in above if str(path) in index), -1)
 
     matrices = np.zeros((len(prims), len(codes), 4, 4))
     for n, code in enumerate(codes):
@@ -82,7 +83,8 @@ def read_parts(stage: Usd.Stage) -> Parts | None:
             problems[k] = error
             rotations[k], positions[k] = np.eye(3), matrices[k, :, :3, 3]
     return Parts(
-        list(index), [first_of(carriers(prim)[1:]) for prim in prims], [first_of(_ancestors(prim)) for prim in prims],
+        list(index), [first_of(one.GetPath() for one in carriers(prim)[1:]) for prim in prims],
+        [first_of(prim.GetPath().GetParentPath().GetAncestorsRange()) for prim in prims],
         rotations, units_of(stage).length(positions), [_size(prim, codes[0]) for prim in prims], codes, clock, problems,
     )  # fmt: skip
 
@@ -99,14 +101,6 @@ def _size(prim: Usd.Prim, code: float) -> float:
 
     box = UsdGeom.Imageable(prim).ComputeWorldBound(float(code), *UsdGeom.Imageable.GetOrderedPurposeTokens())
     return float(np.linalg.norm(gf.vector(box.ComputeAlignedRange().GetSize())))
-
-
-def _ancestors(prim: Usd.Prim) -> list[Usd.Prim]:
-    found, above = [], prim.GetParent()
-    while above and not above.IsPseudoRoot():
-        found.append(above)
-        above = above.GetParent()
-    return found
 
 
 def _rigid_motion(matrices: Array, path: str, codes: Array) -> tuple[Array, Array]:

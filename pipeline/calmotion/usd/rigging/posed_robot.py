@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from calmotion.arrays import Array
 from calmotion.catalogs.materials import Material
-from calmotion.model import MassProperties, SurfaceMesh
+from calmotion.mesh.mass import joined_surfaces
+from calmotion.model import MassProperties
 from calmotion.rigging.hinge_rows import HingeRow
 from calmotion.rigging.links import Link, Piece, targets_of, tip_of
 from calmotion.rigging.part_joints import FIXED, FREE, PRISMATIC
@@ -90,7 +91,8 @@ class PosedRobot(RobotLayer):
         known = [mass.mass for mass in masses if mass is not None]
         servo = servo_share * min(known, default=1.0) / self._units.mass(1.0)
         self.mass += sum(known)
-        pieces = [_together([shape.surface for shape in found]) for found in shapes]
+        solids = [[shape.surface for shape in found if len(shape.surface.triangles)] for found in shapes]
+        pieces = [joined_surfaces(surfaces) if surfaces else None for surfaces in solids]
         size = max((float(np.ptp(piece[0], axis=0).max()) for piece in pieces if piece), default=1.0)
         light = self._servo_of(servo, size / self._meters)
         for k, (prim, mass) in enumerate(zip(prims, masses, strict=True)):
@@ -176,12 +178,3 @@ class PosedRobot(RobotLayer):
         for pose, code in zip(poses, self._parts.codes, strict=True):
             op.Set(rigid(pose), float(code))
         return path, poses[0]
-
-
-def _together(surfaces: Sequence[SurfaceMesh]) -> Piece | None:
-    """The surfaces of a body as one."""
-    if not surfaces:
-        return None
-    offsets = np.cumsum([0, *(len(surface.points) for surface in surfaces[:-1])])
-    triangles = [surface.triangles + offset for surface, offset in zip(surfaces, offsets, strict=True)]
-    return np.concatenate([surface.points for surface in surfaces]), np.concatenate(triangles)

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from calmotion.errors import ShotError
 from calmotion.model import Frame
 from calmotion.model.animation import Contact
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
+from calmotion.usd.reading.animated import schedule_of
 from calmotion.usd.reading.context import Reading, carrying_body, prims_of, refuse_without_transform
 from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
@@ -73,14 +72,6 @@ def _joint(reading: Reading, path: str, body: str, pose: Pose, clock: Clock) -> 
         reading.units.length(pose.to_local(world.position[None])[0]),
         quaternion_from_rotation(pose.rotation.T @ world.rotation),
     )
-    contact = _activity(prim, clock, -1.0 if friction is None else friction)
+    active = schedule_of(prim, _SCHEMA, ACTIVE, clock)
+    contact = Contact(active.times, active.active, -1.0 if friction is None else friction)
     return JointPrim(None, path, _KINDS[kind], "", body, world.frame(meters), local, closes_chain=True, contact=contact)
-
-
-def _activity(prim: Usd.Prim, clock: Clock, friction: float) -> Contact:
-    """When a contact holds: each sample until the next."""
-    attribute = prim.GetAttribute(ACTIVE)
-    codes = np.array(attribute.GetTimeSamples() if attribute else [], dtype=np.float64)
-    if not len(codes):
-        return Contact(np.zeros(1), np.array([bool(schemas.value(prim, _SCHEMA, ACTIVE))]), friction)
-    return Contact(clock.seconds(codes), np.array([bool(attribute.Get(code)) for code in codes]), friction)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.model import Character, FreeTrack, Motor
-from calmotion.model.animation import Schedule
 from calmotion.model.motor import SERVO
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
@@ -22,6 +21,7 @@ from calmotion.usd.reading.actuators.foreign_actuators import (
     reachable,
     token_of,
 )
+from calmotion.usd.reading.animated import schedule_of, switched
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints.joint_prims import JointPrim
 
@@ -140,16 +140,7 @@ def limits_of_commands(reading: Reading, joint: JointPrim, actuator: str) -> tup
 
 def may_change(prim: Usd.Prim) -> bool:
     """Whether a motor may be changed at all."""
-    samples = _switched(prim, _FREE)
-    return any(value for _, value in samples) if samples else bool(schemas.value(prim, _SCHEMA, _FREE))
-
-
-def _switched(prim: Usd.Prim, name: str) -> list[tuple[float, bool]]:
-    """Samples of an attribute, by time codes."""
-    attribute = prim.GetAttribute(name)
-    if not attribute or not schemas.is_applied(prim, _SCHEMA):
-        return []
-    return [(code, bool(attribute.Get(code))) for code in attribute.GetTimeSamples()]
+    return any(value for _, value in switched(prim, _SCHEMA, _FREE))
 
 
 def free_tracks(stage: Usd.Stage, motors: Sequence[Motor], clock: Clock) -> tuple[FreeTrack, ...]:
@@ -157,10 +148,9 @@ def free_tracks(stage: Usd.Stage, motors: Sequence[Motor], clock: Clock) -> tupl
     the next."""
     ranges = []
     for index, motor in enumerate(motors):
-        samples = _switched(stage.GetPrimAtPath(motor.prim_path), _FREE)
-        if len({value for _, value in samples}) > 1:
-            codes, values = zip(*samples, strict=True)
-            ranges.append(FreeTrack(index, clock.seconds(np.array(codes, dtype=np.float64)), np.array(values, bool)))
+        free = schedule_of(stage.GetPrimAtPath(motor.prim_path), _SCHEMA, _FREE, clock)
+        if len(set(free.active.tolist())) > 1:
+            ranges.append(FreeTrack(index, free.times, free.active))
     return tuple(ranges)
 
 
@@ -174,11 +164,9 @@ def with_power(stage: Usd.Stage, character: Character, clock: Clock) -> Characte
     motors = list(character.motors)
     for index, motor in enumerate(motors):
         prim = stage.GetPrimAtPath(motor.prim_path)
-        samples = _switched(prim, _POWERED) or [(clock.start, schemas.value(prim, _SCHEMA, _POWERED) is not False)]
-        codes, values = zip(*samples, strict=True)
-        if all(values):
+        powered = schedule_of(prim, _SCHEMA, _POWERED, clock)
+        if np.all(powered.active):
             continue
-        powered = Schedule(clock.seconds(np.array(codes, dtype=np.float64)), np.array(values, bool))
         problem = "the motor is off at the first frame, where the robot rests"
         remedy = "Begin the shot while it is on; a joint that no motor ever turns needs no drive and no CalmMotorAPI"
         schemas.require(powered.holds_at(0.0), prim, _POWERED, False, problem, remedy)
