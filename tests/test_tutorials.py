@@ -396,7 +396,7 @@ def test_offline_and_live_play_the_same_robot(tmp_path):
 def test_a_phone_shows_the_modulus_of_an_arm(tmp_path):
     import calmotion as cm
     import numpy as np
-    from calmotion.views.playback import rotation_matrices
+    from calmotion.support import rotation_from_quaternion
 
     work = tmp_path / "work"
     work.mkdir()
@@ -412,7 +412,7 @@ def test_a_phone_shows_the_modulus_of_an_arm(tmp_path):
     path = "/Robot/Phone"
     times, motion = result.times, result.targets[path]
     acceleration = np.gradient(np.gradient(motion.position, times, axis=0), times, axis=0) + [0.0, 0.0, 9.81]
-    own = np.einsum("tji,tj->ti", rotation_matrices(motion.orientation), acceleration)
+    own = np.einsum("tji,tj->ti", rotation_from_quaternion(motion.orientation), acceleration)
     own += 0.02 * np.random.default_rng(3).standard_normal(own.shape)
     names = ["Time (s)", *(f"Acceleration {axis} (m/s^2)" for axis in "xyz")]
     table = np.column_stack([times, own])[20:-20:5]

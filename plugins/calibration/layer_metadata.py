@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from calmotion.model import Character
 from calmotion.recordings import ANGLE, MARKER
+from calmotion.support import rotation_from_quaternion
 from calmotion.usd import to_doubles, to_strings
-from scipy.spatial.transform import Rotation
 
 from .model.estimates import ENCODER_OFFSET, Calibration, Estimate
 
@@ -72,8 +72,7 @@ def _arm(character: Character, path: str) -> float:
 
     def place(body: int, at: np.ndarray) -> np.ndarray:
         rest = character.bodies[body].rest
-        w, x, y, z = rest.rotation
-        return np.asarray(rest.position + Rotation.from_quat([x, y, z, w]).apply(at))
+        return np.asarray(rest.position + rotation_from_quaternion(rest.rotation) @ at)
 
     joint = character.joints[motor.joint]
     middle = place(joint.body1, joint.frame1.position)

@@ -269,7 +269,7 @@ class _Writer:
         from pxr import Gf, Sdf
 
         if value.ndim == 2:
-            x, y, z, w = (float(part) for part in Rotation.from_matrix(value).as_quat())
+            w, x, y, z = (float(part) for part in Rotation.from_matrix(value).as_quat(scalar_first=True))
             spec = self._spec(path, name, Sdf.ValueTypeNames.Quatf)
             spec.default = Gf.Quatf(w, x, y, z)
         else:

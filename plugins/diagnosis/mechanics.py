@@ -11,8 +11,8 @@ from calmotion.arrays import Array, BoolArray
 from calmotion.model import DRIVE, ON_ERROR, RunSettings, curve_of
 from calmotion.multibody import Model, PoseModel, SimulationFailure, VelocityForces, pose_model, rigid_poses
 from calmotion.simulation import CompiledShot, compile_shot, prepare
+from calmotion.support import rotation_from_quaternion
 from scipy.linalg import block_diag, eigh
-from scipy.spatial.transform import Rotation
 
 HIGHEST, MOST = 150.0, 8  # frequency [Hz] up to which modes of the links are used, and the largest number of shapes
 OFTEN = 0.01  # at which forces that change with the pose are taken [s]
@@ -114,7 +114,7 @@ def mechanics_of(shot: CompiledShot, times: Array, command: Array) -> Mechanics 
         return None
     world = prepare(shot, RunSettings(pre_roll=0.0)).world[0]
     c, q = rigid_poses(model, model.joint_angles(command), np.repeat(world[None], len(times), axis=0))
-    R = Rotation.from_quat(q[..., [1, 2, 3, 0]].reshape(-1, 4)).as_matrix().reshape(*q.shape[:2], 3, 3)
+    R = rotation_from_quaternion(q)
     carried = _carried(model)
     rates = np.gradient(command, times, axis=0, edge_order=2)
     joints = [joint_of[m] for m in range(command.shape[1])]

@@ -126,7 +126,7 @@ def _continuous(rotations: Array) -> Array:
 
 def _turned(rotations: Array, reference: Array) -> Array:
     """Rotation vectors, world axes, that turn one pose into another [rad]; [f, b, 3]."""
-    first, second = (Rotation.from_quat(q[..., [1, 2, 3, 0]].reshape(-1, 4)) for q in (rotations, reference))
+    first, second = (Rotation.from_quat(q.reshape(-1, 4), scalar_first=True) for q in (rotations, reference))
     return np.asarray((first * second.inv()).as_rotvec()).reshape(*rotations.shape[:2], 3)
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.support import rotation_from_quaternion
 from calmotion.usd import transforms
 
 
 def rotation(seed: int) -> np.ndarray:
-    return transforms.rotation_from_quaternion(np.random.default_rng(seed).normal(size=4))
+    return rotation_from_quaternion(np.random.default_rng(seed).normal(size=4))
 
 
 def affine(linear: np.ndarray, offset=(1.0, 2.0, 3.0)) -> np.ndarray:
@@ -35,11 +36,6 @@ def test_local_points_are_where_the_pose_puts_them():
     pose = transforms.pose_from_matrix(affine(rotation(2) * 3.0), "/a")
     local = np.array([[0.1, 0.2, 0.3]])
     assert np.allclose(pose.to_local(local @ pose.rotation.T + pose.position), local)
-
-
-def test_quaternions_and_rotations_agree():
-    turn = rotation(3)
-    assert np.allclose(transforms.rotation_from_quaternion(transforms.quaternion_from_rotation(turn)), turn)
 
 
 @pytest.mark.parametrize(("axis", "direction"), [("X", [1, 0, 0]), ("Y", [0, 1, 0]), ("Z", [0, 0, 1])])

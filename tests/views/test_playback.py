@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import synthetic
 from calmotion.model import Body, Motion
+from calmotion.support import rotation_from_quaternion
 from calmotion.views.playback import (
     carriers,
     deformed_points,
     deviations,
     relative_poses,
-    rotation_matrices,
     sample_motion,
     world_points,
 )
@@ -39,7 +39,9 @@ def test_a_quaternion_that_changes_sign_between_steps_is_the_same_rotation():
     motion.rotations[1::2] *= -1.0
     between = sample_motion(motion, motion.times[:-1] + 0.5 * synthetic.STEP)
     plain = sample_motion(synthetic.motion(0.0), between.times)
-    np.testing.assert_allclose(rotation_matrices(between.rotations), rotation_matrices(plain.rotations), atol=1e-12)
+    np.testing.assert_allclose(
+        rotation_from_quaternion(between.rotations), rotation_from_quaternion(plain.rotations), atol=1e-12
+    )
 
 
 def test_outside_its_span_a_motion_is_constant():
@@ -58,12 +60,6 @@ def test_surface_points_move_with_the_modes_and_the_body():
     assert deformed_points(points, None, motion.elastic[1]).shape == (1, 8, 3)
 
 
-def test_rotation_matrices_turn_as_the_quaternions_do():
-    half = 0.25 * np.pi
-    matrix = rotation_matrices(np.array([np.cos(half), 0.0, 0.0, np.sin(half)]))
-    assert matrix @ [1.0, 0.0, 0.0] == pytest.approx([0.0, 1.0, 0.0])
-
-
 def test_a_nested_body_is_placed_in_the_body_above_it():
     rng = np.random.default_rng(7)
     bodies = [Body(path, None, None) for path in ("/R/a/b/c", "/R/a", "/R/ab", "/R/a/x/d")]
@@ -74,8 +70,8 @@ def test_a_nested_body_is_placed_in_the_body_above_it():
     c = rng.normal(size=(5, 2, 3))
     motion = Motion(np.arange(5.0), c, q, (empty, empty), empty, empty, np.zeros((5, 0, 3)), np.zeros((5, 0, 4)))
     positions, rotations = relative_poses(motion, 0, 1)
-    outer, inner = rotation_matrices(q[:, 1]), rotation_matrices(rotations)
-    assert np.abs(outer @ inner - rotation_matrices(q[:, 0])).max() < 1e-14
+    outer, inner = rotation_from_quaternion(q[:, 1]), rotation_from_quaternion(rotations)
+    assert np.abs(outer @ inner - rotation_from_quaternion(q[:, 0])).max() < 1e-14
     assert np.abs(np.einsum("fij,fj->fi", outer, positions) + c[:, 1] - c[:, 0]).max() < 1e-14
 
 

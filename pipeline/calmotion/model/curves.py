@@ -127,7 +127,7 @@ def cycle_gap(track: Track, end: float, turning: bool) -> float:
 
 def rotation_spline(frame: MovingFrame) -> RotationSpline:
     """The rotations of a root that moves, between its samples."""
-    times, rotations = frame.times, Rotation.from_quat(np.roll(frame.rotations, -1, axis=1))
+    times, rotations = frame.times, Rotation.from_quat(frame.rotations, scalar_first=True)
     if len(times) == 1:
         times, rotations = np.array([times[0], times[0] + 1.0]), Rotation.concatenate([rotations, rotations])
     return RotationSpline(times, rotations)
@@ -235,7 +235,7 @@ def _with_corners(times: Array, corners: Array) -> Array:
 
 def _continuous(rotations: Rotation) -> Array:
     """Quaternions (w, x, y, z) of which neighbours have the same sign, shape [k, 4]."""
-    found: Array = np.roll(rotations.as_quat(), 1, axis=1)
+    found: Array = rotations.as_quat(scalar_first=True)
     turns = np.where(np.sum(found[1:] * found[:-1], axis=1) < 0.0, -1.0, 1.0)
     found[1:] *= np.cumprod(turns)[:, None]
     return found

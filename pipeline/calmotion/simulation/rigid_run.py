@@ -25,6 +25,7 @@ from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.open_chains import refuse_open_chains, refuse_open_failure
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.standing.slipping import refuse_slipping
+from calmotion.support.rotations import rotation_from_quaternion
 
 _POWER_LEFT = 1e-3  # of a signal's power may lie above the highest frequency that matters: 3% of its amplitude
 _NOTHING = 1e-9  # of gravity, or of it over a metre: an acceleration that is rounding
@@ -153,7 +154,7 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
     result = []
     for index, anchors in enumerate(body_anchors(character, tree)):
         b = component_of[index]
-        R = _matrices(states.q[:, b])
+        R = rotation_from_quaternion(states.q[:, b])
         felt = np.einsum("tji,tj->ti", R, acceleration[:, b] - system.gravity)
         peaks = np.zeros((len(anchors.joints), 6))
         far = np.zeros(len(anchors.joints))
@@ -209,7 +210,7 @@ def _reach(model: Model, run: ForwardRun) -> Array:
     for target, b in enumerate(model.targets.component):
         k = int(b)
         while k >= 0:
-            joint = states.c[:, k] + _matrices(states.q[:, k]) @ system.position[k, 1]
+            joint = states.c[:, k] + rotation_from_quaternion(states.q[:, k]) @ system.position[k, 1]
             distance = np.linalg.norm(run.target_positions[:, target] - joint, axis=1)
             reach[k] = max(reach[k], float(distance.max()))
             k = int(system.parent[k])
@@ -218,11 +219,3 @@ def _reach(model: Model, run: ForwardRun) -> Array:
 
 def _peak(signal: Array) -> Array:
     return np.asarray(np.abs(signal).max(axis=0))
-
-
-def _matrices(q: Array) -> Array:
-    """Rotation matrices, shape [..., 3, 3], of unit quaternions (w, x, y, z)."""
-    from scipy.spatial.transform import Rotation
-
-    matrices = Rotation.from_quat(np.roll(q, -1, axis=-1).reshape(-1, 4)).as_matrix()
-    return np.asarray(matrices.reshape(q.shape[:-1] + (3, 3)))

@@ -26,6 +26,8 @@ from calmotion.support.operating_system import PIPES as PIPES
 from calmotion.support.operating_system import locked as locked
 from calmotion.support.operating_system import processors as processors
 from calmotion.support.operating_system import use_processors as use_processors
+from calmotion.support.rotations import quaternion_from_rotation as quaternion_from_rotation
+from calmotion.support.rotations import rotation_from_quaternion as rotation_from_quaternion
 from calmotion.support.time_columns import TIME_UNITS as TIME_UNITS
 from calmotion.support.time_columns import TimeColumn as TimeColumn
 from calmotion.support.time_columns import counters as counters

@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model.character import Frame
+from calmotion.support.rotations import quaternion_from_rotation
 
 _HUGE = 1e30
 _AFFINE = 1e-6  # matrices that were computed in single precision have 0.9999999 in the corner
@@ -103,25 +104,6 @@ def refuse_infinite(matrix: Array, path: str) -> None:
             found=f"{float(np.max(np.abs(matrix))):g}",
             remedy="Correct the transform",
         )
-
-
-def quaternion_from_rotation(rotation: Array) -> Array:
-    """Unit quaternions (w, x, y, z), w >= 0, shape [..., 4], of rotation matrices [..., 3, 3]."""
-    from scipy.spatial.transform import Rotation
-
-    # SciPy takes more than one axis of rotations since 1.17
-    flat = np.reshape(rotation, (-1, 3, 3))
-    quaternions: Array = Rotation.from_matrix(flat).as_quat(canonical=True, scalar_first=True)
-    return quaternions.reshape(*np.shape(rotation)[:-2], 4)
-
-
-def rotation_from_quaternion(quaternion: Array) -> Array:
-    """Rotation matrices [..., 3, 3] of quaternions (w, x, y, z) [..., 4], which are normalised first."""
-    from scipy.spatial.transform import Rotation
-
-    flat = np.reshape(quaternion, (-1, 4))
-    rotations: Array = Rotation.from_quat(flat, scalar_first=True).as_matrix().reshape(*np.shape(quaternion)[:-1], 3, 3)
-    return rotations
 
 
 def axis_rotation(axis: str) -> Array:

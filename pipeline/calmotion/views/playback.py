@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model.character import Body
 from calmotion.model.result import Motion, Skin
+from calmotion.support.rotations import rotation_from_quaternion
 
 
 def sample_motion(motion: Motion, times: Array) -> Motion:
@@ -80,17 +81,6 @@ def modes_of(skin: Skin | None, surface: int) -> Array | None:
     return skin.modes[surface]
 
 
-def rotation_matrices(quaternions: Array) -> Array:
-    """Unit quaternions (w, x, y, z), shape [..., 4], as matrices, shape [..., 3, 3]."""
-    w, x, y, z = np.moveaxis(quaternions, -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
 def carriers(bodies: Sequence[Body]) -> list[int]:
     """For each body the index of the body whose prim is its nearest ancestor, -1 for none."""
     index = {body.path: k for k, body in enumerate(bodies)}
@@ -112,7 +102,7 @@ def relative_poses(motion: Motion, body: int, carrier: int) -> tuple[Array, Arra
     positions, rotations = motion.positions[:, body], motion.rotations[:, body]
     if carrier < 0:
         return positions, rotations
-    matrices = rotation_matrices(motion.rotations[:, carrier])
+    matrices = rotation_from_quaternion(motion.rotations[:, carrier])
     offset = positions - motion.positions[:, carrier]
     w, v = motion.rotations[:, carrier, :1], -motion.rotations[:, carrier, 1:]
     real = w * rotations[:, :1] - np.sum(v * rotations[:, 1:], axis=1, keepdims=True)
@@ -136,7 +126,7 @@ def deviations(surface: Array, modes: Array | None, body: int, motion: Motion, r
     world = []
     for moved in (motion, reference):
         points = deformed_points(surface, modes, moved.elastic[body])
-        rotated = np.einsum("fij,fnj->fni", rotation_matrices(moved.rotations[:, body]), points)
+        rotated = np.einsum("fij,fnj->fni", rotation_from_quaternion(moved.rotations[:, body]), points)
         world.append(rotated + moved.positions[:, body, None])
     return np.asarray(np.linalg.norm(world[0] - world[1], axis=2))
 
@@ -152,7 +142,7 @@ def world_points(body: Body, index: int, skin: Skin | None, motion: Motion, row:
     Returns:
         For each surface [m], shape [n_s, 3].
     """
-    matrix = rotation_matrices(motion.rotations[row, index])
+    matrix = rotation_from_quaternion(motion.rotations[row, index])
     elastic = motion.elastic[index][row : row + 1]
     return [
         deformed_points(surface.points, modes_of(skin, s), elastic)[0] @ matrix.T + motion.positions[row, index]

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from calmotion.arrays import Array, IntArray
 from calmotion.model.character import Character
 from calmotion.model.result import Motion, Skin
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.views.painting import LEVELS, Light, Marks, Visible, develop, mark, outlines
-from calmotion.views.playback import deformed_points, modes_of, rotation_matrices
+from calmotion.views.playback import deformed_points, modes_of
 from calmotion.views.raster import Hits, rasterize, split_at_creases
 from calmotion.views.viewpoint import Viewpoint
 
@@ -123,7 +124,7 @@ def pose(model: Model, motion: Motion, row: int) -> tuple[Array, Array, IntArray
     of each triangle [m]."""
     corners, normals, owners = [np.zeros((0, 3, 3))], [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int32)]
     for number, (body, points, modes, directions, triangles) in enumerate(model.parts):
-        matrix = rotation_matrices(motion.rotations[row, body])
+        matrix = rotation_from_quaternion(motion.rotations[row, body])
         deformed = deformed_points(points, modes, motion.elastic[body][row : row + 1])[0]
         corners.append((deformed @ matrix.T + motion.positions[row, body])[triangles])
         normals.append((directions @ matrix.T)[triangles])

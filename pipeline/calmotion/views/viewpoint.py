@@ -10,7 +10,8 @@ import numpy as np
 from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.model.character import Character
 from calmotion.model.result import Motion, Skin
-from calmotion.views.playback import deformed_points, modes_of, rotation_matrices, world_points
+from calmotion.support.rotations import rotation_from_quaternion
+from calmotion.views.playback import deformed_points, modes_of, world_points
 
 SIDE = np.radians(38.0)
 ELEVATION = np.radians(17.0)
@@ -128,7 +129,7 @@ def moving_cloud(character: Character, skins: tuple[Skin | None, ...], motion: M
     """
     clouds = [motion.target_positions.reshape(-1, 3)]
     instants = np.unique(np.linspace(0, len(motion.times) - 1, INSTANTS).astype(int))
-    matrices = rotation_matrices(motion.rotations[instants])
+    matrices = rotation_from_quaternion(motion.rotations[instants])
     moved = moving_bodies(motion)
     seen = moved if np.any(moved) else np.ones(len(moved), bool)
     for index, body in enumerate(character.bodies):
@@ -200,7 +201,7 @@ def _edges(points: Array) -> tuple[Array, Array]:
 
 def _still_surfaces(character: Character, motion: Motion) -> tuple[list[Array], list[Array]]:
     """Corners of the hulls of bodies that stand still beside others that move, and of each of their surfaces [m]."""
-    moved, matrices = moving_bodies(motion), rotation_matrices(motion.rotations[:1])[0]
+    moved, matrices = moving_bodies(motion), rotation_from_quaternion(motion.rotations[:1])[0]
     bases, surfaces = [], []
     for index, body in enumerate(character.bodies):
         if not moved[index] and np.any(moved):

@@ -22,6 +22,7 @@ from calmotion.arrays import Array
 from calmotion.model import PRESCRIBED, Character, curve_of
 from calmotion.recordings import EFFORT, Channel, SensorRecording
 from calmotion.simulation import CompiledShot
+from calmotion.support import rotation_from_quaternion
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
@@ -78,7 +79,7 @@ def moved(shot: CompiledShot, recordings: Sequence[SensorRecording] = ()) -> Mov
     turned, origins = list[Array](), list[Array]()  # of the bodies
     places, axes = list[Array](), list[Array]()  # of the joints
     for k, joint in enumerate(character.joints):
-        first, last = _matrix(joint.frame0.rotation), _matrix(joint.frame1.rotation)
+        first, last = rotation_from_quaternion(joint.frame0.rotation), rotation_from_quaternion(joint.frame1.rotation)
         R, o = (np.eye(3), np.zeros(3)) if joint.body0 < 0 else (turned[joint.body0], origins[joint.body0])
         about = Rotation.from_rotvec(values.get(k, 0.0 * times)[:, None] * np.array([0.0, 0.0, 1.0])).as_matrix()
         own = R @ first @ about @ last.T
@@ -112,11 +113,6 @@ def moved(shot: CompiledShot, recordings: Sequence[SensorRecording] = ()) -> Mov
             (index[channel.path], replace(channel, times=channel.times[known], values=channel.values[known]))
         )
     return Moved(rows, times, tuple(efforts))
-
-
-def _matrix(quaternion: Array) -> Array:
-    w, x, y, z = quaternion
-    return np.asarray(Rotation.from_quat([x, y, z, w]).as_matrix())
 
 
 def _wrenches(times: Array, R: Array, o: Array, gravity: Array) -> Array:

@@ -189,11 +189,11 @@ def mujoco_module() -> Any:
 
 
 def _rotation(frame: Frame) -> Rotation:
-    return Rotation.from_quat(np.roll(frame.rotation, -1))
+    return Rotation.from_quat(frame.rotation, scalar_first=True)
 
 
 def _quaternion(rotation: Rotation) -> str:
-    return _text(np.roll(rotation.as_quat(), 1))
+    return _text(rotation.as_quat(scalar_first=True))
 
 
 def _text(values: Any) -> str:

@@ -9,8 +9,8 @@ from calmotion.model import SERVO, Motor, RunSettings, Track
 from calmotion.multibody import Workspace, joint_values
 from calmotion.recordings import SensorRecording
 from calmotion.simulation import CompiledShot, compile_shot, prepare, run_forward
+from calmotion.support import rotation_from_quaternion
 from scipy.interpolate import make_interp_spline
-from scipy.spatial.transform import Rotation
 
 from .faulty_arm import FaultyArm, played
 from .faulty_mujoco import sampled
@@ -32,7 +32,7 @@ def recorded_by_us(arm: FaultyArm) -> SensorRecording:
         prepared.world, integrator=settings.scheme,
     )  # fmt: skip
     values = joint_values(model.system, model.motor, shot.character.motors, run.trajectory.states.u, run.joint_angles)
-    R = Rotation.from_quat(run.target_rotations[:, 0][:, [1, 2, 3, 0]]).as_matrix()
+    R = rotation_from_quaternion(run.target_rotations[:, 0])
     felt = make_interp_spline(grid.times, run.target_positions[:, 0], k=5).derivative(2)(grid.times)
     felt = np.einsum("tij,ti->tj", R, felt - np.asarray(shot.character.gravity))
     return sampled(arm, grid.times, model.motor_values(values), felt, rng)

@@ -25,6 +25,7 @@ from calmotion.multibody import (
 )
 from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER, STRAIN, Channel, LowPass
 from calmotion.simulation import AT_REST, CompiledShot, ForwardRun, Prepared, over_grid, prepare, run_forward
+from calmotion.support import rotation_from_quaternion
 from scipy.interpolate import CubicSpline, make_interp_spline
 from scipy.signal import bilinear, lfilter, lfilter_zi
 from scipy.spatial.transform import Rotation
@@ -183,10 +184,9 @@ def _measured(robot: Robot, prepared: Prepared, run: ForwardRun) -> Signals:
     lost = np.flatnonzero(~np.isfinite(rotations).all(axis=(1, 2)))
     if len(lost):  # a body that is bent so far that its frame at the target has no direction
         raise SimulationFailure(float(prepared.grid.times[lost[0]]), NOWHERE, Reason.DIVERGED)
-    matrices = Rotation.from_quat(rotations.reshape(-1, 4)[:, [1, 2, 3, 0]]).as_matrix()
     loads = model.motor_values(found.efforts)
     return Signals(
-        prepared.grid.times, run.target_positions, matrices.reshape(*rotations.shape[:2], 3, 3),
+        prepared.grid.times, run.target_positions, rotation_from_quaternion(rotations),
         model.motor_values(values), loads, loads, np.asarray(character.gravity, float),
         robot.offsets, _modes(model, run.commands[0]),
     )  # fmt: skip

@@ -103,7 +103,7 @@ def local_poses(bodies: BodyTree, curves: MotorCurves, rate: float) -> LocalPose
             back = _rotation(q[:, parent]).inv()
             point, relative = back.apply(point - c[:, parent]), back * relative
         translations[:, k] = point
-        rotations[:, k] = _continuous(np.roll(relative.as_quat(), 1, axis=-1))
+        rotations[:, k] = _continuous(relative.as_quat(scalar_first=True))
     return LocalPoses(times, translations, rotations)
 
 
@@ -222,7 +222,7 @@ def _composed(bodies: BodyTree, poses: LocalPoses) -> tuple[Array, Array]:
         if parent >= 0:
             before = _rotation(q[:, parent])
             turn, point = before * turn, c[:, parent] + before.apply(point)
-        q[:, k] = np.roll(turn.as_quat(), 1, axis=-1)
+        q[:, k] = turn.as_quat(scalar_first=True)
         c[:, k] = point - turn.apply(bodies.pivots[k])
     return c, q
 
@@ -236,4 +236,4 @@ def _continuous(quaternions: Array) -> Array:
 
 def _rotation(quaternions: Array) -> Rotation:
     """Rotations of quaternions (w, x, y, z), shape [4] or [T, 4]."""
-    return Rotation.from_quat(np.roll(quaternions, -1, axis=-1))
+    return Rotation.from_quat(quaternions, scalar_first=True)

@@ -10,9 +10,9 @@ from arms import compiled
 from calmotion.model import Body, Frame, Joint, MassProperties
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.model.joint_arrays import rotation_matrix
 from calmotion.multibody.model.model import start_angles
 from calmotion.multibody.statics.equilibrium import equilibrium
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.testing.beam_arms import IDENTITY
 from neutral_hinges import push_rod, turning
 
@@ -26,7 +26,7 @@ def at_rest(character):
     angles = np.zeros(len(model.motor))
     start = rigid_state(model, start_angles(model, angles))
     state, _ = equilibrium(model.system, start, angles, Workspace.for_system(model.system))
-    return lambda body: rotation_matrix(state.q[list(model.tree.body).index(body)])
+    return lambda body: rotation_from_quaternion(state.q[list(model.tree.body).index(body)])
 
 
 def with_ball_rods(offsets, direction):

@@ -8,7 +8,7 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.usd.transforms import rotation_from_quaternion
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion_plugins.robot_import import import_robot
 from calmotion_plugins.robot_import.converters import VARIABLE, environment_folder
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.model import WORLD
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd.reading import read_shot
-from calmotion.usd.transforms import rotation_from_quaternion
 from pxr import Gf, UsdGeom, UsdPhysics
 from small_shots import (
     BASE,

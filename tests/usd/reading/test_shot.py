@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion.model import WORLD
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd.reading import read_shot
 from calmotion.usd.rigging import RigOptions, rig_shot
-from calmotion.usd.transforms import rotation_from_quaternion
 from calmotion.usd.writing import write_result
 from performing import followed, result_with
 from posed_shots import posed

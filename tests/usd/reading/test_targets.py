@@ -14,9 +14,9 @@ from calmotion.model import (
     MassProperties,
     SurfaceMesh,
 )
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd.reading import read_shot
 from calmotion.usd.reading.targets import default_targets
-from calmotion.usd.transforms import rotation_from_quaternion
 from pxr import Gf, Sdf, UsdGeom
 from small_shots import FORE, HAND, LENGTH, WIDTH, Scale, make_target, write_arm
 

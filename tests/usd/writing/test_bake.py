@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from calmotion.model import Motion, Skin
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import read_shot
-from calmotion.usd.transforms import rotation_from_quaternion
 from calmotion.usd.writing.bake import BakedMotion, bake_bodies, bake_points, simulated_motion
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 from small_shots import ELBOW, FORE, UPPER, Scale, box, write_arm

@@ -10,11 +10,11 @@ from calmotion.arrays import Array
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.trajectory import Trajectory, copy_of_instant
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.model.joint_arrays import rotation_matrix
 from calmotion.multibody.model.model import Model, moves_freely, start_angles
 from calmotion.multibody.model.system import System
 from calmotion.multibody.model.topology import chain_members
 from calmotion.multibody.statics.equilibrium import linearize
+from calmotion.support.rotations import rotation_from_quaternion
 
 
 class OpenJoint(NamedTuple):
@@ -90,7 +90,7 @@ def unheld_joints(model: Model, joint_angles: Array, world: Array | None = None)
         return []
     state = rigid_state(model, start_angles(model, joint_angles), world)
     chained = {b for ends in system.side[len(system.parent) :] for b in chain_members(system.parent, ends)}
-    R = np.array([rotation_matrix(q) for q in state.q])
+    R = rotation_from_quaternion(state.q)
     mass, moment = system.mass.copy(), np.einsum("bij,bj->bi", R, system.s) + system.mass[:, None] * state.c
     for b in range(len(mass) - 1, -1, -1):
         if system.parent[b] >= 0:

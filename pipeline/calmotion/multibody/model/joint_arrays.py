@@ -10,10 +10,10 @@ import numpy as np
 
 from calmotion.arrays import Array, IntArray
 from calmotion.model.character import WORLD, Character, Frame
-from calmotion.multibody.kernels.so3 import matrix_of
 from calmotion.multibody.model.system import SERVO_COLUMNS
 from calmotion.multibody.model.topology import Tree
 from calmotion.reduction.reduced_body import Marker, ReducedBody
+from calmotion.support.rotations import rotation_from_quaternion
 
 # constraint rows of a joint without a motor
 _ROWS = {"fixed": 6, "revolute": 5, "spherical": 3, "prismatic": 5, "floating": 0}
@@ -44,13 +44,6 @@ def body_anchors(character: Character, tree: Tree) -> list[BodyAnchors]:
 def _side(character: Character, joint: int, body: int) -> Frame:
     ends = character.joints[joint]
     return ends.frame0 if ends.body0 == body else ends.frame1
-
-
-def rotation_matrix(quaternion: Array) -> Array:
-    """Rotation matrix of a quaternion (w, x, y, z)."""
-    out = np.zeros((3, 3))
-    matrix_of(np.asarray(quaternion, dtype=float), out)
-    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +95,14 @@ def joint_arrays(
             if body != WORLD:
                 marker = bodies[body].markers[anchors[body].joints.index(index)]
             r = marker.Phi.shape[1]
-            position[k, end], rotation[k, end] = marker.position, rotation_matrix(marker.rotation)
+            position[k, end], rotation[k, end] = marker.position, rotation_from_quaternion(marker.rotation)
             Phi[k, end, :, :r], Psi[k, end, :, :r] = marker.Phi, marker.Psi
         if joint.kind == "spherical":
             # a ball joint has no axes: those of its second side are chosen so that the authored pose has zero rotation
-            turns = [np.eye(3) if b == WORLD else rotation_matrix(character.bodies[b].rest.rotation) for b in bodies_of]
+            turns = [
+                np.eye(3) if b == WORLD else rotation_from_quaternion(character.bodies[b].rest.rotation)
+                for b in bodies_of
+            ]
             rotation[k, 1] = turns[1].T @ turns[0] @ rotation[k, 0]
         sign[k] = -1.0 if flipped else 1.0
         motor[k] = motor_of.get(index, -1)
@@ -131,7 +127,7 @@ def _rest_value(character: Character, ends: Sequence[int], position: Array, rota
     frames = []
     for body, x, R in zip(ends, position, rotation, strict=True):
         rest = None if body == WORLD else character.bodies[body].rest
-        turn = np.eye(3) if rest is None else rotation_matrix(rest.rotation)
+        turn = np.eye(3) if rest is None else rotation_from_quaternion(rest.rotation)
         frames.append((turn @ x + (np.zeros(3) if rest is None else rest.position), turn @ R))
     if sliding:
         return float((frames[1][0] - frames[0][0]) @ frames[0][1][:, 2])

@@ -11,11 +11,12 @@ import numpy as np
 from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.model.character import Body, Character
 from calmotion.model.motor import PRESCRIBED, Motor
-from calmotion.multibody.model.joint_arrays import BodyAnchors, JointArrays, body_anchors, joint_arrays, rotation_matrix
+from calmotion.multibody.model.joint_arrays import BodyAnchors, JointArrays, body_anchors, joint_arrays
 from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, System, components, coordinate_units
 from calmotion.multibody.model.topology import Tree, span_tree
 from calmotion.multibody.motors.drives import add_motors, giving_motors
 from calmotion.reduction.reduced_body import Marker, ReducedBody, rigid_invariants
+from calmotion.support.rotations import rotation_from_quaternion
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +195,7 @@ def _targets(
         frames = anchors[target.body]
         marker = bodies[target.body].markers[len(frames.joints) + frames.targets.index(k)]
         r = marker.Phi.shape[1]
-        position[k], rotation[k] = marker.position, rotation_matrix(marker.rotation)
+        position[k], rotation[k] = marker.position, rotation_from_quaternion(marker.rotation)
         Phi[k, :, :r], Psi[k, :, :r] = marker.Phi, marker.Psi
     return Targets(
         component=np.array([component_of[target.body] for target in character.targets], np.int32),

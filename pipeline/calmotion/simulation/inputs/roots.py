@@ -81,7 +81,7 @@ def root_tracks(moving: Sequence[MovingFrame]) -> list[Track]:
     """Positions [m] and turns from the first pose [rad] as tracks, which tell whether a shot starts in motion."""
     tracks = []
     for frame in moving:
-        rotations = Rotation.from_quat(np.roll(frame.rotations, -1, axis=1))
+        rotations = Rotation.from_quat(frame.rotations, scalar_first=True)
         turns = np.unwrap((rotations[0].inv() * rotations).as_rotvec(), axis=0)
         tracks += [Track(frame.times, column) for column in (*frame.positions.T, *turns.T)]
     return tracks

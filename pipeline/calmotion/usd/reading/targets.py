@@ -13,11 +13,12 @@ from calmotion.errors import ShotError
 from calmotion.model import Body, Frame, Joint, Target, WeightTrack
 from calmotion.model.character import WORLD
 from calmotion.support.naming import nearest
+from calmotion.support.rotations import quaternion_from_rotation
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated import animation_codes, moves_on_body
 from calmotion.usd.reading.context import Reading, carrying_body, prims_of, refuse_without_transform, switched_off_body
-from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
+from calmotion.usd.transforms import Pose, pose_from_matrix
 
 if TYPE_CHECKING:
     from pxr import Usd

@@ -11,9 +11,10 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.catalogs.materials import Material
 from calmotion.model import MassProperties, Provenance
+from calmotion.support.rotations import quaternion_from_rotation
 from calmotion.usd import gf
 from calmotion.usd.stages import RIG
-from calmotion.usd.transforms import Pose, quaternion_from_rotation
+from calmotion.usd.transforms import Pose
 from calmotion.usd.units import StageUnits, units_of
 from calmotion.usd.writing.metadata import author_origin, author_stage_metadata
 from calmotion.usd.writing.root import relative_asset

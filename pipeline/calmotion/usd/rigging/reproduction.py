@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 from calmotion.arrays import Array
 from calmotion.model import Animation, Character, Track
 from calmotion.model.character import Frame
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd.rigging.parts import Parts
 from calmotion.usd.rigging.posed_bodies import PosedBody
-from calmotion.usd.transforms import rotation_from_quaternion
 
 Motion = tuple[Array, Array]  # rotations [n, 3, 3] and origins [n, 3] [m]
 

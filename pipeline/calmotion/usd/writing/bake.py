@@ -9,9 +9,10 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model import Character, Motion, Skin
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
-from calmotion.usd.transforms import Pose, pose_from_matrix, rotation_from_quaternion
+from calmotion.usd.transforms import Pose, pose_from_matrix
 from calmotion.usd.writing.curves import attribute_spec
 
 if TYPE_CHECKING:

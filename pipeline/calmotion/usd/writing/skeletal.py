@@ -10,12 +10,13 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import Animation, Character, MotorCurve
 from calmotion.model.curves import curve_of
+from calmotion.support.rotations import quaternion_from_rotation
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.character import read_skeleton
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stacks
-from calmotion.usd.transforms import pose_from_matrix, quaternion_from_rotation
+from calmotion.usd.transforms import pose_from_matrix
 from calmotion.usd.units import units_of
 from calmotion.usd.writing.curves import attribute_spec, curve_values
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from calmotion.model import Frame, MotorCurve
 from calmotion.model.curves import commanded_curves
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import read_shot
 from calmotion.usd.reading.joints.chains import axis_values
 from calmotion.usd.reading.joints.joint_prims import JointPrim
-from calmotion.usd.transforms import rotation_from_quaternion
 from calmotion.usd.writing.curves import author_curves
 from generic_arm import driven, generic
 from pxr import Gf, Sdf, UsdGeom, UsdPhysics

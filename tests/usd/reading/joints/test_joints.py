@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.model import WORLD
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd.reading import read_shot
-from calmotion.usd.transforms import rotation_from_quaternion
 from generic_arm import generic
 from pxr import Gf, Sdf, UsdGeom, UsdPhysics
 from small_shots import BASE, ELBOW, FORE, LENGTH, SHOULDER, UPPER, Scale, write_arm

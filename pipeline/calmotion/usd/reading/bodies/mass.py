@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.mesh.moments import Moments, sum_of, surface_moments
 from calmotion.model import MassProperties
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd import gf, schemas
 from calmotion.usd.dialects import number_of
 from calmotion.usd.reading.bodies.flexible import ELASTIC
@@ -16,7 +17,7 @@ from calmotion.usd.reading.bodies.primitives import TYPES
 from calmotion.usd.reading.bodies.shapes import MESH, Shape
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
 from calmotion.usd.schemas import is_applied
-from calmotion.usd.transforms import Pose, rotation_from_quaternion
+from calmotion.usd.transforms import Pose
 
 if TYPE_CHECKING:
     from pxr import Usd

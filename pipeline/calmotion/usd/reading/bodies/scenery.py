@@ -10,10 +10,10 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Body, SurfaceMesh
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd.reading.bodies import primitives
 from calmotion.usd.reading.bodies.shapes import color_of, mesh_geometry
 from calmotion.usd.reading.context import Reading, is_rigid_body
-from calmotion.views.playback import rotation_matrices
 
 if TYPE_CHECKING:
     from pxr import Gf, Usd, UsdGeom
@@ -34,7 +34,7 @@ def scenery_of(reading: Reading, bodies: Sequence[Body]) -> tuple[SurfaceMesh, .
     from pxr import Tf
 
     cloud = [
-        surface.points @ rotation_matrices(body.rest.rotation).T + body.rest.position
+        surface.points @ rotation_from_quaternion(body.rest.rotation).T + body.rest.position
         for body in bodies
         for surface in body.surfaces
         if surface.drawn

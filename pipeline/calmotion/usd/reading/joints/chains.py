@@ -13,10 +13,11 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model import Frame
+from calmotion.support.rotations import quaternion_from_rotation, rotation_from_quaternion
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints.freedoms import SEVERAL_FREEDOMS, TRANSLATIONS
 from calmotion.usd.reading.joints.joint_prims import HALF_TURN, JointPrim, axis_limits
-from calmotion.usd.transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
+from calmotion.usd.transforms import Pose, axis_rotation
 
 
 @dataclass(frozen=True)

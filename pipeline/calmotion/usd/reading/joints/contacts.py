@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 from calmotion.errors import ShotError
 from calmotion.model import Frame
 from calmotion.model.animation import Contact
+from calmotion.support.rotations import quaternion_from_rotation
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated import schedule_of
 from calmotion.usd.reading.context import Reading, carrying_body, prims_of, refuse_without_transform
 from calmotion.usd.reading.joints.joint_prims import JointPrim
-from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
+from calmotion.usd.transforms import Pose, pose_from_matrix
 
 if TYPE_CHECKING:
     from pxr import Usd

@@ -10,12 +10,13 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Frame
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd.reading.context import RIGID_BODY, Reading
 from calmotion.usd.reading.joints import topology
 from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.reading.joints.roots import world_side_prim
 from calmotion.usd.schemas import is_applied
-from calmotion.usd.transforms import Pose, rotation_from_quaternion
+from calmotion.usd.transforms import Pose
 
 if TYPE_CHECKING:
     from pxr import Usd

@@ -13,11 +13,12 @@ from calmotion.errors import ShotError
 from calmotion.model import WORLD, Frame
 from calmotion.model.animation import Contact
 from calmotion.support.naming import nearest
+from calmotion.support.rotations import quaternion_from_rotation, rotation_from_quaternion
 from calmotion.usd import gf
 from calmotion.usd.dialects import number_of, number_or
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.reading.joints import freedoms
-from calmotion.usd.transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
+from calmotion.usd.transforms import Pose, axis_rotation
 
 if TYPE_CHECKING:
     from pxr import Sdf, Usd

@@ -14,13 +14,13 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.support.naming import nearest
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd import gf
 from calmotion.usd.dialects import number_or
 from calmotion.usd.reading.context import Reading, body_on, prims_of
 from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.reading.motors.gearing import Gear
 from calmotion.usd.reading.motors.posed_motors import joint_motions
-from calmotion.usd.transforms import rotation_from_quaternion
 
 if TYPE_CHECKING:
     from pxr import Usd

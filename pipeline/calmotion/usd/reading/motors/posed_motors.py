@@ -12,6 +12,7 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Track
 from calmotion.model.character import Frame
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated import carriers, codes_of, has_splines, moves
@@ -19,7 +20,7 @@ from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints.chains import axis_values
 from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.reading.joints.roots import world_frame, world_side_prim
-from calmotion.usd.transforms import pose_from_matrix, rotation_from_quaternion
+from calmotion.usd.transforms import pose_from_matrix
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:

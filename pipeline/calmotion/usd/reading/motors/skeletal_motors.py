@@ -19,6 +19,7 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Track
 from calmotion.rigging.hinge_rows import follow
+from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated import moves
@@ -26,7 +27,7 @@ from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.motors.driven_motors import SKEL_JOINT, SKELETON, Drive
 from calmotion.usd.reading.motors.posed_motors import GAP_TOLERANCE, TILT_TOLERANCE, joint_motions
 from calmotion.usd.reading.skeletons import BoundSkeleton, bound_skeletons, skeleton_with
-from calmotion.usd.transforms import pose_from_matrix, rotation_from_quaternion
+from calmotion.usd.transforms import pose_from_matrix
 
 if TYPE_CHECKING:
     from pxr import Usd
