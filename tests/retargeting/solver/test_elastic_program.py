@@ -35,3 +35,16 @@ def test_constraints_that_exclude_each_other_are_exceeded_least():
     )  # fmt: skip
     assert least.fun > 0.1
     assert excess.sum() == pytest.approx(least.fun, rel=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(2, 5))
+def test_constraints_far_out_of_reach_have_all_the_multiplier_that_there_is(seed):
+    rng, count, rho = np.random.default_rng(seed), 400, 73.0
+    rows = 40.0 * rng.normal(size=(count, 6))
+    G, low = np.concatenate([rows, -rows]), -380.0 * rng.uniform(size=count)
+    b = np.concatenate([low, 380.0 * rng.uniform(size=count) * (rng.uniform(size=count) < 0.5) - 100.0])
+    H = np.diag(rng.uniform(0.005, 0.02, 6))
+    with np.errstate(all="raise"):
+        found = elastic_minimum(csr_matrix(H), np.zeros(6), csr_matrix(G), b, rho)
+    assert np.all((found.multipliers >= 0.0) & (found.multipliers <= rho * (1.0 + 1e-12)))
+    assert np.all(np.abs(H @ found.x + G.T @ found.multipliers) < 1e-9 * (np.abs(G.T) @ found.multipliers))

@@ -46,10 +46,9 @@ def elastic_minimum(H: csr_matrix, c: Array, G: csr_matrix, b: Array, rho: float
     """
     count, x, Gt = max(1, len(b)), np.zeros(len(c)), csc_matrix(G.T)
     gap = G @ x - b
-    multipliers = np.full(len(b), 0.5 * rho)
+    multipliers = other = np.full(len(b), 0.5 * rho)  # other: rho - multipliers, whose digits a difference would lose
     below, above = np.maximum(-gap, 0.0) + 1.0, np.maximum(gap, 0.0) + 1.0
     for _ in range(ITERATIONS):
-        other = rho - multipliers
         measure = float(below @ multipliers + above @ other) / (2 * count)
         dual = H @ x + c + Gt @ multipliers
         primal = G @ x + below - above - b
@@ -67,8 +66,9 @@ def elastic_minimum(H: csr_matrix, c: Array, G: csr_matrix, b: Array, rho: float
             _longest(below, d_below), _longest(above, d_above),
         )  # fmt: skip
         x = x + length * step
-        multipliers, below, above = (
+        multipliers, other, below, above = (
             multipliers + length * d_multipliers,
+            other - length * d_multipliers,
             below + length * d_below,
             above + length * d_above,
         )
