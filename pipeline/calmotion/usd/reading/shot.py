@@ -29,7 +29,7 @@ from calmotion.usd.reading.motors.holds import held
 from calmotion.usd.reading.motors.motor_limits import free_tracks, with_power
 from calmotion.usd.reading.motors.posed_motors import joint_motions, pose_codes, posed_track
 from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stacks, performed_on, skeletal_tracks
-from calmotion.usd.reading.motors.tracks import read_track, sample_codes
+from calmotion.usd.reading.motors.tracks import read_track, sample_codes, swings
 from calmotion.usd.reading.motors.turns import unwrapped
 from calmotion.usd.reading.motors.undriven_joints import target_positions
 from calmotion.usd.reading.provenance import notes_of_results, provenance_of
@@ -211,8 +211,13 @@ def motor_tracks(
                 ends = np.unique([clock.start, clock.end])
                 tracks[path] = Track(clock.seconds(ends), np.full(len(ends), drive.constant))
     frame = 1.0 / clock.frames_per_second
-    for joint in (drive.joint for drive in drives if drive.joint.path in tracks):
+    for drive in (drive for drive in drives if drive.joint.path in tracks):
+        joint, attribute = drive.joint, drive.attribute(stage)
         tracks[joint.path] = held(unwrapped(tracks[joint.path], joint, reading), frame, joint, reading)
+        if drive.source == DRIVE and attribute.GetNumTimeSamples():
+            reading.notes.extend(
+                swings(attribute.GetPath(), tracks[joint.path], clock, to_si(joint.kind, reading.units))
+            )
     for drive in drives:
         if drive.gear is not None and drive.gear.leader in tracks:
             led = tracks[drive.gear.leader]

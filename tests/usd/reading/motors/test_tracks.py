@@ -94,8 +94,17 @@ def test_samples_between_the_frames_give_a_note(tmp_path):
     assert not any("more samples" in note for note in read(tmp_path)[0].notes)
 
 
-@pytest.mark.parametrize(("keys", "noted"), [({0: 0.0, 4: 70.0, 8: 0.0, 24: 0.0}, True), ({0: 0.0, 24: 40.0}, False)])
+@pytest.mark.parametrize(
+    ("keys", "noted"),
+    [
+        ({0: 0.0, 4: 70.0, 8: 0.0, 24: 1.0}, True),
+        ({0: 0.0, 24: 40.0}, False),
+        ({0: 0.0, 4: 70.0, 8: 0.0, 24: 0.0}, False),
+    ],
+)
 def test_a_smooth_curve_that_swings_far_beyond_sparse_samples_gives_a_note(tmp_path, keys, noted):
+    """And not where equal samples are a hold, in which it stands still."""
+
     def edit(stage):
         drive(stage).Clear()
         for code, value in keys.items():
@@ -105,4 +114,4 @@ def test_a_smooth_curve_that_swings_far_beyond_sparse_samples_gives_a_note(tmp_p
     notes = [note for note in character.notes if "smooth curve" in note]
     assert len(notes) == noted
     if noted:
-        assert notes[0].startswith(f"{ELBOW}.{TARGET_POSITION}: between its samples at time codes 8 and 24 (0 and 0)")
+        assert notes[0].startswith(f"{ELBOW}.{TARGET_POSITION}: between its samples at time codes 8 and 24 (0 and 1)")

@@ -189,17 +189,20 @@ def read_track(attribute: Usd.Attribute, clock: Clock, reading: Reading, to_si: 
         notes.append(f"{path}: its samples do not span the shot; the first and last value are held, as USD does")
     codes = np.concatenate([frames[held[0]], codes, frames[held[1]]])
     values = np.concatenate([np.full(held[0].sum(), values[0]), values, np.full(held[1].sum(), values[-1])])
-    track = Track(clock.seconds(codes), to_si * values)
-    notes.extend(_swings(path, track, codes, to_si, frames))
-    return track
+    return Track(clock.seconds(codes), to_si * values)
 
 
-def _swings(path: Sdf.Path, track: Track, codes: Array, to_si: float, frames: Array) -> list[str]:
-    """A note where the smooth curve swings far beyond two samples between which frames have none."""
-    span = np.ptp(track.values)
-    if len(frames) < 2 or span == 0.0:
+def swings(path: Sdf.Path, track: Track, clock: Clock, to_si: float) -> list[str]:
+    """A note where the smooth curve swings far beyond two samples between which frames have none.
+
+    Args:
+        track: With what its holds need.
+        to_si: Radians, or metres, in its unit.
+    """
+    span, codes = np.ptp(track.values), clock.time_codes(track.times)
+    if len(clock.frame_times()) < 2 or span == 0.0:
         return []
-    wide = np.nonzero(np.diff(codes) > _SPARSE * (frames[1] - frames[0]))[0]
+    wide = np.nonzero(np.diff(track.times) > _SPARSE / clock.frames_per_second)[0]
     curve = interpolate(track, float(track.times[-1]))
     worst = (0.0, 0, 0.0)
     for k in wide:
