@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
@@ -155,11 +154,11 @@ def _representative(context: RunContext) -> CompiledShot:
     from calmotion.simulation import busiest
 
     shot: CompiledShot = context.get(CompiledShot)
-    part = busiest(shot.animation, LONG_SHOT)
-    if part is shot.animation or shot.character.retarget.cyclic:
+    character, part = busiest(shot.character, shot.animation, LONG_SHOT)
+    if part is shot.animation:
         return shot
     context.report("info", f"the shot is long: only its busiest {LONG_SHOT:g} s are simulated")
-    return replace(shot, animation=part)
+    return shot.part(character, part)
 
 
 class EstimateMotorEffects(Operator):
@@ -227,8 +226,7 @@ class CompareWithLimits(Operator):
         from calmotion.simulation import busiest
         from calmotion.tolerance import exceeded_limits
 
-        character, animation = context.get(Character), context.get(Animation)
-        part = animation if character.retarget.cyclic else busiest(animation, LONG_SHOT)
+        character, part = busiest(context.get(Character), context.get(Animation), LONG_SHOT)
         return [exceeded_limits(character, part, run_settings(context.get(Source)))]
 
 

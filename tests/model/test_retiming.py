@@ -20,7 +20,7 @@ def animation(rate=1.0):
     tracks = (Track(times, np.sin(4.0 * FRAMES)),)
     return Animation(
         times, tracks, tracks, (root,), (WeightTrack(0, False, times[[3, 9]], np.array([1.0, 0.5])),),
-        (FreeTrack(0, times[[0, 12]], np.array([True, False])),),
+        (FreeTrack(times[[0, 12]], np.array([True, False]), 0),),
     )  # fmt: skip
 
 

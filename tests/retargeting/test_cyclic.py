@@ -90,7 +90,7 @@ def test_options_that_do_not_fit_a_cyclic_shot_are_refused(looping, dance, bodie
 
 
 def test_a_range_locked_at_the_seam_is_locked_on_both_sides_of_it(looping, dance, bodies):
-    locks = (FreeTrack(0, np.array([0.0, 0.1]), np.array([False, True])),)
+    locks = (FreeTrack(np.array([0.0, 0.1]), np.array([False, True]), 0),)
     found = optimize_shot(
         compile_shot(looping, dataclasses.replace(dance, free=locks), bodies), OPTIONS, ignore_progress
     )

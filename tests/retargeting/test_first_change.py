@@ -24,7 +24,7 @@ def held(seconds):
 
 
 def test_a_locked_beginning_is_left_out_and_the_result_is_the_same(arm, bodies, monkeypatch):
-    locks = tuple(FreeTrack(k, np.array([0.0, 0.52]), np.array([False, True])) for k in range(2))
+    locks = tuple(FreeTrack(np.array([0.0, 0.52]), np.array([False, True]), k) for k in range(2))
     animation, firsts, held_back = dataclasses.replace(held(0.8), free=locks), [], RetargetSearch._held
     with monkeypatch.context() as patch:
         patch.setattr(RetargetSearch, "_held", lambda self, first: (firsts.append(first), held_back(self, first)))

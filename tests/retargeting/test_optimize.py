@@ -130,7 +130,7 @@ def test_locked_motors_keep_their_curves(arm, animation, bodies):
 
 
 def test_a_range_in_which_a_motor_is_locked_keeps_its_curve(arm, animation, bodies):
-    lock = FreeTrack(0, np.array([0.0, 0.5, 1.0]), np.array([True, False, True]))
+    lock = FreeTrack(np.array([0.0, 0.5, 1.0]), np.array([True, False, True]), 0)
     result = optimize_shot(compile_shot(arm, dataclasses.replace(animation, free=(lock,)), bodies), OPTIONS, checked)
     before, after = result.before.motion, result.after.motion
     inside = (after.times >= 0.5) & (after.times <= 1.0)
@@ -138,7 +138,7 @@ def test_a_range_in_which_a_motor_is_locked_keeps_its_curve(arm, animation, bodi
     assert np.abs(after.motor_values[~inside, 0] - before.motor_values[~inside, 0]).max() > 1e-4
     assert judged(result.after)[1] < judged(result.before)[1]
     with pytest.raises(ShotError, match="every motor is locked"):
-        locks = tuple(FreeTrack(k, np.array([0.0]), np.array([False])) for k in range(2))
+        locks = tuple(FreeTrack(np.array([0.0]), np.array([False]), k) for k in range(2))
         optimize_shot(compile_shot(arm, dataclasses.replace(animation, free=locks), bodies), OPTIONS, checked)
 
 

@@ -81,18 +81,37 @@ class WeightTrack:
 
 
 @dataclass(frozen=True, eq=False)
-class FreeTrack:
+class Schedule:
+    """When something holds that comes and goes.
+
+    Attributes:
+        times: [s] after the first frame of the shot, strictly increasing, shape [k].
+        active: Whether it holds from each time on, and before the first as from it, shape [k], bool.
+    """
+
+    times: Array
+    active: BoolArray
+
+    def holds_at(self, time: float) -> bool:
+        """Whether it holds from a time [s] on."""
+        return bool(self.held(np.array([time + 1e-9]))[0])
+
+    def held(self, times: Array) -> BoolArray:
+        """Whether it holds at each of some times [s], none of which is one at which it comes or goes."""
+        at = np.maximum(np.searchsorted(self.times, times, "right") - 1, 0)
+        held: BoolArray = self.active[at]
+        return held
+
+
+@dataclass(frozen=True, eq=False)
+class FreeTrack(Schedule):
     """When a motor's curve may be changed.
 
     Attributes:
         motor: Index of the motor.
-        times: [s] after the first frame of the shot, strictly increasing, shape [k].
-        free: Whether it may be changed from each time on, and before the first as from it, shape [k], bool.
     """
 
-    motor: int
-    times: Array
-    free: BoolArray
+    motor: int = -1
 
     def locked(self, end: float) -> list[tuple[float, float]]:
         """The ranges of the shot, up to its end [s], in which the curve is kept."""
@@ -100,8 +119,8 @@ class FreeTrack:
         ends = [*self.times[1:], np.inf]
         return [
             (max(start, 0.0), min(stop, end))
-            for start, stop, free in zip(starts, ends, self.free, strict=True)
-            if not free and start < end and stop > 0.0
+            for start, stop, active in zip(starts, ends, self.active, strict=True)
+            if not active and start < end and stop > 0.0
         ]
 
 
@@ -127,29 +146,6 @@ class Animation:
     weights: tuple[WeightTrack, ...] = ()
     free: tuple[FreeTrack, ...] = ()
     tempo: TimeMap | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Schedule:
-    """When something holds that comes and goes.
-
-    Attributes:
-        times: [s] after the first frame of the shot, strictly increasing, shape [k].
-        active: Whether it holds from each time on, and before the first as from it, shape [k], bool.
-    """
-
-    times: Array
-    active: BoolArray
-
-    def holds_at(self, time: float) -> bool:
-        """Whether it holds from a time [s] on."""
-        return bool(self.held(np.array([time + 1e-9]))[0])
-
-    def held(self, times: Array) -> BoolArray:
-        """Whether it holds at each of some times [s], none of which is one at which it comes or goes."""
-        at = np.maximum(np.searchsorted(self.times, times, "right") - 1, 0)
-        held: BoolArray = self.active[at]
-        return held
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline, PPoly
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from calmotion.arrays import Array
-from calmotion.model.animation import Animation, Contact, FreeTrack, MovingFrame, Schedule, Track
+from calmotion.model.animation import Animation, Contact, MovingFrame, Schedule, Track
 from calmotion.model.character import Character
 from calmotion.model.result import MotorCurve, Result
 from calmotion.model.tempo import TimeMap
@@ -204,15 +204,19 @@ def retimed(animation: Animation, tempo: TimeMap, frame_times: Array) -> Animati
     return Animation(
         frame_times, tracks, current, tuple(frame(moving) for moving in animation.moving),
         tuple(replace(weight, times=tempo.performed(weight.times)) for weight in animation.weights),
-        tuple(FreeTrack(track.motor, tempo.performed(track.times), track.free) for track in animation.free), tempo,
+        tuple(replace(free, times=tempo.performed(free.times)) for free in animation.free), tempo,
     )  # fmt: skip
 
 
-def with_schedules_at(character: Character, tempo: TimeMap) -> Character:
-    """The character whose feet come and go, and whose motors are switched, at a tempo."""
+def with_schedules_at(character: Character, moved: Callable[[Array], Array]) -> Character:
+    """The character whose feet come and go, and whose motors are switched, at other times.
+
+    Args:
+        moved: Maps times of the shot [s], shape [k], to when it happens.
+    """
 
     def at(schedule: _Schedule) -> _Schedule:
-        return None if schedule is None else replace(schedule, times=tempo.performed(schedule.times))
+        return None if schedule is None else replace(schedule, times=moved(schedule.times))
 
     joints = tuple(replace(joint, contact=at(joint.contact)) for joint in character.joints)
     motors = tuple(replace(motor, powered=at(motor.powered)) for motor in character.motors)

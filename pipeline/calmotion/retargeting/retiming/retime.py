@@ -176,7 +176,7 @@ class _Performance:
         tempo = found.map or TimeMap(given.times, given.times)
         frames = np.arange(found.frames, dtype=np.float64) * given.frame
         performed = retimed(made.animation, tempo, frames)
-        performance = Retimed(performed, with_schedules_at(made.character, tempo), found.report)
+        performance = Retimed(performed, with_schedules_at(made.character, tempo.performed), found.report)
         return cls(made.character, performance, made.at(performance))
 
     def with_curves(self, result: Result) -> _Performance:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
 from calmotion.arrays import Array, BoolArray, IntArray
-from calmotion.model import Animation, FreeTrack
-from calmotion.model.curves import Sample, held_curve
+from calmotion.model import Animation, Character
+from calmotion.model.curves import Sample, held_curve, with_schedules_at
 
 MAX_STEP = 1.0 / 480.0
 ORDERS = 4  # a curve and its first three derivatives
@@ -138,21 +138,22 @@ def later(animation: Animation, start: float, frame_times: Array) -> Animation:
         replace(track, times=track.times - start, corners=track.corners - start) for track in animation.tracks
     )
     weights = tuple(replace(weight, times=weight.times - start) for weight in animation.weights)
-    free = tuple(FreeTrack(track.motor, track.times - start, track.free) for track in animation.free)
+    free = tuple(replace(free, times=free.times - start) for free in animation.free)
     moving = tuple(replace(frame, times=frame.times - start) for frame in animation.moving)
     return Animation(frame_times, tracks, tracks, moving, weights, free)
 
 
-def busiest(animation: Animation, seconds: float) -> Animation:
-    """The part of so many seconds around the largest accelerations of the motors, as they were animated; the animation
-    itself where it is no longer."""
+def busiest(character: Character, animation: Animation, seconds: float) -> tuple[Character, Animation]:
+    """The part of a shot of so many seconds around the largest accelerations of the motors, as they were animated; the
+    same objects where it is no longer, or cyclic."""
     times = animation.frame_times
-    if len(times) < 2 or times[-1] <= seconds or not animation.tracks:
-        return animation
+    if len(times) < 2 or times[-1] <= seconds or not animation.tracks or character.retarget.cyclic:
+        return character, animation
     values = np.stack([held_curve(track, times[-1])(times, 2) for track in animation.tracks], axis=1)
     shares = values / np.maximum(np.abs(values).max(axis=0), 1e-12)  # a slide and a hinge count alike
     brief = max(1, round(_BRIEF / times[1]))
     means = np.convolve(np.sum(shares**2, axis=1), np.ones(brief), "same")
     count = round(seconds / times[1])
     first = int(np.clip(int(np.argmax(means)) - count // 2, 0, len(times) - 1 - count))
-    return later(animation, float(times[first]), times[: count + 1])
+    start = float(times[first])
+    return with_schedules_at(character, lambda at: at - start), later(animation, start, times[: count + 1])

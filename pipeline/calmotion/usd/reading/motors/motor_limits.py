@@ -150,7 +150,7 @@ def free_tracks(stage: Usd.Stage, motors: Sequence[Motor], clock: Clock) -> tupl
     for index, motor in enumerate(motors):
         free = schedule_of(stage.GetPrimAtPath(motor.prim_path), _SCHEMA, _FREE, clock)
         if len(set(free.active.tolist())) > 1:
-            ranges.append(FreeTrack(index, free.times, free.active))
+            ranges.append(FreeTrack(free.times, free.active, index))
     return tuple(ranges)
 
 
