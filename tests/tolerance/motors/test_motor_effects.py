@@ -9,9 +9,13 @@ from calmotion.model import Animation, Track
 from calmotion.model.character import motors_give, with_ideal_motors
 from calmotion.model.motor import Rotor
 from calmotion.model.run import RunSettings
+from calmotion.multibody.analysis.kinematics import rigid_state
+from calmotion.multibody.failure import Reason, SimulationFailure
+from calmotion.multibody.model.model import rigid_model
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
+from calmotion.tolerance.motors import motor_effects
 from calmotion.tolerance.motors.motor_effects import effects_of_gains, with_error_shares
 from made_shots import plastic_shot
 
@@ -89,6 +93,20 @@ def test_motors_cause_all_of_the_error_of_rigid_links_and_ideal_ones_none():
     assert shares.links_m[0] < 1e-3 * shares.motors_m[0]
     ideal = shot(with_ideal_motors(with_gains("drive")))
     assert with_error_shares(ideal, result, OPTIONS, quiet) is result and not motors_give(ideal.character)
+
+
+def test_where_rigid_links_cannot_be_simulated_the_result_is_told_without_these_parts(flexible_arm, monkeypatch):
+    """Their last state has no elastic coordinates, as that of the robot has."""
+    motors = tuple(replace(m, model="drive", position_gain=K, velocity_gain=D) for m in flexible_arm.character.motors)
+    drives = compile_shot(replace(flexible_arm.character, motors=motors), flexible_arm.animation, flexible_arm.bodies)
+    result = simulate_shot(drives, OPTIONS, quiet)
+
+    def failing(model, *given, **options):
+        raise SimulationFailure(0.1, 0, Reason.DIVERGED, rigid_state(rigid_model(model), np.zeros(len(motors))))
+
+    monkeypatch.setattr(motor_effects, "run_forward", failing)
+    assert with_error_shares(drives, result, OPTIONS, quiet) is result
+    assert effects_of_gains(drives, OPTIONS) is None
 
 
 @pytest.mark.parametrize("model", ["drive", "servo"])

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.errors import ShotError
+from calmotion.errors import IntegrationError, ShotError
 from calmotion.model import Result
 from calmotion.model.character import Character, motors_give, with_ideal_motors
 from calmotion.model.motor import PRESCRIBED
@@ -22,7 +22,7 @@ from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.preparation import Prepared, failure_error, prepare
+from calmotion.simulation.preparation import Prepared, prepare
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.tolerance.integrator_choice import by_fast_scheme
 from calmotion.tolerance.simulation import own_step
@@ -49,17 +49,10 @@ def effects_of_gains(shot: CompiledShot, options: RunSettings) -> MotorEffects |
         return None
     options = replace(options, step=own_step(character, options))
     prepared = prepare(shot, options)
-
-    def simulated(model: Model, options: RunSettings) -> Array:
-        try:
-            return _errors(prepared, model, options)
-        except SimulationFailure as failure:
-            raise failure_error(prepared, failure) from failure
-
     found = []
     for model in (_giving_model(shot, character), _with_ideal_motors(shot)):
         try:
-            errors = by_fast_scheme(options, partial(simulated, model))
+            errors = by_fast_scheme(options, partial(_errors, prepared, model))
         except ShotError:
             return None
         lag = errors[prepared.grid.judged].max(axis=0, initial=0.0)
@@ -77,10 +70,8 @@ def _giving_model(shot: CompiledShot, character: Character) -> Model:
 
 def with_error_shares(shot: CompiledShot, result: Result, options: RunSettings, progress: Progress) -> Result:
     """The result with the parts of the motors and of the links in the error of the animated curves: what is left of it
-    where the other of the two is ideal. The result itself where motors are ideal, or its input is no animation.
-
-    Raises:
-        ShotError: One of these robots cannot be simulated.
+    where the other of the two is ideal. The result itself where motors are ideal, where its input is no animation, or
+    where one of these robots cannot be simulated, though the robot itself was.
     """
     character, animation = shot.character, shot.animation
     if not motors_give(character) or (result.after is None and animation.current is not animation.tracks):
@@ -88,17 +79,15 @@ def with_error_shares(shot: CompiledShot, result: Result, options: RunSettings, 
     progress(0.99, "the parts of motors and links in the error")
     of_step = replace(options, step=result.step_s)
 
-    def largest(options: RunSettings, rigid: bool) -> Array:
+    def largest(model: Model, options: RunSettings) -> Array:
         prepared = prepare(shot, options)
-        links = rigid_model(shot.model)
-        model = with_drives(links, character.motors) if rigid else _with_ideal_motors(shot)
-        try:
-            return np.asarray(_errors(prepared, model, options)[prepared.grid.judged].max(axis=0, initial=0.0))
-        except SimulationFailure as failure:
-            raise failure_error(prepared, failure) from failure
+        return np.asarray(_errors(prepared, model, options)[prepared.grid.judged].max(axis=0, initial=0.0))
 
-    motors = by_fast_scheme(of_step, lambda options: largest(options, True))
-    links = by_fast_scheme(of_step, lambda options: largest(options, False))
+    models = with_drives(rigid_model(shot.model), character.motors), _with_ideal_motors(shot)
+    try:
+        motors, links = (by_fast_scheme(of_step, partial(largest, model)) for model in models)
+    except ShotError:
+        return result
     return replace(result, error_shares=ErrorShares(motors, links))
 
 
@@ -107,11 +96,21 @@ def _with_ideal_motors(shot: CompiledShot) -> Model:
 
 
 def _errors(prepared: Prepared, model: Model, options: RunSettings) -> Array:
-    """Distances of the targets from what is intended while a model follows the animated curves [m], shape [T, K]."""
+    """Distances of the targets from what is intended while a model follows the animated curves [m], shape [T, K].
+
+    Raises:
+        ShotError: The model cannot be simulated.
+    """
     grid, tracks = prepared.grid, prepared.shot.animation.tracks
     angles, rates = sample_tracks(tracks, grid)
     workspace = Workspace.for_system(model.system)
     steady = SteadyState(model, prepared.world, grid.h, workspace) if grid.cyclic else None
-    run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, integrator=options.scheme, steady=steady)
+    try:
+        run = run_forward(
+            model, workspace, angles, rates, grid.h, prepared.world, integrator=options.scheme, steady=steady
+        )
+    except SimulationFailure as failure:
+        # never shown: both callers go on without it
+        raise IntegrationError(str(failure), path=prepared.character.path) from failure
     intended = intended_motion(prepared, angles, rates)
     return np.asarray(np.linalg.norm(run.target_positions - intended.target_positions, axis=2))
