@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
@@ -154,11 +155,11 @@ def _representative(context: RunContext) -> CompiledShot:
     from calmotion.simulation import busiest
 
     shot: CompiledShot = context.get(CompiledShot)
-    character, part = busiest(shot.character, shot.animation, LONG_SHOT)
+    part = busiest(shot.character, shot.animation, LONG_SHOT)
     if part is shot.animation:
         return shot
     context.report("info", f"the shot is long: only its busiest {LONG_SHOT:g} s are simulated")
-    return shot.part(character, part)
+    return replace(shot, animation=part)
 
 
 class EstimateMotorEffects(Operator):
@@ -226,7 +227,8 @@ class CompareWithLimits(Operator):
         from calmotion.simulation import busiest
         from calmotion.tolerance import exceeded_limits
 
-        character, part = busiest(context.get(Character), context.get(Animation), LONG_SHOT)
+        character = context.get(Character)
+        part = busiest(character, context.get(Animation), LONG_SHOT)
         return [exceeded_limits(character, part, run_settings(context.get(Source)))]
 
 

@@ -58,10 +58,6 @@ class CompiledShot:
         """The same shot with other reductions of its bodies."""
         return compile_shot(self.character, self.animation, bodies)
 
-    def part(self, character: Character, animation: Animation) -> CompiledShot:
-        """The same bodies in a part of the shot, at whose begin other feet may stand and other motors be on."""
-        return compile_shot(character, animation, self._system.given)
-
     def with_character(self, character: Character) -> CompiledShot:
         """The same system with a character of other settings: motors that may change, limits, weights of the search."""
         return replace(self, character=character)
@@ -71,11 +67,11 @@ class _System:
     """The compiled system of a shot."""
 
     def __init__(self, character: Character, moving: Sequence[int], bodies: Sequence[ReducedBody] | None):
-        self._character, self._moving, self.given = character, moving, bodies
+        self._character, self._moving, self._bodies = character, moving, bodies
 
     def __getstate__(self) -> dict[str, object]:
         """What another process compiles it from: a compiled model holds addresses of this one's memory."""
-        return {"_character": self._character, "_moving": self._moving, "given": self.given}
+        return {"_character": self._character, "_moving": self._moving, "_bodies": self._bodies}
 
     @cached_property
     def tree(self) -> Tree:
@@ -87,7 +83,7 @@ class _System:
     def bodies(self) -> tuple[ReducedBody, ...]:
         from calmotion.simulation.bodies import reduce_bodies
 
-        return tuple(reduce_bodies(self._character, self.tree, None) if self.given is None else self.given)
+        return tuple(reduce_bodies(self._character, self.tree, None) if self._bodies is None else self._bodies)
 
     @cached_property
     def model(self) -> Model:

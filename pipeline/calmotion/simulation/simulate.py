@@ -51,13 +51,16 @@ def shape_tracks(shot: CompiledShot, options: RunSettings, kind: str, cutoff: fl
         cutoff: Of the low-pass filter, over the lowest frequency.
 
     Raises:
-        ShotError: There is no such shaper, nothing to shape for, or contacts that come and go.
+        ShotError: There is no such shaper, nothing to shape for, or contacts that come and go, or motors that are
+            switched.
     """
-    contacts = contact_joints(shot.character)
-    if contacts:
+    character = shot.character
+    changing = [character.joints[joint].path for joint in contact_joints(character)]
+    changing += [motor.path for motor in character.motors if motor.powered is not None]
+    if changing:
         raise ShotError(
-            "a shaper delays the motion, and the contacts with the ground would not be",
-            path=shot.character.joints[contacts[0]].path,
+            "a shaper delays the motion, and contacts with the ground and switches of motors would not be",
+            path=changing[0],
             attribute="--shaper",
             found=kind,
             remedy="Leave it out; calmotion optimize calms the motion without a delay.",

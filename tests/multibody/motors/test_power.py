@@ -184,6 +184,11 @@ def test_its_times_follow_the_tempo(shot):
     assert slower.joints[0].contact is None
 
 
+def test_a_shaper_would_not_delay_its_times(shot):
+    with pytest.raises(ShotError, match="/Robot/Hinge.*would not be"):
+        cm.simulate(cm.open_shot(shot), shaper="zv")
+
+
 def never_on(prim):
     prim.GetAttribute("calm:motor:powered").Clear()
     prim.GetAttribute("calm:motor:powered").Set(False)

@@ -10,7 +10,8 @@ from numpy.polynomial.polynomial import polyder, polyval
 
 from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.model import Animation, Character
-from calmotion.model.curves import Sample, held_curve, with_schedules_at
+from calmotion.model.character import contact_joints
+from calmotion.model.curves import Sample, held_curve
 
 MAX_STEP = 1.0 / 480.0
 ORDERS = 4  # a curve and its first three derivatives
@@ -143,17 +144,20 @@ def later(animation: Animation, start: float, frame_times: Array) -> Animation:
     return Animation(frame_times, tracks, tracks, moving, weights, free)
 
 
-def busiest(character: Character, animation: Animation, seconds: float) -> tuple[Character, Animation]:
-    """The part of a shot of so many seconds around the largest accelerations of the motors, as they were animated; the
-    same objects where it is no longer, or cyclic."""
+def busiest(character: Character, animation: Animation, seconds: float) -> Animation:
+    """The part of a shot of so many seconds around the largest accelerations of the motors, as they were animated.
+
+    The animation itself where it is no longer, where it loops, and where feet come and go or motors are switched: what
+    stands, and where, follows from all that was before.
+    """
     times = animation.frame_times
-    if len(times) < 2 or times[-1] <= seconds or not animation.tracks or character.retarget.cyclic:
-        return character, animation
+    changing = contact_joints(character) or any(motor.powered is not None for motor in character.motors)
+    if len(times) < 2 or times[-1] <= seconds or not animation.tracks or character.retarget.cyclic or changing:
+        return animation
     values = np.stack([held_curve(track, times[-1])(times, 2) for track in animation.tracks], axis=1)
     shares = values / np.maximum(np.abs(values).max(axis=0), 1e-12)  # a slide and a hinge count alike
     brief = max(1, round(_BRIEF / times[1]))
     means = np.convolve(np.sum(shares**2, axis=1), np.ones(brief), "same")
     count = round(seconds / times[1])
     first = int(np.clip(int(np.argmax(means)) - count // 2, 0, len(times) - 1 - count))
-    start = float(times[first])
-    return with_schedules_at(character, lambda at: at - start), later(animation, start, times[: count + 1])
+    return later(animation, float(times[first]), times[: count + 1])
