@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from calmotion.support import read_toml
 from calmotion.workflow import Shot
 
 AT_REST = 0.02  # of the fastest motor of a clip: a slower one rests
+AT_ONE_PLACE = 1e-9  # by which a root and its quaternion may change where it stands still [m]
 SHORTEST = 0.5  # transition [s], unless the file says otherwise
 MARGIN = 0.9  # of limits and of the clips' own speeds, that a transition uses
 _NAME = re.compile(r"[A-Za-z0-9][\w-]*")
@@ -108,7 +109,8 @@ def read_clips(plan: Plan, plugins: Sequence[str] = ()) -> list[Clip]:
     """Read all clips.
 
     Raises:
-        ShotError: A clip cannot be processed, does not begin and end at rest, repeats itself, or is of another robot.
+        ShotError: A clip cannot be processed, does not begin and end at rest, repeats itself, is of another robot, or
+            animates more than motors.
     """
     clips = [_clip(name, Shot(path, plugins=plugins).read()) for name, path in plan.clips.items()]
     first = clips[0].shot
@@ -128,7 +130,36 @@ def read_clips(plan: Plan, plugins: Sequence[str] = ()) -> list[Clip]:
                 found=f"{clip.shot.character.path} with {len(clip.shot.motors)} motors",
                 remedy=f"Use shots of {first.character.path} with the motors of {first.path}",
             )
+    for clip in clips:
+        for path, attribute in _besides_motors(clip.shot):
+            raise ShotError(
+                "transitions are motions of motors, and more than motors is animated in this clip",
+                path=path,
+                attribute=attribute,
+                found=clip.shot.path,
+                remedy="Remove its samples, so that it is the same in the whole clip, or leave out the clip",
+            )
     return clips
+
+
+def _besides_motors(shot: Shot) -> Iterator[tuple[str, str]]:
+    """What changes in a clip besides the motors, as prims and attributes: a transition would have all that as it is at
+    the beginning of the clip before."""
+    character, animation = shot.character, shot.animation
+    for frame in animation.moving:
+        if max(np.ptp(frame.positions, axis=0).max(), np.ptp(frame.rotations, axis=0).max()) > AT_ONE_PLACE:
+            yield character.joints[frame.joint].path, "physics:body0"
+    for joint in character.joints:
+        if joint.contact is not None and len(set(joint.contact.active.tolist())) > 1:
+            yield joint.path, "calm:contact:active"
+    for motor in character.motors:
+        if motor.powered is not None:
+            yield motor.prim_path, "calm:motor:powered"
+    for free in animation.free:
+        yield character.motors[free.motor].prim_path, "calm:motor:optimize"
+    for weight in animation.weights:
+        name = "rotationWeight" if weight.rotation else "positionWeight"
+        yield character.targets[weight.target].path, f"calm:target:{name}"
 
 
 def _clip(name: str, shot: Shot) -> Clip:

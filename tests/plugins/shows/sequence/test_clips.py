@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion_plugins.shows.sequence.clips import pace_of, read_clips, read_plan, transition
-from one_hinge import HINGE, ONE_HINGE
+from one_hinge import HINGE, ONE_HINGE, TIP
+
+FREE = "calm:motor:optimize"
+MOTOR = '(prepend apiSchemas = ["PhysicsDriveAPI:angular"])\n    {'
+MOTORS = '(prepend apiSchemas = ["PhysicsDriveAPI:angular", "CalmMotorAPI"])\n    {'
+PLACE = "            double3 xformOp:translate = (0.1, 0, 0)\n"
 
 
 def clip_text(first, last):
@@ -90,3 +95,46 @@ def test_clips_that_cannot_follow_one_another_are_refused(plan_file, change, pro
     with pytest.raises(ShotError, match=problem) as error:
         read_clips(read_plan(plan_file))
     assert error.value.path.endswith("b.usda") and error.value.remedy
+
+
+SERVO = """
+        float drive:angular:physics:stiffness = 500
+        float drive:angular:physics:damping = 5
+        uniform token calm:motor:model = "servo"
+        bool calm:motor:powered.timeSamples = { 0: 1, 12: 0, 14: 1 }
+"""
+ROOT = """
+    def Xform "Base"
+    {
+        double3 xformOp:translate.timeSamples = { 0: (0, 0, 0), 24: (1, 0, 0) }
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+    }
+"""
+ON_BASE = "        rel physics:body0 = </Robot/Base>\n"
+WEIGHT = "            double calm:target:positionWeight.timeSamples = { 0: 1, 12: 2 }\n"
+
+
+@pytest.mark.parametrize(
+    ("change", "path", "attribute"),
+    [
+        (lambda t: t.replace(MOTOR, f"{MOTORS}\n        bool {FREE}.timeSamples = {{ 0: 1, 12: 0 }}"), HINGE, FREE),
+        (lambda t: t.replace(MOTOR, MOTORS + SERVO), HINGE, "calm:motor:powered"),
+        (lambda t: t.replace(PLACE, WEIGHT + PLACE), TIP, "calm:target:positionWeight"),
+        (
+            lambda t: t.replace(
+                '    def PhysicsRevoluteJoint "Hinge"', ROOT + '    def PhysicsRevoluteJoint "Hinge"'
+            ).replace("        rel physics:body1", ON_BASE + "        rel physics:body1"),
+            HINGE,
+            "physics:body0",
+        ),
+    ],
+)
+def test_clips_in_which_more_than_motors_is_animated_are_refused(plan_file, change, path, attribute):
+    """A transition would have it as at the beginning of the clip that it follows."""
+    clip = plan_file.with_name("b.usda")
+    text = change(clip.read_text())
+    assert text != clip.read_text()
+    clip.write_text(text)
+    with pytest.raises(ShotError, match="more than motors") as error:
+        read_clips(read_plan(plan_file))
+    assert (error.value.path, error.value.attribute) == (path, attribute) and error.value.found.endswith("b.usda")
