@@ -279,11 +279,16 @@ class _Exporter:
         exact = self._loss(written.exact, step)
         loss = self._loss(written.read, step, given.delay) if given.delay else rounded
         lowest = self._lowest(loss) if search else None
+        switched = [motor.path for motor in compiled.character.motors if motor.powered is not None]
+        notes = written.notes
+        if switched:
+            what = f"calm:motor:powered switches {', '.join(switched)} off and on, which the file does not say"
+            notes += (f"{what}; its player has to do so at the same times, and the loss is that of a player that does",)
         names = {motor.path: name for motor, name in zip(self._curves.motors, self._curves.names, strict=True)}
         return Export(
             given.format, written.files, given.rate, given.delay, written, targets, loss, exact, rounded,
             self._playback.fastest(step), lowest, tolerance, self._allowed, step, self._playback.simulations, names,
-            search, 0.0, written.notes,
+            search, 0.0, notes,
         )  # fmt: skip
 
     def _loss(self, commands: Commands, step: float, delay: float = 0.0) -> Loss:

@@ -70,6 +70,14 @@ def refuse_unfit(shot: CompiledShot, settings: LiveSettings) -> None:
             path=character.joints[contacts[0]].path,
             remedy="Fix the feet to the ground, or use calmotion optimize on the whole motion.",
         )
+    coupled = [motor.path for motor in character.motors if motor.turns_with is not None]
+    if coupled:
+        raise ShotError(
+            "the live model has no motor that two joints turn",
+            path=coupled[0],
+            attribute="calm:motor:coupledTo",
+            remedy="Remove it if its effect is small, or use calmotion optimize on the whole motion.",
+        )
     if not 10.0 <= settings.rate <= 2000.0:
         raise SettingError(
             "the rate is no rate of commands",
@@ -99,6 +107,9 @@ def notes_of(shot: CompiledShot, forces: VelocityForces) -> tuple[str, ...]:
     if free:
         names = ", ".join(free) if len(free) < len(shot.character.motors) or len(free) < 4 else "all of them"
         found.append(f"a jump is played within a tick by motors without a limit of speed: {names}")
+    switched = [motor.path.rpartition("/")[2] for motor in shot.character.motors if motor.powered is not None]
+    if switched:
+        found.append(f"motors that the shot switches off (calm:motor:powered) stay on: {', '.join(switched)}")
     delays = {motor.delay for motor in shot.character.motors if motor.model != PRESCRIBED}
     if len(delays) > 1:
         found.append("motors with different delays are taken as if all had the longest")

@@ -52,7 +52,9 @@ from calmotion.model.motor import SERVO as SERVO
 from calmotion.model.motor import Follows as Follows
 from calmotion.model.motor import Motor as Motor
 from calmotion.model.motor import Rotor as Rotor
+from calmotion.model.motor import TurnsWith as TurnsWith
 from calmotion.model.motor import measure_of as measure_of
+from calmotion.model.motor import rotor_angles as rotor_angles
 from calmotion.model.outputs import CsvFile as CsvFile
 from calmotion.model.outputs import ExceededLimits as ExceededLimits
 from calmotion.model.outputs import Figures as Figures

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from calmotion.arrays import Array
 from calmotion.model.animation import Schedule
 
 PRESCRIBED, DRIVE, SERVO = MODELS = ("prescribed", "drive", "servo")  # models of motors
@@ -216,6 +218,29 @@ class Follows:
     offset: float
 
 
+class TurnsWith(NamedTuple):
+    """A motor that another joint turns too, through its gearing, as in the wrists of many arms: seen at its own joint,
+    its rotor turns by joint + ratio * other joint, and it pulls at the other joint by ratio times its own effort.
+
+    Attributes:
+        other: Index of that joint's motor.
+        ratio: [-].
+    """
+
+    other: int
+    ratio: float
+
+
+def rotor_angles(motors: Sequence[Motor], joint_values: Array) -> Array:
+    """How far the rotors of motors with rigid gears have turned, seen at their joints, shape [..., M], where the joints
+    stand at values of shape [..., M] [rad or m]."""
+    found = joint_values.copy()
+    for k, motor in enumerate(motors):
+        if motor.turns_with is not None:
+            found[..., k] += motor.turns_with.ratio * joint_values[..., motor.turns_with.other]
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Motor:
     """A driven joint.
@@ -245,6 +270,7 @@ class Motor:
         backlash: Play between the motor and the joint, from one end to the other [rad]; it is not simulated.
         kind: Name of the real motor that it is, or empty; its rotor is then known, whatever the model.
         powered: When a SERVO is on, as it is at the first frame; off, it exerts no torque. None: always.
+        turns_with: The other joint that turns it; None: its own alone.
     """
 
     joint: int
@@ -269,6 +295,7 @@ class Motor:
     backlash: float = 0.0
     kind: str = ""
     powered: Schedule | None = None
+    turns_with: TurnsWith | None = None
 
     def with_gain(self, position_gain: float) -> Motor:
         """The motor with another position gain; where it is fed with a voltage, with a winding that makes it so: the

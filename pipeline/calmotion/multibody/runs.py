@@ -62,7 +62,7 @@ class ModelRun:
     def efforts(self) -> Array:
         """Of the motors [N m or N], shape [T, M]."""
         found = reactions(self.model.system, self.trajectory, self.joint_values, self.joint_rates)
-        return self.model.motor_values(found.efforts)
+        return self.model.motor_efforts(found.efforts)
 
 
 def simulate(model: Model, values: Array, rates: Array, step: float, integrator: str = "bdf2") -> ModelRun:
@@ -131,7 +131,7 @@ class LinearizedRun:
         each, from its derivative by the targets' frames, shape [T, K, 6]."""
         by_component = of_components(self.run.model, self._by_coordinates, gradient)
         by_value, by_rate = adjoint(self._linearization, by_component)
-        return self.run.model.motor_values(by_value), self.run.model.motor_values(by_rate)
+        return self.run.model.by_inputs(by_value), self.run.model.by_inputs(by_rate)
 
 
 def linearize(run: ModelRun) -> LinearizedRun:

@@ -88,7 +88,7 @@ class PerformedCurves:
     def efforts(self) -> Array:
         """Of the motors in the run, shape [T, M]."""
         found = reactions(self.model.system, self.run.trajectory, self.run.joint_angles, self.run.joint_rates)
-        return self.model.motor_values(found.efforts)
+        return self.model.motor_efforts(found.efforts)
 
 
 def limited_values(model: Model, names: Collection[str], curves: Curves, run: ForwardRun) -> dict[str, Array]:

@@ -32,7 +32,7 @@ def rigid_motion(
             raise
         states = run.trajectory.states
         return IntendedMotion(states.c, states.q, run.target_positions, run.target_rotations)
-    c, q = rigid_poses(rigid, model.joint_angles(angles), world)
+    c, q = rigid_poses(rigid, rigid.joint_angles(angles), world)
     positions, rotations = target_frames(rigid, c, q, np.zeros(c.shape[:2] + (0,)))
     return IntendedMotion(c, q, positions, rotations)
 
@@ -42,7 +42,7 @@ def rigid_targets(model: Model, angles: Array, world: Array | None = None) -> Ar
     rigid = rigid_model(model)
     if np.any(moves_freely(rigid)):
         return None
-    c, q = rigid_poses(rigid, model.joint_angles(angles), world)
+    c, q = rigid_poses(rigid, rigid.joint_angles(angles), world)
     positions, _ = target_frames(rigid, c, q, np.zeros(c.shape[:2] + (0,)))
     return positions
 

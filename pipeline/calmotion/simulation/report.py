@@ -36,15 +36,12 @@ def elastic_by_body(model: Model, u: Array) -> tuple[Array, ...]:
     return tuple(u[:, component[b], : model.system.modes[component[b]]].copy() for b in range(len(component)))
 
 
-def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int, joints: int) -> Motion:
+def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, joints: int) -> Motion:
     states = run.trajectory.states
     shown = _shown(grid)
     elastic = elastic_by_body(model, states.u[shown])
     found = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates)
-    efforts = np.zeros((len(states.c), motors))
-    for k, motor in enumerate(model.motor):
-        if motor >= 0:
-            efforts[:, motor] = found.efforts[:, k] * model.sign[k]
+    efforts = model.motor_efforts(found.efforts)
     forces, moments = (_by_joint(model, joints, part[shown]) for part in (found.forces, found.moments))
     return Motion(
         grid.times[shown], by_body(model, states.c[shown]), by_body(model, states.q[shown]), elastic,
@@ -92,7 +89,7 @@ def simulation_of(prepared: Prepared, run: ForwardRun, intended: IntendedMotion)
     off = run.target_positions - intended.target_positions
     errors, shown = np.linalg.norm(off, axis=2), _shown(grid)
     return Simulation(
-        motion=_simulated_motion(model, grid, run, len(character.motors), len(character.joints)),
+        motion=_simulated_motion(model, grid, run, len(character.joints)),
         position_errors=errors[shown],
         rotation_errors=np.linalg.norm(turned, axis=2)[shown],
         newton_iterations=run.trajectory.newton_iterations,

@@ -80,11 +80,11 @@ class LinearRun:
             motion, effort = tangent(self.linearization, *given, d_load)
         else:
             motion, effort = periodic_tangent(self.linearization, self._monodromy, *given)
-        return motion, self.model.motor_values(effort)
+        return motion, self.model.motor_efforts(effort, through_gears=True)
 
     def adjoint(self, gradient: Array, effort: Array | None, load: Array | None = None) -> tuple[Array, Array]:
         """The transpose of `tangent`: derivatives by the motors' values and rates, shape [T, M] each."""
-        given = gradient, None if effort is None else self.model.joint_angles(effort)
+        given = gradient, None if effort is None else self.model.by_efforts(effort)
         if self._monodromy is None:
             found = adjoint(self.linearization, *given, load)
         else:
@@ -121,12 +121,13 @@ class LinearRun:
         acts = np.any(angles, axis=(1, 2)) | np.any(speeds, axis=(1, 2))
         first = max(self.linearization.windows()[0][0], begin + int(np.argmax(acts)))
         given = angles[first - begin :], speeds[first - begin :]
-        joints = np.flatnonzero(np.isin(self.model.motor, motors)).astype(np.int32)
+        by_joint = self.model.motor_efforts(np.eye(len(self.model.motor)), through_gears=True).T[list(motors)]
+        joints = np.flatnonzero(np.any(by_joint, axis=0)).astype(np.int32)
         found = block_tangent(self.linearization, first, *given, component, jacobian, joints)
         if not len(joints):
             return first, found
-        by_joint = self.model.motor_values(np.eye(len(self.model.motor))[joints]).T[list(motors)]
-        return first, np.concatenate([found[:, : len(component)], by_joint @ found[:, len(component) :]], axis=1)
+        of_motors = by_joint[:, joints] @ found[:, len(component) :]
+        return first, np.concatenate([found[:, : len(component)], of_motors], axis=1)
 
     def _joint_columns(self, values: Array, rates: Array, coupling: Array) -> tuple[Array, Array]:
         """What the joints follow by one curve of shape [n] with each unknown, shape [n, J, m]."""
@@ -137,7 +138,7 @@ class LinearRun:
 
     def _on_curves(self, by_angle: Array, by_rate: Array) -> tuple[Array, Array]:
         """Derivatives by the motors' curves, shape [T, M], from those by what the joints follow, [T, J]."""
-        by_value, by_change = self.model.motor_values(by_angle), self.model.motor_values(by_rate)
+        by_value, by_change = self.model.by_inputs(by_angle), self.model.by_inputs(by_rate)
         delay = CommandDelay(self.model.delays, self.h, self._monodromy is not None)
         return delay.transposed(by_value, by_change)
 

@@ -102,11 +102,7 @@ def simulate_at(
 
 def _efforts(prepared: Prepared, run: ForwardRun, frames: IntArray) -> Array:
     """Efforts of the motors at some instants [N m] or [N], shape [f, M]."""
-    model, found = prepared.model, reactions_at(prepared.model, run, frames)
-    efforts = np.zeros((len(frames), len(prepared.character.motors)))
-    driven = model.motor >= 0
-    efforts[:, model.motor[driven]] = found.efforts[:, driven] * model.sign[driven]
-    return efforts
+    return prepared.model.motor_efforts(reactions_at(prepared.model, run, frames).efforts)
 
 
 def frames_of_result(result: Result, frame_times: Array) -> StepRun:

@@ -305,6 +305,8 @@ def _motor(motor: Motor, track: Track, character: Character) -> dict[str, Any]:
         "type": motor.kind,
         "delay_s": motor.delay,
         f"backlash_{unit}": motor.backlash,
+        "coupled_to": None if motor.turns_with is None else character.motors[motor.turns_with.other].path,
+        "coupling": 0.0 if motor.turns_with is None else motor.turns_with.ratio,
         "rotor": _rotor(motor, newtons, unit) if motor.kind or motor.model_of_gains == SERVO else None,
     }
 

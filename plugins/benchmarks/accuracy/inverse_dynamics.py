@@ -5,8 +5,8 @@ joint carries, about the joint at p, are linear in their masses m, first moments
 
     F = m (o'' - g) + (R s)'',    M = (o - p) x F + R s x (o'' - g) + (R J R^T w)'
 
-and so are the rotor's inertia, viscous and Coulomb friction, and an offset. What the data do not tell stays zero
-(truncated singular values: the base parameters).
+and so are the rotor's inertia, viscous and Coulomb friction, and an offset, also of rotors that two joints turn. What
+the data do not tell stays zero (truncated singular values: the base parameters).
 
 Source: Khalil, Dombre, Modeling, Identification and Control of Robots, 2002, chapter 12; Gautier, Khalil, Direct
 calculation of minimum set of inertial parameters of serial robots, 1990.
@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.model import PRESCRIBED, Character, curve_of
+from calmotion.model import PRESCRIBED, Character, curve_of, rotor_angles
 from calmotion.recordings import EFFORT, Channel, SensorRecording
 from calmotion.simulation import CompiledShot
 from calmotion.support import rotation_from_quaternion
@@ -101,7 +101,11 @@ def moved(shot: CompiledShot, recordings: Sequence[SensorRecording] = ()) -> Mov
             carrier = character.joints[carrier].body0
     bodies = OF_BODY * len(character.bodies)
     for k, motor in enumerate(character.motors):
-        spline = make_interp_spline(times, values[motor.joint], k=5)
+        if motor.turns_with is not None:  # its effort acts on the other joint as well
+            rows[:, motor.turns_with.other] -= motor.turns_with.ratio * rows[:, k]
+    rotors = rotor_angles(character.motors, np.stack([values[m.joint] for m in character.motors], axis=1))
+    for k, motor in enumerate(character.motors):
+        spline = make_interp_spline(times, rotors[:, k], k=5)
         speed, faster = spline.derivative(1)(times), spline.derivative(2)(times)
         of_rotor = np.stack([faster, speed, np.tanh(speed / motor.rotor.friction_speed), np.ones(len(times))], axis=1)
         rows[:, k, bodies + OF_ROTOR * k : bodies + OF_ROTOR * (k + 1)] = of_rotor

@@ -9,9 +9,11 @@ the estimate of another fit that shares no recording with it. `--most` takes tha
 
 The error of a strain gauge, whose gain and free swing at the start are fitted, is the share of its signal's shake that
 is left. A folder with `beam.toml` (the entries of `two_mode_beam.Strip`) gets the same from an independent model of its
-strip too, which also replays commands that were optimised for each fit. Rigid arms with ideal motors get it from
-classic identification, a linear regression of efforts. Without a folder, the command compares a
-published cantilever with its finite elements.
+strip too, and one with `servo.toml` (the entries of `servo_model.Bench`) the error of the model of
+`better-actuator-models`, fitted to all recordings. Commands that were optimised for each fit are replayed in these
+models: of the shots without a recording, else of the largest motion that the fit has not seen. Rigid arms with
+ideal motors get the error of classic identification, a linear regression of efforts. Without a folder, the command
+compares a published cantilever with its finite elements.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import argparse
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -46,8 +49,9 @@ from calmotion_plugins.calibration import (
 from scipy.interpolate import CubicSpline
 
 from ..common.reporting import bench_parser, finish, keep, say
-from . import cantilever, inverse_dynamics, two_mode_beam
+from . import cantilever, inverse_dynamics, servo_model, two_mode_beam
 from .replays import Replayed, replayed
+from .servo_model import FittedServo
 from .two_mode_beam import Fitted
 
 CLOCK = 0.02  # standard deviation of the clocks, which begin with the commands [s]
@@ -74,9 +78,10 @@ class Predicted:
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """Shots of one machine with their recordings, by name."""
+    """Shots of one machine with their recordings, by name, and those that have none."""
 
     takes: dict[str, tuple[CompiledShot, tuple[SensorRecording, ...]]]
+    motions: dict[str, CompiledShot]
 
     def error(self, name: str, estimates: Sequence[Estimate] = ()) -> float:
         """Mean absolute error of the prediction of a recording [rad, m, N m]; of a strain gauge the share of its shake.
@@ -102,7 +107,7 @@ class Machine:
     def robot(self, name: str, estimates: Sequence[Estimate] = ()) -> Robot:
         """The robot of a shot with the estimates of a fit; a value of the shot is scaled or moved as that of the first
         shot of the fit was."""
-        shot, _ = self.takes[name]
+        shot = self.motions[name] if name in self.motions else self.takes[name][0]
         values, given = {}, {item.name: item for item in estimates if item.of_robot}
         kinds, motors = sorted({item.kind for item in given.values()}), [motor.path for motor in shot.character.motors]
         for p in robot_parameters(shot, kinds, efforts=motors) if given else ():
@@ -169,23 +174,59 @@ def regressions(machine: Machine, fits: Iterable[tuple[str, ...]]) -> list[Predi
     return rows
 
 
-def replays(machine: Machine, fits: Mapping[tuple[str, ...], Calibration], by: Mapping[Any, Fitted]) -> list[Replayed]:
-    """Commands of the shot with the largest motion that a fit has not seen, in the beam of its recordings."""
+def servo(folder: Path, machine: Machine) -> FittedServo | None:
+    """Of a servo with a weight, the other authors' model that fits all recordings; nothing of another machine."""
+    file = folder / "servo.toml"
+    if not file.is_file():
+        return None
+    bench = servo_model.Bench(**tomllib.loads(file.read_text(encoding="utf-8")))
+    plays = []
+    for shot, recordings in machine.takes.values():
+        times, channel = shot.animation.frame_times, recordings[0].channels[0]
+        inside = (channel.times >= 0.0) & (channel.times <= times[-1])
+        gain = shot.character.motors[0].position_gain / bench.unit_gain
+        measured = channel.times[inside], channel.values[inside, 0]
+        plays.append(servo_model.Played(gain, times, np.ravel(shot.animation.current[0].values), *measured))
+    return servo_model.fitted_servo(bench, plays)
+
+
+def replays(
+    machine: Machine, fits: Mapping[tuple[str, ...], Calibration], by: Mapping[Any, Fitted], peer: FittedServo | None
+) -> list[Replayed]:  # fmt: skip
+    """Commands that were optimised for each fit, in the independent model of the strip or of the servo.
+
+    They are of the shots without a recording, or, without any, of the largest motion that the fit has not seen.
+    """
     rows = []
-    for own, beam in by.items():
+    for own, fit in fits.items() if by or peer else ():
         spans = {name: np.ptp(shot.animation.current[0].values) for name, (shot, _) in machine.takes.items()}
-        name = max((name for name in spans if name not in own), key=spans.__getitem__)
-        robot = machine.robot(name, fits[own].estimates).shot
-        sensors = {path for one in machine.takes[name][1] for c in one.channels for path in (c.path, c.to)}
-        rows.append(replayed(", ".join(own), name, robot, unexplained_share(fits[own]), beam, STEP, sensors))
+        largest = max((name for name in spans if name not in own), key=spans.__getitem__)
+        for name in machine.motions or [largest]:
+            robot = machine.robot(name, fit.estimates).shot
+            recordings = [one for _, found in machine.takes.values() for one in found]
+            sensors = {path for one in recordings for c in one.channels for path in (c.path, c.to)}
+            error = by[own].largest_error_mm if own in by else None
+            if peer is not None:
+                gain = machine.robot(name).shot.character.motors[0].position_gain / peer.bench.unit_gain
+                error = partial(peer.largest_error_mm, gain)
+            assert error is not None
+            rows.append(replayed(", ".join(own), name, robot, unexplained_share(fit), error, STEP, sensors))
+            say(_sentence(rows[-1]))
     return rows
 
 
+def _sentence(row: Replayed) -> str:
+    return (
+        f"commands of {row.shot}, optimised for the fit of {row.fitted} and replayed in the independent model: "
+        f"{row.before_mm:.3g} to {row.after_mm:.3g} mm (told: {row.told_mm:.3g} mm)"
+    )
+
+
 def machine_in(folder: Path) -> Machine:
-    """The shots of a folder that have a recording; flexible links are reduced once, for the motion of the first.
+    """The shots of a folder; flexible links are reduced once, for the motion of the first that has a recording.
 
     Raises:
-        ShotError: There are fewer than two, or one cannot be read.
+        ShotError: There are fewer than two recorded ones, or one cannot be read.
     """
     files = [file for file in sorted(folder.glob("*.usda")) if file.with_suffix(".csv").is_file()]
     if len(files) < 2:
@@ -199,7 +240,9 @@ def machine_in(folder: Path) -> Machine:
     for file in files:
         first = next((shot for shot, _ in takes.values()), None)
         takes[file.stem] = read_performed(str(file), [file.with_suffix(".csv")], first)
-    return Machine(takes)
+    first = takes[files[0].stem][0]
+    others = [file for file in sorted(folder.glob("*.usda")) if file not in files]
+    return Machine(takes, {file.stem: read_performed(str(file), [], first)[0] for file in others})
 
 
 def choices(names: Sequence[str], count: int, most: int | None) -> list[tuple[str, ...]]:
@@ -282,7 +325,7 @@ def main(arguments: list[str] | None = None) -> int:
         rows.append(Predicted(", ".join(own), error, float(np.mean([nominal[name] for name in others])), told))
         say(f"{rows[-1].fitted}: {error:.4f} (as they are {rows[-1].nominal:.4f}); {told}")
         keep(options, Predicted, rows)
-    by = beams(Path(options.folder), machine, fits)
+    by, peer = beams(Path(options.folder), machine, fits), servo(Path(options.folder), machine)
     errors, inside = [row.error for row in rows], covered(fits)
     as_they_are = list(nominal.values())
     rows += [
@@ -292,12 +335,11 @@ def main(arguments: list[str] | None = None) -> int:
         *regressions(machine, fits),
     ]
     lines = [f"in the 95% interval, {name}: {a} of {n}" for name, (a, n) in inside.items()]
-    played = replays(machine, fits, by)
-    lines += [
-        f"commands of {row.shot}, optimised for the fit of {row.fitted} and replayed in the beam: "
-        f"{row.before_mm:.3g} to {row.after_mm:.3g} mm (told: {row.told_mm:.3g} mm)"
-        for row in played
-    ]
+    if peer is not None:
+        lines.append(f"{peer.bench.model} of better-actuator-models, fitted to all: {peer.error:.3f} rad "
+                     f"(as published {peer.published_error:.3f} rad)")  # fmt: skip
+    played = replays(machine, fits, by, peer)
+    lines += map(_sentence, played)
     finish(
         options, "Predictions of a real machine", rows, lines=lines, in_the_95_percent_interval=inside,
         replays=[vars(row) for row in played],

@@ -106,6 +106,15 @@ class Fitted:
     left: float
     strip: Strip = field(repr=False)
 
+    def largest_error_mm(self, times: Array, hub: Array, aim: Array) -> float:
+        """Largest distance of the strip's end from that of a rigid strip at the angles `aim` [mm].
+
+        Args:
+            times, hub, aim: Uniform [s], [rad], [rad], shape [n] each.
+        """
+        path = (self.strip.root + self.strip.length) * aim
+        return float(1e3 * np.abs(self.strip.end(times, hub, self.damping) - path).max())
+
 
 def _columns(strip: Strip, damping: float, reading: Reading) -> tuple[Array, Array]:
     """Answer to the hub's motion with a gain of 1, shape [n], and what is free: swings of the modes, and an offset."""

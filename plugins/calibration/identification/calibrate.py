@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import PRESCRIBED, RunSettings, curve_of
+from calmotion.model import PRESCRIBED, SERVO, RunSettings, curve_of
 from calmotion.recordings import ANGLE, STRAIN, SensorRecording, unit_of
 from calmotion.simulation import CompiledShot
 
@@ -321,4 +321,14 @@ def _missed(found: Found, fits: Sequence[ChannelFit]) -> list[str]:
                 "model (a smaller --tolerance), another friction of motors (calm:motor:frictionModel), or more "
                 "--parameters"
             )
+    smooth = [
+        motor.path
+        for motor in found.problem.shot.character.motors
+        if motor.model == SERVO and not (motor.rotor.friction or motor.rotor.viscous_friction)
+    ]
+    if notes and smooth:
+        notes.append(
+            f"the shot has no friction of {', '.join(smooth)}, so that none is estimated: author a guess "
+            "(calm:motor:friction, such as 5% of the largest torque)"
+        )
     return notes

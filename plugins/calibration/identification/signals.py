@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.model import PRESCRIBED, Animation, Character, Rotor, RunSettings, curve_of
+from calmotion.model import PRESCRIBED, Animation, Character, Rotor, RunSettings, curve_of, rotor_angles
 from calmotion.multibody import (
     NOWHERE,
     Model,
@@ -179,12 +179,14 @@ def signals_of(
 def _measured(robot: Robot, prepared: Prepared, run: ForwardRun) -> Signals:
     model, character = prepared.model, prepared.character
     found = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates)
-    values = joint_values(model.system, model.motor, character.motors, run.trajectory.states.u, run.joint_angles)
+    values = model.turned(
+        joint_values(model.system, model.motor, character.motors, run.trajectory.states.u, run.joint_angles)
+    )
     rotations = run.target_rotations
     lost = np.flatnonzero(~np.isfinite(rotations).all(axis=(1, 2)))
     if len(lost):  # a body that is bent so far that its frame at the target has no direction
         raise SimulationFailure(float(prepared.grid.times[lost[0]]), NOWHERE, Reason.DIVERGED)
-    loads = model.motor_values(found.efforts)
+    loads = model.motor_efforts(found.efforts)
     return Signals(
         prepared.grid.times, run.target_positions, rotation_from_quaternion(rotations),
         model.motor_values(values), loads, loads, np.asarray(character.gravity, float),
@@ -195,9 +197,10 @@ def _measured(robot: Robot, prepared: Prepared, run: ForwardRun) -> Signals:
 def with_rotors(signals: Signals, robot: Robot) -> Signals:
     """The same motion with efforts on the rotors of a robot's ideal motors, which no simulation has to know."""
     motors, efforts = robot.shot.character.motors, signals.loads.copy()
+    turned = rotor_angles(motors, signals.angles)
     for k, motor in enumerate(motors):
         if motor.model == PRESCRIBED and motor.follows is None and motor.rotor != Rotor():
-            efforts[:, k] = rotor_efforts(motor.rotor, signals.times, signals.angles[:, k], efforts[:, k])
+            efforts[:, k] = rotor_efforts(motor.rotor, signals.times, turned[:, k], efforts[:, k])
     return replace(signals, efforts=efforts, _splines={})
 
 
@@ -222,7 +225,7 @@ def _begun(robot: Robot, prepared: Prepared, workspace: Workspace, angles: Array
     for _ in range(_TURNS):
         joints = model.joint_angles(command[None])
         state, _ = equilibrium(model.system, rigid_state(model, start_angles(model, joints[0])), joints[0], workspace)
-        found = joint_values(model.system, model.motor, motors, state.u[None], joints)
+        found = model.turned(joint_values(model.system, model.motor, motors, state.u[None], joints))
         off = np.where(free, start - robot.offsets - model.motor_values(found)[0], 0.0)
         if np.all(np.abs(off) <= _NEAR):
             break

@@ -183,7 +183,8 @@ def read_performed(
         SettingError: A recording cannot be read.
     """
     opened = with_sensors(shot)
-    read = read_recordings(opened.host, [os.fspath(file) for file in recordings], opened.settings)
+    files = [os.fspath(file) for file in recordings]
+    read = read_recordings(opened.host, files, opened.settings) if files else ()
     hooks = Hooks(None, None, None)
     if like is not None and any(body.simulated_flexible for body in like.character.bodies):
         source = Source("", "", RunSettings(), measured=measured_prims(read))

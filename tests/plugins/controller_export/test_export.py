@@ -143,3 +143,16 @@ def test_the_curves_of_a_result_are_written_at_a_rate(shot_file, tmp_path):
         rows = [line.split(",") for line in stream if not line.startswith("#")]
     assert len(rows) == 1 + 51
     assert float(rows[26][1]) == pytest.approx(np.degrees(result.motors[HINGE].output[len(result.times) // 2]))
+
+
+def test_a_motor_that_is_switched_off_is_told(shot_file, tmp_path):
+    servo = """uniform token calm:motor:model = "servo"
+        uniform float calm:motor:positionGain = 0.5
+        uniform float calm:motor:velocityGain = 0.05
+        uniform float calm:motor:armature = 0.01
+        bool calm:motor:powered.timeSamples = { 0: true, 12: false }
+        uniform token physics:axis"""
+    text = ONE_HINGE.replace('Hinge" (prepend apiSchemas = [', 'Hinge" (prepend apiSchemas = ["CalmMotorAPI", ')
+    shot_file.write_text(text.replace("uniform token physics:axis", servo))
+    made = export(shot_file, tmp_path / "a.csv", to="csv", rate=100, search=False)
+    assert any(f"calm:motor:powered switches {HINGE} off and on" in note for note in made.notes)

@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calmotion.errors import ShotError
 from calmotion.host import SettingError
-from calmotion.model import Follows, Rotor, RunSettings, Track
+from calmotion.model import Follows, Rotor, RunSettings, Track, TurnsWith
+from calmotion.model.animation import Schedule
 from calmotion.multibody import Workspace
 from calmotion.simulation import (
     Curves,
@@ -218,3 +220,14 @@ def test_a_thread_renews_the_gains(stream):
             commands = live.step(k / RATE, motion(k / RATE))
         assert live.report()["renewals"] >= 1
     np.testing.assert_allclose(commands, motion(6.0), atol=1e-2)
+
+
+def test_motors_that_two_joints_turn_are_refused_and_those_that_are_switched_off_stay_on():
+    with pytest.raises(ShotError, match="no motor that two joints turn"):
+        Live(robot({"turns_with": TurnsWith(0, 1.0)}))
+    servo = GIVES | {"model": "servo", "rotor": Rotor(armature=0.01)}
+    switched = Schedule(np.array([0.0, 0.5]), np.array([True, False]))
+    with Live(robot(servo | {"powered": switched})) as live:
+        (note,) = [note for note in live.notes if "calm:motor:powered" in note]
+        assert "stay on: " in note
+        live.step(0.0, live.start)

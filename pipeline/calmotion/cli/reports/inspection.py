@@ -167,6 +167,10 @@ def _print_gains(console: Console, report: dict[str, Any]) -> None:
     servos = _alike(_servo_row(motor) for motor in report["motors"] if motor["rotor"])
     heads = ["servo", "type", "armature", "gear", "friction", "viscous", "no-load speed", "delay", "backlash"]
     print_table(console, "Servos", heads, servos, texts=2)
+    for motor in report["motors"]:
+        if motor["coupled_to"]:
+            other = f"{motor['coupled_to']}, by {motor['coupling']:g} of its angle"
+            say(console, f"The motor of {motor['path']} also turns with {other}.")
     effects = report["effects_of_gains"]
     if effects:
         ideal = all(motor["model"] == PRESCRIBED for motor in report["motors"])

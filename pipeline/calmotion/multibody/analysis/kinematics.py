@@ -67,14 +67,14 @@ def rigid_poses(model: Model, joint_angles: Array, world: Array | None = None) -
     """Poses of the undeformed character.
 
     Args:
-        joint_angles: Angles [rad] (or lengths [m]) of the components' joints, shape [T, B], or of all joints,
-            [T, J]; free joints included.
+        joint_angles: Of `Model.joint_angles`, free joints included, or those of the components' joints alone, shape
+            [T, B].
         world: Moving markers of the world, shape [T, W, 18]; needed where the system has any.
 
     Returns:
         Origins [m], shape [T, B, 3], and unit quaternions, shape [T, B, 4], world.
     """
-    return system_poses(model.system, joint_angles, world)
+    return system_poses(model.system, model.turned(joint_angles), world)
 
 
 def rigid_state(model: Model, joint_angles: Array, world: Array | None = None) -> State:
@@ -87,7 +87,7 @@ def rigid_state(model: Model, joint_angles: Array, world: Array | None = None) -
 
 
 def set_rotors(system: System, state: State, joint_angles: Array) -> None:
-    """Turn the rotors of servos to the angles (or lengths) of their joints, shape [B] or [J]."""
+    """Turn the rotors of servos to what they follow, shape [B] or [J]."""
     for joint in system.servos[system.servos < len(joint_angles)]:
         state.u[system.side[joint, 1], system.rotor[joint]] = joint_angles[joint]
 

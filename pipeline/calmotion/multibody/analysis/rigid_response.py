@@ -114,7 +114,7 @@ def motor_responses(
             solve_system(held, ws.matrix, x, lam, scratch.solution)
             motions[n, :, :, m] = x
             efforts[n, m] = _along_axes(system, ws.work.R, lam)
-    by_motor = np.stack([rigid.motor_values(efforts[:, m]) for m in range(len(motors))], axis=2)
+    by_motor = np.stack([rigid.motor_efforts(efforts[:, m]) for m in range(len(motors))], axis=2)
     return motions, by_motor
 
 

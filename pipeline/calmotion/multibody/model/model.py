@@ -14,6 +14,7 @@ from calmotion.model.motor import PRESCRIBED, Motor
 from calmotion.multibody.model.joint_arrays import BodyAnchors, JointArrays, body_anchors, joint_arrays
 from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, System, components, coordinate_units
 from calmotion.multibody.model.topology import Tree, span_tree
+from calmotion.multibody.motors.couplings import Coupling, couplings
 from calmotion.multibody.motors.drives import add_motors, giving_motors
 from calmotion.reduction.reduced_body import Marker, ReducedBody, rigid_invariants
 from calmotion.support.rotations import rotation_from_quaternion
@@ -45,6 +46,7 @@ class Model:
         targets: The target markers.
         rest_angles: Angle [rad] (or length [m]) of each joint in the pose the shot was authored in, shape [J].
         delays: Of the motors' commands [s]; empty where there are none.
+        coupled: The motors that other joints turn too.
     """
 
     system: System
@@ -54,20 +56,65 @@ class Model:
     targets: Targets
     rest_angles: Array
     delays: tuple[float, ...] = ()
+    coupled: tuple[Coupling, ...] = ()
 
     def joint_angles(self, motor_values: Array) -> Array:
-        """Angles (or lengths) of the joints, shape [..., J], from values of the motors, shape [..., M]."""
-        out = np.zeros(motor_values.shape[:-1] + (len(self.motor),))
-        driven = self.motor >= 0
-        out[..., driven] = motor_values[..., self.motor[driven]] * self.sign[driven]
+        """What the motors of the joints follow, shape [..., J], from values of the motors, shape [..., M]: angles (or
+        lengths) of the joints, but of a servo that another joint turns too those of its rotor."""
+        out = self._of_joints(motor_values)
+        for own in self.coupled:
+            if own.compliant:
+                out[..., own.joint] += own.ratio * out[..., own.other]
         return out
 
-    def motor_values(self, joint_values: Array) -> Array:
+    def by_inputs(self, by_joint: Array) -> Array:
         """The transpose of `joint_angles`: shape [..., J] to [..., M]."""
+        found = by_joint.copy()
+        for own in self.coupled:
+            if own.compliant:
+                found[..., own.other] += own.ratio * found[..., own.joint]
+        return self.motor_values(found)
+
+    def turned(self, followed: Array) -> Array:
+        """Angles (or lengths) of the joints where their motors are at what they follow, shape [..., J]."""
+        found = followed.copy() if self.coupled else followed
+        for own in self.coupled:
+            if own.compliant:
+                found[..., own.joint] -= own.ratio * found[..., own.other]
+        return found
+
+    def motor_values(self, joint_values: Array) -> Array:
+        """Values of the motors, shape [..., M], from those of the joints, shape [..., J]."""
         out = np.zeros(joint_values.shape[:-1] + (int(self.motor.max(initial=-1)) + 1,))
         for joint, motor in enumerate(self.motor):
             if motor >= 0:
                 out[..., motor] += self.sign[joint] * joint_values[..., joint]
+        return out
+
+    def motor_efforts(self, joint_efforts: Array, through_gears: bool = False) -> Array:
+        """Efforts of the motors, shape [..., M], from those along the axes of the joints, shape [..., J].
+
+        Args:
+            through_gears: Whether those of servos are what their joints transmit, as in sweeps and `transmitted`, not
+                what acts on their rotors.
+        """
+        found = joint_efforts.copy()
+        for own in self.coupled:
+            if through_gears or not own.compliant:
+                found[..., own.other] -= own.ratio * found[..., own.joint]
+        return self.motor_values(found)
+
+    def by_efforts(self, by_motor: Array) -> Array:
+        """The transpose of `motor_efforts` through gears: shape [..., M] to [..., J]."""
+        out = self._of_joints(by_motor)
+        for own in self.coupled:
+            out[..., own.joint] -= own.ratio * out[..., own.other]
+        return out
+
+    def _of_joints(self, motor_values: Array) -> Array:
+        out = np.zeros(motor_values.shape[:-1] + (len(self.motor),))
+        driven = self.motor >= 0
+        out[..., driven] = motor_values[..., self.motor[driven]] * self.sign[driven]
         return out
 
     @property
@@ -148,14 +195,15 @@ def _held(character: Character, tree: Tree, mass: Array, Z: Array, joints: Joint
 
 def with_drives(model: Model, motors: Sequence[Motor]) -> Model:
     """The model with the coordinates of its compliant motors, see `drives`; itself where motors are ideal."""
+    coupled = couplings(model.system, model.motor, model.sign, motors)
     found = giving_motors(model.system, model.motor, motors)
     if not found:
-        return model
-    system, t = add_motors(model.system, found), model.targets
+        return replace(model, coupled=coupled)
+    system, t = add_motors(model.system, found, coupled), model.targets
     more = [(0, 0), (0, 0), (0, system.size - model.system.size)]
     targets = replace(t, Phi=np.pad(t.Phi, more), Psi=np.pad(t.Psi, more))
     delays = tuple(0.0 if motor.model == PRESCRIBED else motor.delay for motor in motors)
-    return replace(model, system=system, targets=targets, delays=delays)
+    return replace(model, system=system, targets=targets, delays=delays, coupled=coupled)
 
 
 def _elastic_laws(bodies: Sequence[ReducedBody]) -> dict[str, Any]:
@@ -238,7 +286,8 @@ def rigid_model(model: Model) -> Model:
         t.component, t.position, t.rotation, np.ascontiguousarray(t.Phi[..., :none]),
         np.ascontiguousarray(t.Psi[..., :none]), t.position_weight, t.rotation_weight,
     )  # fmt: skip
-    return Model(rigid, model.tree, model.motor, model.sign, targets, model.rest_angles)
+    coupled = tuple(own._replace(compliant=False) for own in model.coupled)
+    return Model(rigid, model.tree, model.motor, model.sign, targets, model.rest_angles, coupled=coupled)
 
 
 def moves_freely(model: Model) -> BoolArray:

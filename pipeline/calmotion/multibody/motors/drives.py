@@ -29,6 +29,7 @@ from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
 from calmotion.model.motor import ON_ERROR, PRESCRIBED, SERVO, Coulomb, Motor, Rotor
 from calmotion.multibody.model.system import LINEAR, System
+from calmotion.multibody.motors.couplings import Coupling
 
 
 class GivingMotor(NamedTuple):
@@ -74,8 +75,12 @@ def giving_motors(system: System, motor: IntArray, motors: Sequence[Motor]) -> l
     return found
 
 
-def add_motors(system: System, motors: Sequence[GivingMotor]) -> System:
-    """The system with the coordinates of these motors, behind the modes of the components on side 1 of their joints."""
+def add_motors(system: System, motors: Sequence[GivingMotor], coupled: Sequence[Coupling] = ()) -> System:
+    """The system with the coordinates of these motors, behind the modes of the components on side 1 of their joints.
+
+    Args:
+        coupled: Joints whose motors other joints turn too.
+    """
     elastic = system.elastic.copy()
     placed: list[tuple[int, int, _Coordinate]] = []
     rotor, servo = system.rotor.copy(), system.servo.copy()
@@ -105,6 +110,9 @@ def add_motors(system: System, motors: Sequence[GivingMotor]) -> System:
         wide.inertia[b, k], wide.stiffness[b, k], wide.damping[b, k, k] = item.inertia, item.stiffness, item.damping
         moved = wide.Phi if system.sliding[joint] else wide.Psi
         moved[joint, 1, :, k] = item.turn * system.rotation[joint, 1, :, 2]
+        for pair in coupled:
+            if pair.compliant and pair.other == joint:
+                wide.Psi[pair.joint, 0, :, k] = pair.ratio * item.turn * system.rotation[pair.joint, 0, :, 2]
     return wide
 
 
@@ -118,7 +126,7 @@ def joint_values(system: System, motor: IntArray, motors: Sequence[Motor], u: Ar
         joint_angles: What the joints' motors follow, shape [T, J].
 
     Returns:
-        Angles [rad] or lengths [m] of the driven joints, shape [T, J]; of others `joint_angles`.
+        What their motors follow but for their gears and springs, shape [T, J]; of other joints `joint_angles`.
     """
     values, placed = joint_angles.copy(), system.modes.copy()
     for joint, item in giving_motors(system, motor, motors):

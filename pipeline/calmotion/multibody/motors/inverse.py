@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calmotion.arrays import Array
-from calmotion.model.motor import ON_JOINT, PRESCRIBED, SERVO, Coulomb, Motor, Rotor
+from calmotion.model.motor import ON_JOINT, PRESCRIBED, SERVO, Coulomb, Motor, Rotor, rotor_angles
 from calmotion.multibody.model.system import FRICTION, FRICTION_TERMS, SERVO_COLUMNS
 from calmotion.multibody.motors.friction import largest_friction
 
@@ -25,15 +25,18 @@ def inverse_commands(motors: Sequence[Motor], times: Array, values: Array, effor
         motors: Ideal ones are commanded what they do.
         times: Equidistant [s], shape [T].
         values: Of their joints [rad or m], shape [T, M].
-        efforts: That move the joints so [N m or N], shape [T, M].
+        efforts: Of ideal motors that move the joints so [N m or N], shape [T, M].
 
     Returns:
         Shape [T, M].
     """
-    commands = values.copy()
+    commands, turned = values.copy(), rotor_angles(motors, values)
     for k, motor in enumerate(motors):
         if motor.model != PRESCRIBED and motor.position_gain > 0.0:
-            commands[:, k] = _command(motor, times, values[:, k], efforts[:, k])
+            commands[:, k] = _command(motor, times, turned[:, k], efforts[:, k])
+    for k, motor in enumerate(motors):
+        if motor.turns_with is not None and motor.model != PRESCRIBED:
+            commands[:, k] -= motor.turns_with.ratio * commands[:, motor.turns_with.other]
     return commands
 
 

@@ -93,11 +93,10 @@ def _rigid_commands(prepared: Prepared, curves: Curves, slower: float) -> Array:
     Raises:
         SimulationFailure: It cannot follow the animation.
     """
-    model, grid = prepared.model, prepared.grid
-    rigid = rigid_model(model)
+    grid, rigid = prepared.grid, rigid_model(prepared.model)
     run = Simulator(rigid, slower * grid.h, prepared.world, grid.cyclic).run(curves.angles, curves.rates / slower)
     found = reactions(rigid.system, run.trajectory, run.joint_angles, run.joint_rates)
-    efforts = model.motor_values(found.efforts)
+    efforts = rigid.motor_efforts(found.efforts)
     return inverse_commands(prepared.character.motors, slower * grid.times, curves.angles, efforts)
 
 

@@ -39,7 +39,7 @@ class RigidRobot:
         """Along the curves."""
         rigid, curves, grid = rigid_model(self.model), self.curves, self.grid
         motion = rigid_motion(rigid, curves.angles, curves.rates, grid.h, self.world, grid.cyclic)
-        angles = self.model.joint_angles(curves.angles)
+        angles = rigid.joint_angles(curves.angles)
         roots = rooted(self.world, len(motion.c))
         moved = np.flatnonzero(np.any(self.coupling, axis=1)).astype(np.int32)
         times = grid.h * np.arange(len(angles), dtype=np.float64)

@@ -25,7 +25,7 @@ class Efforts(Quantity):
     def values(self, run: ForwardRun) -> Array:
         """By the reactions of the joints."""
         found = reactions(self.model.system, run.trajectory, run.joint_angles, run.joint_rates)
-        return self.model.motor_values(found.efforts)
+        return self.model.motor_efforts(found.efforts)
 
     def slopes(self, run: ForwardRun) -> EffortSlopes:
         """The efforts themselves."""

@@ -97,7 +97,7 @@ class PlaySlopes:
 def transmitted_by(model: Model, run: ForwardRun) -> Array:
     """The torque [N m] or force [N] that each motor's gear transmits in a run, shape [T, M]."""
     found = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates)
-    return model.motor_values(transmitted(model.system, found))
+    return model.motor_efforts(transmitted(model.system, found), through_gears=True)
 
 
 def gear_play(

@@ -102,7 +102,7 @@ def rigid_efforts(model: Model, grid: TimeGrid, world: Array, curves: Curves, ru
         model, Workspace.for_system(model.system), curves.angles, curves.rates / slow, slow * grid.h, world
     )
     efforts, weight = (
-        model.motor_values(reactions(model.system, one.trajectory, one.joint_angles, one.joint_rates).efforts)
+        model.motor_efforts(reactions(model.system, one.trajectory, one.joint_angles, one.joint_rates).efforts)
         for one in (run, rest)
     )
     few = np.unique(np.linspace(0, len(grid.times) - 1, MOST_INSTANTS).round().astype(int))

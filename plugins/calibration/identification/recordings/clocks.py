@@ -15,13 +15,15 @@ from .noise import noise_of
 STEP = 0.01  # between clocks that are tried first [s]
 SAMPLES = 600  # of a channel that are compared, at most
 COVERED = 0.5  # share of the motion that a recording must hold
+UNLIKE = 0.8  # mean square of the difference over that of the recording itself, from which no clock is told
 
 
 def clock_of(recording: SensorRecording, character: Character, robots: Sequence[Signals]) -> float:
     """The clock [s] at which what was recorded is most like what one of some simulated robots shows.
 
     All shifts at which half of the motion is recorded are tried, then finer ones about the best. Constants are taken
-    off each component, so that biases do not matter.
+    off each component, so that biases do not matter. Where no robot is like the recording at any clock, it is taken to
+    begin with the shot (0): in a shot without friction, a dropped arm swings on and is like its recording nowhere.
 
     Args:
         recording: The recording; channels that the robot does not have are not looked at.
@@ -30,7 +32,10 @@ def clock_of(recording: SensorRecording, character: Character, robots: Sequence[
             clock, where one that hardly shakes tells the right one.
     """
     found = [_clock_by(recording, character, signals) for signals in robots]
-    return min(found, key=lambda item: item[1])[0]
+    clock, cost = min(found, key=lambda item: item[1])
+    length = float(robots[0].times[-1])
+    covered = min(recording.end, length) - max(recording.start, 0.0)
+    return 0.0 if UNLIKE <= cost < np.inf and covered >= COVERED * length else clock
 
 
 def _clock_by(recording: SensorRecording, character: Character, signals: Signals) -> tuple[float, float]:
@@ -82,7 +87,7 @@ def _best(candidates: Array, compared: list[_Compared], signals: Signals) -> tup
             off = (values - simulated) / scale
             # a few outliers must not decide
             off = np.clip(off - np.nanmedian(off, axis=0), -2.0, 2.0)
-            cost += float(np.nanmean(off**2))
+            cost += float(np.nanmean(off**2)) / len(compared)
         costs.append(cost)
     least = int(np.argmin(costs))
     return float(candidates[least]), float(costs[least])

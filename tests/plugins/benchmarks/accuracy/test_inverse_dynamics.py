@@ -7,7 +7,7 @@ import pytest
 from arms import chain
 from calmotion.model import Animation, RunSettings, Track
 from calmotion.model.character import WORLD, Body, Joint, MassProperties
-from calmotion.model.motor import SERVO, Rotor
+from calmotion.model.motor import SERVO, Rotor, TurnsWith
 from calmotion.recordings import EFFORT, Channel, SensorRecording
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion_plugins.benchmarks.accuracy.inverse_dynamics import OF_ROTOR, identified, moved, nominal, serves
@@ -17,7 +17,7 @@ TIMES = np.arange(0.05, 1.95, 1 / 250)
 ROTORS = (Rotor(0.02, friction=0.4, viscous_friction=0.15), Rotor(0.005, friction=0.1, viscous_friction=0.02))
 
 
-def shot(signs=(1.0, 1.0)):
+def shot(signs=(1.0, 1.0), pair=None):
     """An arm of two hinges about axes that are not parallel, on a body that is fixed to the world."""
     arm = chain(2, driven=(0, 1), length=0.3, mass=0.6)
     heavy = MassProperties(0.5, np.array([0.1, 0.02, 0.03]), np.diag([2e-3, 5e-3, 4e-3]))
@@ -27,6 +27,7 @@ def shot(signs=(1.0, 1.0)):
     base = Body("/C/Base", arm.bodies[0].rest, heavy)
     fixed = Joint("/C/Weld", "fixed", WORLD, 0, arm.joints[0].frame0, arm.joints[0].frame0)
     motors = [replace(motor, joint=k + 1, rotor=ROTORS[k]) for k, motor in enumerate(arm.motors)]
+    motors[1] = replace(motors[1], turns_with=pair)
     arm = replace(
         arm, bodies=(base, arm.bodies[0], replace(arm.bodies[1], mass=heavy)), joints=(fixed, *joints),
         motors=tuple(motors), targets=(replace(arm.targets[0], body=2),),
@@ -46,8 +47,9 @@ def recorded(own):
     return [SensorRecording("a.csv", "", tuple(channels))]
 
 
-def test_the_regression_has_the_efforts_of_the_simulation():
-    own = shot()
+@pytest.mark.parametrize("pair", [None, TurnsWith(0, -0.8)], ids=["", "coupled"])
+def test_the_regression_has_the_efforts_of_the_simulation(pair):
+    own = shot(pair=pair)
     assert serves(own.character)
     motion, x = moved(own, recorded(own)), nominal(own.character)
     for k, rotor in enumerate(ROTORS):

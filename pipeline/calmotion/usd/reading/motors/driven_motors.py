@@ -20,7 +20,7 @@ from calmotion.usd.reading.actuators.rotors import read_delay, read_rotor
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.reading.joints.joint_prims import JointPrim, refuse_unsupported
 from calmotion.usd.reading.motors.couplings import gears_of_joints
-from calmotion.usd.reading.motors.gearing import Gear, led_by_driven, read_gear, resolve
+from calmotion.usd.reading.motors.gearing import Gear, led_by_driven, read_gear, read_turns_with, resolve
 from calmotion.usd.reading.motors.motor_limits import effort_limit, may_change, velocity_limit
 from calmotion.usd.reading.motors.tracks import sample_codes
 from calmotion.usd.reading.motors.undriven_joints import (
@@ -252,6 +252,7 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
         delay=read_delay(described),
         backlash=described.own_or_named("backlash", "backlash", described.length, 0.0),
         kind=described.kind.name,
+        turns_with=read_turns_with(drive.joint, motors),
     )
     factor = described.own("gainFactor")  # by what a calibration found the gain to differ
     return motor if factor is None else motor.with_gain(factor * motor.position_gain)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.errors import ShotError
+from calmotion.model import TurnsWith
 from calmotion.support.naming import nearest
 from calmotion.usd.dialects import GEARS, SI, GearSpelling, number_or
 from calmotion.usd.reading.joints.joint_prims import JointPrim
@@ -79,6 +80,32 @@ def _to_si(kind: str, spelling: GearSpelling, units: StageUnits) -> float:
     if kind == "prismatic":
         return units.length(1.0)
     return 1.0 if spelling.angles == SI else float(np.deg2rad(1.0))
+
+
+_TO, _RATIO = "calm:motor:coupledTo", "calm:motor:coupling"
+
+
+def read_turns_with(joint: JointPrim, motors: dict[str, int]) -> TurnsWith | None:
+    """The other joint that turns the motor of a joint too.
+
+    Args:
+        motors: Index of each motor, by the path of its joint.
+
+    Raises:
+        ShotError: It names no driven joint, or a ratio that is not finite; a ratio without a joint.
+    """
+    relationship = joint.prim.GetRelationship(_TO)
+    targets = [str(path) for path in relationship.GetForwardedTargets()] if relationship else []
+    ratio = number_or(joint.prim, _RATIO, 1.0)
+    if not targets and not joint.prim.GetAttribute(_RATIO).HasAuthoredValue():
+        return None
+    others = [path for path in motors if path != joint.path]
+    if len(targets) != 1 or targets[0] not in others:
+        likely = nearest(targets[0], others) if targets else ""
+        problem, found = "a motor is coupled to one other driven joint", ", ".join(targets) or None
+        remedy = f"{likely}Name that joint, or remove {_TO} and {_RATIO}"
+        raise ShotError(problem, path=joint.path, attribute=_TO, found=found, remedy=remedy)
+    return TurnsWith(motors[targets[0]], ratio)
 
 
 def led_by_driven(gears: dict[str, Gear], driven: Collection[str]) -> dict[str, Gear]:
