@@ -14,6 +14,7 @@ from calmotion.multibody.model.model import rigid_model
 from calmotion.multibody.motors.inverse import inverse_commands
 from calmotion.multibody.runs import linearize, simulate
 from calmotion.simulation.simulator import Simulator
+from calmotion.tolerance.motors.motor_effects import with_gains_used
 from calmotion.usd.reading import read_shot
 from motor_runs import G, smooth
 from pxr import Usd
@@ -300,6 +301,19 @@ def test_a_shot_couples_a_motor_and_is_optimised_with_it(shot, capsys):
     result = cm.optimize(cm.open_shot(shot), step=1 / 240).result
     before, after = (run.position_errors[run.motion.judged].max() for run in (result.before, result.after))
     assert before > 5e-3 and after < 0.02 * before
+
+
+@pytest.mark.parametrize(
+    ("changes", "model"),
+    [({}, "servo"), ({0: {"position_gain": 0.0}}, "prescribed"), ({1: {"position_gain": 0.0}}, "prescribed")],
+)
+def test_gains_of_coupled_ideal_motors_are_used_for_both_or_none(changes, model):
+    character = wrist("prescribed")
+    gains = [{"position_gain": GAIN, "rotor": Rotor()} | changes.get(k, {}) for k in range(2)]
+    motors = tuple(replace(motor, **own) for motor, own in zip(character.motors, gains, strict=True))
+    used = with_gains_used(replace(character, motors=motors))
+    assert [motor.model for motor in used.motors] == [model, model]
+    compiled(used)
 
 
 @pytest.mark.parametrize(

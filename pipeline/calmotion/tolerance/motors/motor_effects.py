@@ -11,7 +11,7 @@ from calmotion.arrays import Array
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.model import Result
 from calmotion.model.character import Character, motors_give, with_ideal_motors
-from calmotion.model.motor import PRESCRIBED
+from calmotion.model.motor import PRESCRIBED, SERVO
 from calmotion.model.outputs import MotorEffects
 from calmotion.model.result import ErrorShares
 from calmotion.model.run import RunSettings
@@ -29,8 +29,16 @@ from calmotion.tolerance.simulation import own_step
 
 
 def with_gains_used(character: Character) -> Character:
-    """The character with every ideal motor that has gains as a drive, or as a servo where its rotor is known."""
-    return replace(character, motors=tuple(replace(m, model=m.model_of_gains) for m in character.motors))
+    """The character with every ideal motor that has gains as a drive, or as a servo where its rotor is known; coupled
+    motors are both servos, or both ideal where one has no gains."""
+    models = [motor.model_of_gains for motor in character.motors]
+    for k, motor in enumerate(character.motors):
+        if motor.turns_with is not None:
+            pair = [k, motor.turns_with.other]
+            model = PRESCRIBED if any(models[own] == PRESCRIBED for own in pair) else SERVO
+            models = [model if own in pair else found for own, found in enumerate(models)]
+    motors = (replace(motor, model=model) for motor, model in zip(character.motors, models, strict=True))
+    return replace(character, motors=tuple(motors))
 
 
 def effects_of_gains(shot: CompiledShot, options: RunSettings) -> MotorEffects | None:
