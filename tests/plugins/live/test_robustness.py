@@ -9,7 +9,7 @@ import pytest
 from calmotion.simulation import impulses
 from calmotion_plugins.live import gains_at
 from calmotion_plugins.live.regulation.robustness import EQUAL, PERIODS, SLACK, Moves, affordable_others
-from hinges import TICK, hinge, two_hinges, weighting
+from hinges import TICK, hinge, two_hinges, weighting, with_free_motion
 
 UNCERTAINTY = 0.1
 
@@ -39,18 +39,7 @@ def test_others_do_not_count_where_motors_cannot_do_what_the_targets_need():
 def test_a_free_motion_of_the_robot_sets_no_period():
     """As the spin of a ball joint, which is the mode of the lowest frequency."""
     pose = two_hinges()
-
-    def beside(matrix, axes):
-        return np.pad(matrix, [(int(k in axes), 0) for k in range(matrix.ndim)])
-
-    free = replace(
-        pose, omega=np.array([0.0, *pose.omega]), damping=beside(pose.damping, (0, 1)),
-        by_acceleration=beside(pose.by_acceleration, (0,)), by_rate=beside(pose.by_rate, (0,)),
-        targets_by_mode=beside(pose.targets_by_mode, (2,)), shapes=beside(pose.shapes, (1,)),
-        deflections=beside(pose.deflections, (1,)), by_deflection=beside(pose.by_deflection, (0,)),
-        resistance=np.insert(pose.resistance, 2, 0.0, axis=1),
-    )  # fmt: skip
-    left = [Moves(makes(p, 40)(0.0), np.eye(2), TICK).left_by_shaper for p in (pose, free)]
+    left = [Moves(makes(p, 40)(0.0), np.eye(2), TICK).left_by_shaper for p in (pose, with_free_motion(pose))]
     assert left[1] == pytest.approx(left[0], rel=1e-9)
 
 
