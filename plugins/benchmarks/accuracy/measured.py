@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from calmotion import ShotError
 from calmotion.model import RunSettings
-from calmotion.recordings import STRAIN, Channel, SensorRecording
+from calmotion.recordings import STRAIN, Channel, LowPass, SensorRecording
 from calmotion.simulation import CompiledShot
 from calmotion_plugins.calibration import (
     Calibration,
@@ -98,8 +98,8 @@ class Machine:
                 place = place_of(channel, shot.character)
                 assert place is not None  # the recording was read for this shot
                 if channel.kind == STRAIN:
-                    gains = [item.value for item in estimates if item.kind == "gain" and item.path == channel.path]
-                    off.append(np.array([_left(signals, channel, place, gains[0] if gains else None)]))
+                    known = {item.kind: item.value for item in estimates if item.path == channel.path}
+                    off.append(np.array([_left(signals, channel, place, known)]))
                 else:
                     off.append(np.abs(signals.at(channel.kind, place, channel.times) - channel.values).ravel())
         return float(np.nanmean(np.concatenate(off)))
@@ -120,12 +120,16 @@ class Machine:
         return robot_with(shot, values)
 
 
-def _left(signals: Signals, channel: Channel, place: Any, gain: float | None) -> float:
+def _left(signals: Signals, channel: Channel, place: Any, known: Mapping[str, float]) -> float:
     """Share of the shake of a gauge's signal that is left, with its own free swing, offset and, if it is not known,
-    gain."""
+    gain; its filter as it is known."""
+    gain, low_pass = known.get("gain"), channel.low_pass
+    if low_pass is not None:
+        damping = known.get("filter_damping", low_pass.damping)
+        low_pass = LowPass(known.get("filter_frequency", low_pass.frequency), damping)
     inside = (channel.times >= 0.0) & (channel.times <= signals.times[-1])
     times, values = channel.times[inside], channel.values[inside, 0]
-    answer = signals.at(STRAIN, place, times, low_pass=channel.low_pass)
+    answer = signals.at(STRAIN, place, times, low_pass=low_pass)
     free = np.concatenate(
         [signals.decays(times), np.ones((len(times), 1)), *([answer] if gain is None else [])], axis=1
     )
@@ -205,11 +209,8 @@ def replays(
             robot = machine.robot(name, fit.estimates).shot
             recordings = [one for _, found in machine.takes.values() for one in found]
             sensors = {path for one in recordings for c in one.channels for path in (c.path, c.to)}
-            error = by[own].largest_error_mm if own in by else None
-            if peer is not None:
-                gain = machine.robot(name).shot.character.motors[0].position_gain / peer.bench.unit_gain
-                error = partial(peer.largest_error_mm, gain)
-            assert error is not None
+            gain = machine.robot(name).shot.character.motors[0].position_gain
+            error = partial(peer.largest_error_mm, gain / peer.bench.unit_gain) if peer else by[own].largest_error_mm
             rows.append(replayed(", ".join(own), name, robot, unexplained_share(fit), error, STEP, sensors))
             say(_sentence(rows[-1]))
     return rows

@@ -7,7 +7,7 @@ angle of the hub t by
     q_k'' + 2 z w_k q_k' + w_k^2 q_k = -G_k t'',    strain at the root ~ 2 w / L - 2 p / 3
 
 and the gauge's signal passes a filter of second order. Gain, offset and the free motion of both modes at the start are
-linear, and are fitted with every modulus and damping.
+linear, and are fitted with every modulus, damping, and corner and damping of the filter.
 
 Source: Meirovitch, Fundamentals of Vibrations, 2001, section 8.10 (assumed modes of a beam with a tip mass).
 """
@@ -15,7 +15,7 @@ Source: Meirovitch, Fundamentals of Vibrations, 2001, section 8.10 (assumed mode
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from calmotion.arrays import Array
@@ -142,7 +142,9 @@ def fitted(strip: Strip, readings: Sequence[Reading]) -> Fitted:
     """Modulus, damping and gain that explain recordings best."""
 
     def solved(x: Array) -> tuple[Strip, float, Array]:
-        own, damping = _with_modulus(strip, float(np.exp(x[0]))), float(np.exp(x[1]))
+        modulus, damping, corner, filter_damping = (float(v) for v in np.exp(x))
+        own = replace(strip, modulus=modulus * strip.modulus, corner=corner * strip.corner,
+                      filter_damping=filter_damping * strip.filter_damping)  # fmt: skip
         rows, values, first = [], [], 1
         total = 1 + 5 * len(readings)
         for reading in readings:
@@ -155,16 +157,10 @@ def fitted(strip: Strip, readings: Sequence[Reading]) -> Fitted:
         best = np.linalg.lstsq(A, b, rcond=None)[0]
         return own, float(best[0]), b - A @ best
 
-    starts = [np.log([e, z]) for e in (0.5, 0.7, 1.0, 1.4) for z in (0.02, 0.1)]
-    found = min(
-        (least_squares(lambda x: solved(x)[2], x, bounds=(np.log([0.1, 1e-3]), np.log([10.0, 0.7]))) for x in starts),
-        key=lambda item: item.cost,
-    )
+    starts = [np.log([e, z, 1.0, 1.0]) for e in (0.5, 0.7, 1.0, 1.4) for z in (0.02, 0.1)]
+    bounds = np.log([[0.1, 1e-3, 0.5, 0.3], [10.0, 0.7, 2.0, 3.0]])
+    found = min((least_squares(lambda x: solved(x)[2], x, bounds=bounds) for x in starts), key=lambda item: item.cost)
     own, gain, off = solved(found.x)
     first, second = (float(w) / (2.0 * np.pi) for w in own.modes()[0])
-    modulus, damping = (float(v) for v in np.exp(found.x))
+    modulus, damping = (float(v) for v in np.exp(found.x[:2]))
     return Fitted(modulus, damping, gain, (first, second), float(np.sqrt(np.mean(off**2))), own)
-
-
-def _with_modulus(strip: Strip, factor: float) -> Strip:
-    return Strip(**{**vars(strip), "modulus": factor * strip.modulus})

@@ -3,8 +3,9 @@
 The clock of a recording reads s at the first frame of the shot, and a share d slower: t_robot = (t - s) (1 + d). An
 accelerometer has a constant bias in its axes; a marker sits a little off its prim, by a distance that is constant in
 the prim's axes; a strain gauge has a gain and an offset. A robot that moves already when a shot begins swings freely in
-its lowest natural modes beside what the shot makes it do, by amounts of each sensor. These are parameters like those of
-the robot, whose derivatives are exact.
+its lowest natural modes beside what the shot makes it do, by amounts of each sensor. A low-pass may have another corner
+and damping than is told. These are parameters like those of the robot; derivatives are exact, and central differences
+for filters.
 """
 
 from __future__ import annotations
@@ -14,14 +15,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.recordings import ACCELEROMETER, MARKER, STRAIN
+from calmotion.recordings import ACCELEROMETER, MARKER, STRAIN, Channel, LowPass
 
-from ..model.estimates import BIAS, CLOCK_DRIFT, CLOCK_OFFSET, GAIN, OFFSET, PLACE, START
+from ..model.estimates import (
+    BIAS,
+    CLOCK_DRIFT,
+    CLOCK_OFFSET,
+    FILTER_DAMPING,
+    FILTER_FREQUENCY,
+    GAIN,
+    OFFSET,
+    PLACE,
+    START,
+)
 from .parameters import Parameter
 from .recordings.sensors import Sensor, decay_paths, own_path
 from .signals import Signals
 
 Motions = Sequence[Signals]  # of each shot
+SIDE = 1e-3  # standard deviations of a prior by which the parameters of a filter are moved, for derivatives
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +69,13 @@ class Measurement:
         start, drift = (self._value(x, kind, file) for kind in (CLOCK_OFFSET, CLOCK_DRIFT))
         return np.asarray((sensor.channel.times - start) * (1.0 + drift))
 
+    def low_pass(self, channel: Channel, x: Array) -> LowPass | None:
+        """The filter of a channel's sensor, or None."""
+        if channel.low_pass is None:
+            return None
+        frequency, damping = (self._value(x, kind, channel.path) for kind in (FILTER_FREQUENCY, FILTER_DAMPING))
+        return LowPass(frequency or channel.low_pass.frequency, damping or channel.low_pass.damping)
+
     def predicted(self, motions: Motions, sensor: Sensor, x: Array) -> Array:
         """What a sensor would measure, shape [n, c].
 
@@ -65,7 +84,7 @@ class Measurement:
         """
         times, kind, path = self.robot_times(sensor, x), sensor.channel.kind, own_path(sensor)
         signals = motions[sensor.take]
-        values = signals.at(kind, sensor.index, times, low_pass=sensor.channel.low_pass)
+        values = signals.at(kind, sensor.index, times, low_pass=self.low_pass(sensor.channel, x))
         if kind == STRAIN:
             values = self._value(x, GAIN, path) * values + self._value(x, OFFSET, path)
         if kind == MARKER and isinstance(sensor.index, int) and np.any(place := self._vector(x, PLACE, path)):
@@ -90,7 +109,8 @@ class Measurement:
         signals = motions[sensor.take]
         file = self.recordings[sensor.recording]
         out = np.zeros((len(times), channel.values.shape[1], len(self.parameters)))
-        rate = signals.at(channel.kind, sensor.index, times, 1, channel.low_pass)
+        low_pass = self.low_pass(channel, x)
+        rate = signals.at(channel.kind, sensor.index, times, 1, low_pass)
         if channel.kind == STRAIN:
             rate = self._value(x, GAIN, path) * rate
         if (free := self._free(signals, sensor, x)) is not None:
@@ -107,8 +127,13 @@ class Measurement:
             elif p.kind == BIAS and channel.kind == ACCELEROMETER and p.path == path:
                 out[:, p.axis, m] = p.spread
             elif p.kind in (GAIN, OFFSET) and channel.kind == STRAIN and p.path == path:
-                own = signals.at(STRAIN, sensor.index, times, low_pass=channel.low_pass) if p.kind == GAIN else 1.0
+                own = signals.at(STRAIN, sensor.index, times, low_pass=low_pass) if p.kind == GAIN else 1.0
                 out[:, :, m] = p.slope(float(x[m])) * own
+            elif p.kind in (FILTER_FREQUENCY, FILTER_DAMPING) and low_pass is not None and p.path == channel.path:
+                gain = self._value(x, GAIN, path) if channel.kind == STRAIN else 1.0
+                ends = [self.low_pass(channel, x + side * np.eye(len(x))[m]) for side in (SIDE, -SIDE)]
+                one, other = (signals.at(channel.kind, sensor.index, times, low_pass=end) for end in ends)
+                out[:, :, m] = gain * (one - other) / (2.0 * SIDE)
             elif p.kind == START and p.path in (paths := decay_paths(sensor, signals)):
                 out[:, max(p.axis, 0), m] = p.spread * signals.decays(times)[:, paths.index(p.path)]
             elif p.kind == PLACE and channel.kind == MARKER and p.path == path:

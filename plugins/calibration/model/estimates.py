@@ -20,6 +20,7 @@ HIGHER_MODES = "higher_modes"
 # kinds of parameters of a measurement
 CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE = "clock_offset", "clock_drift", "bias", "place"
 GAIN, OFFSET = "gain", "offset"  # of a strain gauge
+FILTER_FREQUENCY, FILTER_DAMPING = "filter_frequency", "filter_damping"  # of a sensor's low-pass
 START = "start"  # free motion in which a shot begins, of a sensor's signal
 
 MATERIAL_KINDS = (MODULUS, DAMPING, DENSITY)
@@ -30,7 +31,7 @@ MOTOR_KINDS = (
 )  # fmt: skip
 ROBOT_KINDS = (*MATERIAL_KINDS, *BODY_KINDS, *MOTOR_KINDS)
 MODEL_KINDS = (HIGHER_MODES,)
-MEASUREMENT_KINDS = (CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE, GAIN, OFFSET, START)
+MEASUREMENT_KINDS = (CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE, GAIN, OFFSET, FILTER_FREQUENCY, FILTER_DAMPING, START)
 AXES = "xyz"
 WITH_THIS_MODEL_ONLY = "with this model only"
 

@@ -20,7 +20,17 @@ from calmotion.recordings import (
     refuse_unknown_channels,
 )
 
-from ...model.estimates import BIAS, CLOCK_DRIFT, CLOCK_OFFSET, GAIN, OFFSET, PLACE, START
+from ...model.estimates import (
+    BIAS,
+    CLOCK_DRIFT,
+    CLOCK_OFFSET,
+    FILTER_DAMPING,
+    FILTER_FREQUENCY,
+    GAIN,
+    OFFSET,
+    PLACE,
+    START,
+)
 from ..parameters import PRIORS, Parameter
 from ..signals import Place, Signals, place_of
 from .clocks import fitted_gain
@@ -114,8 +124,8 @@ def measurement_parameters(
     priors: Mapping[str, float] | None = None,
     take: int = 0,
 ) -> tuple[Parameter, ...]:
-    """Clocks of the recordings, biases of accelerometers and places of markers; the recordings of one shot share the
-    latter two.
+    """Clocks of the recordings, biases of accelerometers and places of markers, which the recordings of one shot share,
+    and low-passes of sensors, which all recordings share.
 
     Args:
         take: Index of the shot.
@@ -131,6 +141,13 @@ def measurement_parameters(
                 unit = "m" if kind == PLACE else "m/s^2"
                 path = _of_take(channel.path, take)
                 found += [Parameter(kind, path, 0.0, given[kind], unit, axis, False) for axis in range(3)]
+            if (low_pass := channel.low_pass) is not None:
+                own = {FILTER_FREQUENCY: (low_pass.frequency, "Hz"), FILTER_DAMPING: (low_pass.damping, "")}
+                found += [
+                    Parameter(kind, channel.path, value, float(np.log1p(given[kind])), unit)
+                    for kind, (value, unit) in own.items()
+                    if value
+                ]
     return tuple({p.name: p for p in found}.values())
 
 

@@ -48,11 +48,12 @@ def test_a_filter_is_that_of_its_transfer_function(shots):
     assert np.abs(found - raw[0] - exact).max() < 2e-3 * np.ptp(exact)
 
 
-def test_a_gauge_tells_modulus_and_damping_of_an_arm_that_swings_when_its_shot_begins(shots):
+@pytest.mark.parametrize("real", [FILTER, LowPass(5.4, 0.62)], ids=["", "another filter"])
+def test_a_gauge_tells_modulus_and_damping_of_an_arm_that_swings_when_its_shot_begins(shots, real):
     whole, part = shots
     signals = signals_of(robot_with(whole, TRUTH), RunSettings(step=1 / 960))
     times = np.arange(0.0, 1.2, 1 / 200)
-    values = GAIN * signals.at(STRAIN, PLACE, times + LATER, low_pass=FILTER) + OFFSET
+    values = GAIN * signals.at(STRAIN, PLACE, times + LATER, low_pass=real) + OFFSET
     values = values + 2e-3 * np.ptp(values) * np.random.default_rng(0).standard_normal(values.shape)
     channel = Channel(STRAIN, ENDS[0], times, values, to=ENDS[1], low_pass=FILTER)
     settings = CalibrationSettings(("modulus", "damping"), {"clock_offset": 1e-3}, halvings=0)
@@ -63,5 +64,7 @@ def test_a_gauge_tells_modulus_and_damping_of_an_arm_that_swings_when_its_shot_b
     assert estimates[f"modulus {PLASTIC}"].value == pytest.approx(2.15e9, rel=0.02)
     assert estimates[f"damping {PLASTIC}"].value == pytest.approx(0.02, rel=0.2)
     assert estimates[f"gain {ENDS[0]}"].value == pytest.approx(GAIN, rel=0.03)
+    assert estimates[f"filter_frequency {ENDS[0]}"].value == pytest.approx(real.frequency, rel=0.02)
+    assert estimates[f"filter_damping {ENDS[0]}"].value == pytest.approx(real.damping, rel=0.04)
     assert found.channels[0].validation_rms < 0.01 * np.ptp(values)
     assert any("moves already when its recording begins" in note for note in found.notes)
