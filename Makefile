@@ -4,7 +4,7 @@
 # make release-check  these, and with the newest versions as well; the result goes into docs/evidence/systems.md
 # make test-portable  the tests as on other processors, with meshes made anew and other numbers of threads
 # make docs     the documentation, in build/docs
-# make fuzz     ten minutes of damage to each of shots, meshes, motions, manifests, settings and caches
+# make fuzz     random robots (RUNS=50 SEED=1), then ten minutes of damage to each kind of file (FUZZED= for none)
 # make torture  hours of kills, full disks, damaged caches and other faults (RUNS=20 SEED=1 for a short one)
 # make golden   errors and frequencies of the samples and of robots of others, against the numbers that are kept
 # make audit    known weaknesses of the dependencies; fails where there is no data on them (needs the network)
@@ -117,10 +117,13 @@ test-portable: $(INSTALLED_DEV)
 		NPY_DISABLE_CPU_FEATURES=X86_V3; \
 	echo "== summary"; printf "$$summary"; exit $$status
 
-FUZZED := shot splines meshes bvh recordings motions manifests settings
+# Random robots first. Their shots, where something is wrong, stay in build/fuzz/robots.
+FUZZED ?= shot splines meshes bvh recordings motions manifests settings
+fuzz: RUNS = 200
 fuzz: $(INSTALLED_DEV)
 	$(RUN) -m pytest -q -x tests/fuzz
-	@$(RUN) -m pip install --quiet --editable '.[fuzz]'
+	$(RUN) tests/fuzz/robots/robot_campaign.py --runs $(RUNS) --seed $(SEED)
+	@test -z "$(FUZZED)" || $(RUN) -m pip install --quiet --editable '.[fuzz]'
 	@status=0; for target in $(FUZZED); do \
 		echo "== $$target"; $(RUN) tests/fuzz/guided.py $$target $${CALMOTION_FUZZ:-600} || status=1; \
 	done; exit $$status
