@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from calmotion.arrays import Array
 from calmotion.model.tempo import TempoSettings
 from calmotion.model.tolerance import SEARCH_SHARE
 from calmotion.model.uncertainty import RobustSettings
@@ -35,6 +36,8 @@ class RunSettings:
         limited_by_tempo: Whether a tempo keeps the limits that it can, so that a search need not.
         narrowed: Shares of the limits within which a search keeps each motor, by the name of the quantity; those of
             others are kept as they are.
+        between: By how much efforts are more near each judged instant than there [N m] or [N], shape [T, M], as finer
+            steps have them; None: not known.
         robust: Settings of an optimisation for a set of robots; None: for the nominal robot alone.
         terms: Residuals and limits of plugins, `retargeting.SearchTerm`.
     """
@@ -56,6 +59,7 @@ class RunSettings:
     retime: TempoSettings | None = None
     limited_by_tempo: bool = False
     narrowed: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    between: Array | None = field(default=None, compare=False, repr=False)
     goal: float | None = None
     terms: tuple[Any, ...] = ()
 

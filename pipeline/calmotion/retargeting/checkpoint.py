@@ -52,6 +52,7 @@ def problem_key(problem: RetargetProblem, fixed: BoolArray, settings: object) ->
     if problem.limits is not None:
         for bound in problem.limits.bounds.values():
             arrays += [bound.lower, bound.upper]
+        arrays += problem.limits.shifts.values()
     for array in map(np.asarray, arrays):
         digest.update(str((array.shape, array.dtype)).encode())
         digest.update(np.ascontiguousarray(array).tobytes())

@@ -20,11 +20,11 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.retargeting.avoided_reversals import play_of, with_reversals
 from calmotion.retargeting.checkpoint import Checkpoint, problem_key
 from calmotion.retargeting.found_curves import found_curves
-from calmotion.retargeting.kept_feet import with_kept_feet
 from calmotion.retargeting.left_out import search_rows
 from calmotion.retargeting.problem.limit_costs import limit_costs
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem, with_first_penalty
+from calmotion.retargeting.quantities.kept_feet import with_kept_feet
 from calmotion.retargeting.robust.robots import robots_of
 from calmotion.retargeting.search import RetargetSearch
 from calmotion.retargeting.search_progress import SearchMemory
@@ -139,15 +139,17 @@ def _optimized(
         pre_roll_s=problem.grid.pre_roll,
         dof=prepared.model.dof,
         left_out=tuple(rows),
-        limits=limit_uses(_used(before, character), _used(after, character), problem.grid, costs),
+        limits=limit_uses(_used(before, character, False), _used(after, character, True), problem.grid, costs),
         performed=performed_motion(prepared, after.curves),
         goal_m=goal_of(character, options.goal),
         terms=term_uses(before, after, character, options.terms),
     ).with_limits_told()
 
 
-def _used(at: Evaluation, character: Character) -> list[Excess]:
-    """Use of all limits of the motors at a point."""
-    bounds = motor_bounds(character)
+def _used(at: Evaluation, character: Character, shifted: bool) -> list[Excess]:
+    """Use of all limits of the motors at a point, with what is known of finer steps or without."""
+    bounds, limits = motor_bounds(character), at.problem.limits
     values = limited_values(at.problem.model, bounds, at.curves, at.run)
+    if limits is not None and shifted:
+        values |= {name: values[name] + by for name, by in limits.shifts.items()}
     return excesses(bounds, values, at.problem.grid.judged)

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from calmotion.model import Result, Track
+from calmotion.model import Character, Result, Track
+from calmotion.model.limits.use import is_kept
 from calmotion.model.model_choice import OFF
 from calmotion.model.result import GOAL_REACHED
 from calmotion.model.run import RunSettings
@@ -83,7 +84,7 @@ def optimize_to_tolerance(
     elif chooses:
         progress(0.0, "choosing the time step")
         step = _first_step(projected.shot, options, shake)
-    result, tracks, searches = None, animation.current, SuccessiveSearches(progress)
+    result, tracks, searches, left = None, animation.current, SuccessiveSearches(progress), False
     for number in range(SEARCHES):
         reduced = projected.shot.with_tracks(tracks)
         of_step = replace(options, step=step) if chooses else options
@@ -103,29 +104,35 @@ def optimize_to_tolerance(
             assert accuracy is not None
             allowed = allowed_step_error(character, options, besides_step(accuracy)) if chooses else np.inf
             fine = accuracy.step_m <= allowed or step <= LAST
-            if fine and accurate is None:
+            step = step if fine else _finer_step(result.step_s, allowed / accuracy.step_m, character)
+            # a search under limits follows where the tempo does not keep them
+            left = options.limited_by_tempo and not all(map(is_kept, latest.limits))
+            if fine and accurate is None and not left:
                 accurate = ended or _is_accurate(projected, tracks, result, options)
                 result = with_subspaces(result, projected.shot) if accurate else result
-            if fine and accurate:
+            if (fine and accurate) or left:
                 if again and not number:
                     memory.taken += [SUBSPACES, *([TIME_STEP] if chooses and memory.step else [])]
-                memory.projected, memory.step = projected, result.step_s
+                memory.projected, memory.step = projected, result.step_s if fine else step
                 break
         except KeyboardInterrupt:
             if result is None:
                 raise
             result = best_so_far(result)
             break
-        if not fine:
-            step = max(LAST, STEP_SAFETY * result.step_s * (allowed / accuracy.step_m) ** (1.0 / order_of(character)))
     assert result is not None
     if options.robust is not None and not result.interrupted:
         searches.ended()
         reduced, of_step = projected.shot, replace(options, step=result.step_s if chooses else options.step)
         result = with_modes(_robustly(reduced, of_step, options, result, searches), shot.bodies)
-    if not chooses or again or result.interrupted:
+    if not chooses or again or left or result.interrupted:
         return result
     return with_input_resolved(result, reduced.with_tracks(animation.tracks), options)
+
+
+def _finer_step(step: float, ratio: float, character: Character) -> float:
+    """A step whose error is so many times that of another [s]."""
+    return max(LAST, STEP_SAFETY * step * float(ratio ** (1.0 / order_of(character))))
 
 
 def _first_step(shot: CompiledShot, options: RunSettings, shake: Callable[[StepRun], float]) -> float:

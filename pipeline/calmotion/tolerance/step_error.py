@@ -81,6 +81,23 @@ def simulate_at(
     Raises:
         ShotError: The shot cannot be simulated by this step.
     """
+    prepared, run = _performed(shot, options, step, divides)
+    model, grid = prepared.model, prepared.grid
+    parts = elastic_by_body(model, run.trajectory.states.u) if elastic else []
+    return StepRun(
+        grid.h, run.target_positions[grid.frames], tuple(part.astype(np.float32) for part in parts), options.scheme,
+        run.trajectory.max_joint_gap, _efforts(prepared, run, grid.frames), order_of(shot.character),
+        excitation_of(shot.character, model, run, grid.h) if loads else (),
+    )  # fmt: skip
+
+
+def efforts_by(shot: CompiledShot, options: RunSettings, step: float) -> Array:
+    """Efforts of the motors at the judged instants of one simulation [N m] or [N], shape [T, M]; as `simulate_at`."""
+    prepared, run = _performed(shot, options, step, True)
+    return _efforts(prepared, run, np.flatnonzero(prepared.grid.judged).astype(np.int32))
+
+
+def _performed(shot: CompiledShot, options: RunSettings, step: float, divides: bool) -> tuple[Prepared, ForwardRun]:
     prepared = prepare(shot, replace(options, step=step))
     model, grid = prepared.model, prepared.grid
     workspace = Workspace.for_system(model.system)
@@ -92,12 +109,7 @@ def simulate_at(
         )  # fmt: skip
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
-    parts = elastic_by_body(model, run.trajectory.states.u) if elastic else []
-    return StepRun(
-        grid.h, run.target_positions[grid.frames], tuple(part.astype(np.float32) for part in parts), options.scheme,
-        run.trajectory.max_joint_gap, _efforts(prepared, run, grid.frames), order_of(shot.character),
-        excitation_of(shot.character, model, run, grid.h) if loads else (),
-    )  # fmt: skip
+    return prepared, run
 
 
 def _efforts(prepared: Prepared, run: ForwardRun, frames: IntArray) -> Array:

@@ -9,11 +9,11 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.model.run import RunSettings
-from calmotion.retargeting.kept_feet import with_kept_feet
 from calmotion.retargeting.problem import linear_problem
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.robot import GROUND
 from calmotion.retargeting.quantities.ground import SPEED, ground_bounds
+from calmotion.retargeting.quantities.kept_feet import with_kept_feet
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.preparation import prepare

@@ -160,6 +160,19 @@ def test_terms_have_the_derivatives_that_they_say(terms):
     assert np.all(limits.gradient("velocity", values["velocity"])[:2] == 0.0), "nothing counts before the shot"
 
 
+def test_shifted_terms_are_those_of_larger_values(terms):
+    limits, values = terms
+    more = np.random.default_rng(2).normal(size=(7, 2))
+    shifted, moved = limits.shifted("velocity", more), values["velocity"].copy()
+    moved[2:] += more
+    larger = values | {"velocity": moved}
+    assert shifted.value(values) == pytest.approx(limits.value(larger), rel=1e-12)
+    assert np.allclose(shifted.gradient("velocity", values["velocity"]), limits.gradient("velocity", moved))
+    assert shifted.excess(values) == pytest.approx(limits.excess(larger), rel=1e-12)
+    assert limits.shifted("velocity", more[1:]) is limits, "of other instants"
+    assert limits.shifted("effort", more) is limits, "of what is not limited"
+
+
 def test_the_penalty_grows_no_further_than_short_steps_allow(terms):
     limits, values = terms
     for _ in range(30):  # an excess that stays

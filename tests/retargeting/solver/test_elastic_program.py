@@ -24,6 +24,19 @@ def test_the_minimum_is_that_of_another_method(seed):
     assert np.max(np.abs(found.multipliers * (b - G @ found.x))) < 1e-7
 
 
+def test_rows_of_all_unknowns_beside_sparse_ones_are_kept_as_well():
+    rng, n = np.random.default_rng(7), 40
+    G, b = np.vstack([np.eye(n), -np.eye(n), np.ones(n), -np.ones(n)]), np.r_[np.ones(2 * n), 5.0, -5.0]
+    c = rng.normal(size=n)
+    found = elastic_minimum(csr_matrix(2.0 * np.eye(n)), c, csr_matrix(G), b, 1e4).x
+    # clipped at one level, which the sum determines
+    low, high = -10.0, 10.0
+    for _ in range(80):
+        level = 0.5 * (low + high)
+        low, high = (level, high) if np.clip(level - 0.5 * c, -1.0, 1.0).sum() < 5.0 else (low, level)
+    np.testing.assert_allclose(found, np.clip(level - 0.5 * c, -1.0, 1.0), atol=1e-6)
+
+
 def test_constraints_that_exclude_each_other_are_exceeded_least():
     rng = np.random.default_rng(5)
     G, b = rng.normal(size=(8, 3)), np.full(8, -1.0)

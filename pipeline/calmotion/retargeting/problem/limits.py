@@ -39,6 +39,7 @@ class LimitTerms:
         reached: Largest excess at the last minimum of the problem.
         stalled: Number of minima in a row that hardly reduced it.
         first: The penalty at the first update; 0 before.
+        shifts: What is added to the values of a quantity at each instant, shape [T, M].
         on: Whether the terms are part of the merit. They are once a minimum without them violates limits; that minimum
             is a better start than the input, which may violate them by far.
     """
@@ -52,6 +53,7 @@ class LimitTerms:
     reached: float = np.inf
     stalled: int = 0
     first: float = 0.0
+    shifts: dict[str, Array] = field(default_factory=dict)
     on: bool = False
 
     def __post_init__(self) -> None:
@@ -63,10 +65,19 @@ class LimitTerms:
         """Terms that do not count yet; None without bounds."""
         return cls(dict(bounds), judged, h, 1.0) if bounds else None
 
+    def shifted(self, name: str, by: Array | None) -> LimitTerms:
+        """The same with more of a quantity at the J judged instants, shape [J, M]; not where they are others."""
+        if by is None or name not in self.bounds or len(by) != np.count_nonzero(self.judged):
+            return self
+        every = np.zeros((len(self.judged), by.shape[1]))
+        every[self.judged] = by
+        return replace(self, shifts=self.shifts | {name: every})
+
     def _sides(self, name: str, v: Array) -> Array:
         """c of the upper and of the lower side, shape [2, T, M]; very negative where there is no limit."""
         bound = self.bounds[name]
         with np.errstate(invalid="ignore"):
+            v = v + self.shifts.get(name, 0.0)
             sides = np.stack([v - bound.upper, bound.lower - v]) / bound.scale + MARGIN
         return np.where(np.isfinite(sides) & self.judged[:, None], sides, -1e30)
 

@@ -21,6 +21,7 @@ from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on, uniform_breaks
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.problem.robot import EFFORT
 from calmotion.simulation.inputs.curves import Curves, coupling_of, leaders, sample_tracks
 from calmotion.simulation.inputs.tempo import TEMPO_LIMITS
 from calmotion.simulation.inputs.time_grid import TimeGrid
@@ -59,7 +60,7 @@ def pose(
     problem = RetargetProblem.of_model(
         prepared.model, grid, curves, Objective.over(prepared.model, intended, grid, animation.weights),
         OffsetSpace(known.basis, known.motors, known.coupling, smoothness, closeness_of(character)), prepared.world,
-        LimitTerms.of(known.bounds, grid.judged, grid.h), known.continuous,
+        _limits(known.bounds, grid, options), known.continuous,
     )  # fmt: skip
     offsets = known.offsets
     start = fitted(known.basis, offsets).ravel() if np.any(offsets) else np.zeros(problem.size)
@@ -67,6 +68,11 @@ def pose(
     if ahead is not None and not _merit(problem, start) < _merit(problem, np.zeros(problem.size)):
         start = np.zeros(problem.size)
     return problem, start, not knot_spacing(character, options)
+
+
+def _limits(bounds: dict[str, Bounds], grid: TimeGrid, options: RunSettings) -> LimitTerms | None:
+    limits = LimitTerms.of(bounds, grid.judged, grid.h)
+    return None if limits is None else limits.shifted(EFFORT, options.between)
 
 
 def _merit(problem: RetargetProblem, x: Array) -> float:

@@ -17,10 +17,10 @@ from calmotion.model.run import RunSettings
 from calmotion.model.uncertainty import Scenario
 from calmotion.retargeting.avoided_reversals import play_of, with_reversals
 from calmotion.retargeting.found_curves import found_curves
-from calmotion.retargeting.kept_feet import with_kept_feet
 from calmotion.retargeting.problem.limits import MARGIN, LimitTerms
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
+from calmotion.retargeting.quantities.kept_feet import with_kept_feet
 from calmotion.retargeting.robust.measure import largest_errors
 from calmotion.retargeting.robust.robots import robots_of
 from calmotion.retargeting.search_terms import with_terms

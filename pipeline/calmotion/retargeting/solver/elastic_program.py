@@ -11,13 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix, diags
+from scipy.sparse import bmat, csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import splu
 
-from calmotion.arrays import Array
+from calmotion.arrays import Array, BoolArray
 
 ITERATIONS = 100  # iterations
 FRACTION_TO_BOUNDARY = 0.995  # share of the way to the boundary that a step takes
+FULL, FEW = 0.25, 8  # share of the unknowns of a row that would fill the matrix of all others, and most such rows
 COMPLEMENTARITY = 1e-14  # complementarity at the end, relative to rho
 
 
@@ -46,6 +47,8 @@ def elastic_minimum(H: csr_matrix, c: Array, G: csr_matrix, b: Array, rho: float
     """
     count, x, Gt = max(1, len(b)), np.zeros(len(c)), csc_matrix(G.T)
     gap = G @ x - b
+    full = np.diff(G.indptr) > FULL * len(c)
+    full &= np.count_nonzero(full) <= FEW
     multipliers = other = np.full(len(b), 0.5 * rho)  # other: rho - multipliers, whose digits a difference would lose
     below, above = np.maximum(-gap, 0.0) + 1.0, np.maximum(gap, 0.0) + 1.0
     for _ in range(ITERATIONS):
@@ -57,7 +60,7 @@ def elastic_minimum(H: csr_matrix, c: Array, G: csr_matrix, b: Array, rho: float
         goal = 0.1 * measure
         weight = 1.0 / (below / multipliers + above / other)
         right = -primal - (goal / multipliers - below) + (goal / other - above)
-        step = splu(csc_matrix(H + Gt @ diags(weight) @ G)).solve(-dual + Gt @ (weight * right))
+        step = _step(H, G, weight, full, -dual + Gt @ (weight * right))
         d_multipliers = weight * (G @ step - right)
         d_below = (goal - below * d_multipliers) / multipliers - below
         d_above = (goal + above * d_multipliers) / other - above
@@ -73,6 +76,16 @@ def elastic_minimum(H: csr_matrix, c: Array, G: csr_matrix, b: Array, rho: float
             above + length * d_above,
         )
     return ElasticPoint(x, multipliers)
+
+
+def _step(H: csr_matrix, G: csr_matrix, weight: Array, full: BoolArray, right: Array) -> Array:
+    """The solution of (H + G^T W G) x = right, with a multiplier for each full row."""
+    sparse, rows = G[~full], G[full]
+    matrix = H + sparse.T @ diags(weight[~full]) @ sparse
+    if np.any(full):
+        matrix = bmat([[matrix, rows.T], [rows, -diags(1.0 / weight[full])]])
+    solved = splu(csc_matrix(matrix)).solve(np.concatenate([right, np.zeros(int(full.sum()))]))
+    return np.asarray(solved[: len(right)])
 
 
 def _longest(values: Array, change: Array) -> float:
