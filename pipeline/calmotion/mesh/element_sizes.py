@@ -25,7 +25,7 @@ _LEAST = 2e-4  # of the diagonal; below, the tetrahedraliser takes minutes for a
 # Elements as long as that, of the thickness, in walls of more triangles are those of a thin round shell: following a
 # tube of 2 mm within 0.05 mm takes more than 36 s, within 0.25 mm some 30 s, for a frequency that is 0.05% off
 _SHELL, _FLAT = 2.0, 100
-_SIMPLE = 600  # triangles; below, the surface is that of a box or a tube: following it closely costs a second
+SIMPLE = 600  # triangles; below, the surface is that of a box or a tube: following it closely costs a second
 
 
 @dataclass(frozen=True)
@@ -37,16 +37,12 @@ class Shape:
         length: Longest side of its bounding box [m].
         volume: [m^3].
         area: [m^2].
-        envelope_factor: Factor of the distance that a mesh may be from the surface.
-        detail: Factor of the number of triangles that a surface with many details keeps, and of how close they are.
     """
 
     thickness: float
     length: float
     volume: float
     area: float
-    envelope_factor: float = 1.0
-    detail: float = 1.0
 
 
 def shape_of(points: Array, triangles: Indices) -> Shape:
@@ -123,7 +119,7 @@ def smallest_size(shape: Shape, max_nodes: int) -> float:
     return float(brentq(lambda size: expected_nodes(shape, size) - max_nodes, low, high, xtol=1e-6 * shape.length))
 
 
-def envelope(element_size: float, diagonal: float, shape: Shape, triangles: int, attempt: int) -> float:
+def envelope(element_size: float, diagonal: float, shape: Shape, triangles: int) -> float:
     """How far the mesh may leave the surface [m].
 
     It, more than the element size, decides how many elements the small features of a surface cost. Walls keep their
@@ -132,9 +128,8 @@ def envelope(element_size: float, diagonal: float, shape: Shape, triangles: int,
     Args:
         element_size: [m].
         diagonal: Of the body's bounding box [m].
-        attempt: 0 first; halved for each further one, since the volume was off.
     """
-    simple = _SIMPLE if element_size < _SHELL * shape.thickness else _FLAT
+    simple = SIMPLE if element_size < _SHELL * shape.thickness else _FLAT
     part = 100.0 if triangles <= simple else 20.0
     distance = min(element_size / part, _FORM * diagonal, _WALL * shape.thickness)
-    return max(distance, _LEAST * diagonal) * shape.envelope_factor * 0.5**attempt
+    return max(distance, _LEAST * diagonal)

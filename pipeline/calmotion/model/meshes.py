@@ -79,6 +79,7 @@ class MeshQuality:
         stiffness_factor: Of the stiffness of ever finer meshes over that of this one, by which its elements are softer.
         deflection_error: Estimated relative error of deflections, to which stiff modes add little; None: twice that of
             frequencies.
+        error_of_source: Relative error of the compliance, since the solid is not that of the body's visual surface.
     """
 
     min_dihedral_deg: float
@@ -89,11 +90,12 @@ class MeshQuality:
     stiffness_factor: float = 1.0
     source: str = ""
     deflection_error: float | None = None
+    error_of_source: float = 0.0
 
     @property
-    def error_of_volume(self) -> float:
-        """Relative error of the stiffness by that of the volume: that of a rod goes with its section squared."""
-        return 2.0 * abs(self.volume_error)
+    def error_of_solid(self) -> float:
+        """Relative error of the stiffness by that of the solid; that of a rod goes with its section squared."""
+        return 2.0 * abs(self.volume_error) + self.error_of_source
 
 
 @dataclass(frozen=True, eq=False)

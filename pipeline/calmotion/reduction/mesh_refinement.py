@@ -302,7 +302,7 @@ def _with_errors(mesh: FEMesh, factor: float, error: float, of_deflection: float
         error: Relative, the largest.
         of_deflection: The same, each by its share.
     """
-    by_volume = mesh.quality.error_of_volume
+    by_volume = mesh.quality.error_of_solid
     quality = replace(
         mesh.quality,
         frequency_error=0.5 * (error + by_volume),

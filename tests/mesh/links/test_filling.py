@@ -31,7 +31,7 @@ def test_a_mesh_that_takes_too_long_is_made_again_with_larger_elements(host, mon
 
     monkeypatch.setattr(filling_module, "tetrahedralize", slow)
     (mesh,) = run(host, link(surface(box()), element_size=0.02), time_limit=50.0)
-    assert [limit for _, limit in tried] == pytest.approx([30.0, 50.0])  # the rest is for what follows
+    assert [limit for _, limit in tried] == pytest.approx([20.0, 35.0])  # the rest is for what follows
     assert tried[1][0] == pytest.approx(1.6 * tried[0][0])
     assert any("1.6 times as large" in text for text in mesh.quality.repairs)
     assert mesh.quality.volume == pytest.approx(8e-5, rel=3e-2) and mesh.quality.frequency_error > 0.0
@@ -68,7 +68,7 @@ def test_details_are_left_out_where_following_them_takes_too_long(host, monkeypa
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.03)
     (mesh,) = run(host, link(surface(ball)))
     assert len(tried) == 2 and tried[1][0] < tried[0][0]
-    assert any("simplified to" in text for text in mesh.quality.repairs)
+    assert any("times as large" in text for text in mesh.quality.repairs)
     assert mesh.quality.volume == pytest.approx(float(ball.volume), rel=1e-2)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.errors import ShotError
+from calmotion.mesh.element_sizes import SIMPLE
 from calmotion.mesh.tetrahedra import flat_tets, surface_volume
 from calmotion.support.caching.cache_folder import MESHES
 from calmotion.support.caching.caches import key_of, store_arrays, stored_arrays
@@ -20,11 +21,11 @@ from calmotion.support.operating_system import TimeExceeded, run_limited
 REMEDY = "Simplify or repair the Mesh, author a larger calm:flexible:elementSize, or give a TetMesh or a mesh file"
 MORE_TIME = ", or allow more with --set fe.mesh.time_limit={:.0f}"
 _TRIES = 3  # attempts at a mesh without flat elements
-# Number of passes that improve the elements, and the energy of the worst element at which they end. More passes hardly
-# improve the smallest angles and take most of the time where surfaces are dense, of more triangles than these, and
-# where a volume is many times the cubed element size. What worse elements cost is part of a mesh's estimated error.
-_NORMAL, _QUICK, _QUICKEST, _MANY = (80, 10.0), (5, 30.0), (5, 50.0), 2_000
-_LARGE, _CUBES = (80, 20.0), 1_000.0
+# Number of passes that improve the elements, and the energy of the worst element at which they end: of dense surfaces,
+# of others of more than a few triangles, of large volumes, and of the rest. More passes take up to three quarters of
+# the time and change frequencies by less than the error of the mesh. What worse elements cost is part of that error.
+_QUICKEST, _QUICK, _LARGE, _NORMAL = (5, 50.0), (5, 30.0), (80, 20.0), (80, 10.0)
+_CUBES = 1_000.0  # elements in a large volume
 # Default limit of the processor time of a body [s]: three times the 20 s that a link may take on a fast machine, since
 # slow and busy machines shall make the same meshes
 TIME_LIMIT = 60.0
@@ -126,7 +127,7 @@ def _stored(key: str, *names: str) -> tuple[np.ndarray, ...] | None:
 
 def _improvement(points: np.ndarray, triangles: np.ndarray, element_size: float) -> tuple[int, float]:
     """Number of passes that improve the elements, and the energy of the worst one at which they end."""
-    if len(triangles) > _MANY:
+    if len(triangles) > SIMPLE:
         return _QUICK if len(triangles) <= DENSE else _QUICKEST
     return _LARGE if surface_volume(points, triangles) > _CUBES * element_size**3 else _NORMAL
 

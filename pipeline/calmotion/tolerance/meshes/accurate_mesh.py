@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.element_sizes import envelope
+from calmotion.mesh.element_sizes import SIMPLE, envelope
 from calmotion.mesh.mass import balance_note, density_note, mass_of_tets
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.mesh.tetrahedralize.filling import INTERSECTS, MAX_VOLUME_ERROR, filled
@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from calmotion.tolerance.meshes.options import MeshOptions, Volume
 
 GOAL = 0.01  # error of the first frequencies: a fifth of what is known of a modulus to 10%
-# Nodes of the finer mesh at most: some six seconds
-MAX_NODES = 30_000
-_LONGER = 1.5  # factor of the element size where a surface has many details: they are refined where it matters
+# Nodes of the finer mesh at most: some five seconds
+MAX_NODES = 25_000
+# factor of the element size where a surface has more than a few triangles: elements are bisected where it matters
+_LONGER = 1.5
 _FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
 _SAME_MASS = 0.05  # relative difference that is not reported
 
@@ -43,7 +44,8 @@ def accurate(
         carrier: Frame of the joint to the parent, body frame.
     """
     time = ProcessorTime(options.time_limit)
-    mesh = filled(index, body, volume.solid, volume.shape, size, time, options.cache, _LONGER)
+    longer = _LONGER if len(volume.solid.triangles) > SIMPLE else 1.0
+    mesh = filled(index, body, volume.solid, volume.shape, size, time, options.cache, longer)
     mesh = judged(shaped_to(volume, size, mesh, body, attachments), body, carrier, attachments)
     return replace(mesh, quality=replace(mesh.quality, repairs=(*mesh.quality.repairs, *remark(mesh.quality))))
 
@@ -75,7 +77,7 @@ def shaped_to(
 
     solid, shape = volume.solid, volume.shape
     diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
-    limit = _FIT * envelope(size, diagonal, shape, len(solid.triangles), 0)
+    limit = _FIT * envelope(size, diagonal, shape, len(solid.triangles))
     return shaped(mesh, body, Surface(solid.points, solid.triangles, solid.volume, limit), attachments)
 
 

@@ -13,6 +13,7 @@ from calmotion.errors import ShotError
 from calmotion.mesh.element_sizes import MAX_NODES, element_size, shape_of
 from calmotion.mesh.mass import mass_of_solid
 from calmotion.mesh.mesh_file import read_mesh_file
+from calmotion.mesh.repair.closed_solid import Solid
 from calmotion.mesh.sources.beam import equivalent_beam
 from calmotion.mesh.sources.choice import solid_of
 from calmotion.mesh.sources.hollow import hollowed
@@ -29,7 +30,7 @@ from calmotion.mesh.tetrahedra import (
 )
 from calmotion.mesh.tetrahedralize.filling import filled, refuse_loose_parts, refuse_too_many
 from calmotion.mesh.tetrahedralize.tetwild import DENSE, OutOfTime, ProcessorTime
-from calmotion.model import Body, Character, FEMesh, Frame, TetGeometry
+from calmotion.model import Body, Character, FEMesh, Frame, SurfaceMesh, TetGeometry
 from calmotion.tolerance.meshes.accurate_mesh import (
     accurate,
     judged,
@@ -94,8 +95,43 @@ def _simplest_in_time(
     """
     for simpler in _simpler(index, body, geometry, options, frames, reason):
         with suppress(OutOfTime):
-            return _meshed(index, body, simpler, options, frames, attachments)
+            mesh = _meshed(index, body, simpler, options, frames, attachments)
+            assert isinstance(geometry, Volume)
+            return _in_its_place(mesh, body, geometry.solid, simpler.solid, attachments, frames[0] if frames else None)
     raise reason
+
+
+def _in_its_place(
+    mesh: FEMesh, body: Body, wanted: Solid, given: Solid, attachments: Sequence[AttachmentFrame], carrier: Frame | None
+) -> FEMesh:
+    """The mesh of a given solid in place of the wanted one, with the error of its stiffness that this is."""
+    from calmotion.reduction.mesh_refinement import root_at
+
+    root = root_at(attachments, carrier)
+    if root is None or mesh.quality.frequency_error is None:  # nothing holds it, or the reduction refuses it
+        return mesh
+    stiffer = _first_frequency(body, given, attachments, root) / _first_frequency(body, wanted, attachments, root)
+    quality, off = mesh.quality, abs(stiffer**2 - 1.0)
+    told = f"its first frequency is about {stiffer:.2g} times that of the visual surface, by beams and sections"
+    quality = replace(
+        quality,
+        error_of_source=off,
+        frequency_error=mesh.quality.frequency_error + abs(stiffer - 1.0),
+        deflection_error=(quality.deflection_error or 0.0) + off,
+        repairs=(*quality.repairs, told),
+    )
+    return replace(mesh, quality=quality)
+
+
+def _first_frequency(body: Body, solid: Solid, attachments: Sequence[AttachmentFrame], root: int) -> float:
+    """Of a solid by beams and sections [Hz]; arguments as of `estimated_body`."""
+    from calmotion.reduction.sections.estimate import estimated_body
+
+    assert body.flexible is not None
+    settings = replace(body.flexible, geometry="auto", mesh_file="", wall_thickness=-1.0)
+    surface = SurfaceMesh(body.path, solid.points, solid.triangles)
+    body = replace(body, tets=None, surfaces=(surface,), flexible=settings)
+    return float(estimated_body(body, attachments, root)[0].frequencies[0])
 
 
 def _refuse_far(mesh: FEMesh, body: Body, frames: Sequence[Frame]) -> None:
@@ -209,7 +245,7 @@ def geometry_of(index: int, body: Body, options: MeshOptions, frames: Sequence[F
         solid = hollowed(solid, settings.wall_thickness, settings.section, body.path)
     solid = replace(solid, repairs=(*repairs, *solid.repairs))
     size = options.element_size if options.element_size > 0.0 else settings.element_size
-    shape = replace(shape_of(solid.points, solid.triangles), envelope_factor=options.envelope_factor)
+    shape = shape_of(solid.points, solid.triangles)
     if size > 0.0:
         refuse_too_many(shape, size, ProcessorTime(options.time_limit), body.path)
     return Volume(solid, shape, size)

@@ -68,7 +68,7 @@ def meshes_to_tolerance(
     costs = {b: total / bound * error for b, error in known.items()}
     wanted = {}
     assert reduction.meshes is not None
-    by_volume = {mesh.body: mesh.quality.error_of_volume for mesh in reduction.meshes.meshes}
+    by_volume = {mesh.body: mesh.quality.error_of_solid for mesh in reduction.meshes.meshes}
     unknown = {b: unknown_stiffness(shot.character, b, options.tolerance) for b in known}
     most = UNASKED_NODES if any(unknown.values()) else MOST_NODES
     for b, share in _shares(costs, _MARGIN * allowed).items():

@@ -17,13 +17,11 @@ class MeshOptions:
         element_size: [m]; negative: that of the shot.
         time_limit: Of the processor time of the meshes of one body [s].
         cache: Whether the cache is used.
-        envelope_factor: Factor of the distance that meshes may be from their surfaces.
     """
 
     element_size: float = -1.0
     time_limit: float = TIME_LIMIT
     cache: bool = True
-    envelope_factor: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
