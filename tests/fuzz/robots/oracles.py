@@ -58,7 +58,8 @@ def tellings(seed: int, folder: Path) -> tuple[str, list[str]]:
     if refusals:
         where = f"{robot.kind}, {name}: refused: {refusals[0][:100]}"
         return where, [f"one of two is refused, {name}: {refusals}"] if len(refusals) == 1 else []
-    return f"{robot.kind}, {name}: same", compared(robot, *results)
+    slack = 5.0 if other.welded else 1.0  # two bodies have other errors of the step than one
+    return f"{robot.kind}, {name}: same", compared(robot, *results, slack=slack)
 
 
 def written(seed: int, folder: Path) -> tuple[str, list[str]]:
@@ -80,7 +81,8 @@ def written(seed: int, folder: Path) -> tuple[str, list[str]]:
     for path, target in result.targets.items():
         other = next(t for p, t in again.targets.items() if p.rsplit("/", 1)[1] == path.rsplit("/", 1)[1])
         off = np.abs(target.error - other.error).max() if len(target.error) == len(other.error) else np.nan
-        if not off <= 1e-4 * robot.reach + 2e-2 * largest:
+        coarse = 1e-4 if rate is None else 1e-3  # knots may lie between samples of another rate
+        if not off <= coarse * robot.reach + 2e-2 * max(largest, target.max_error):
             found.append(
                 f"{name}: written curves err {off:.3g} m otherwise than {target.max_error:.3g}, before {largest:.3g}"
             )
@@ -93,8 +95,8 @@ def written(seed: int, folder: Path) -> tuple[str, list[str]]:
     return f"{robot.kind}, {name}: {largest:.3g} -> {result.max_error:.3g}", found
 
 
-def compared(robot: Robot, one: dict, two: dict) -> list[str]:
-    """Differences beyond what single precision explains."""
+def compared(robot: Robot, one: dict, two: dict, slack: float = 1.0) -> list[str]:
+    """Differences beyond what single precision explains, times a slack."""
     if set(one) != set(two):
         return [f"different names: {sorted(set(one) ^ set(two))}"]
     largest = max(np.abs(v).max(initial=0.0) for k, v in one.items() if k.startswith("error"))
@@ -113,7 +115,7 @@ def compared(robot: Robot, one: dict, two: dict) -> list[str]:
         elif name.startswith(("curve", "freq")):
             allowed = 1e-4 + 2e-3 * size if name.startswith("freq") else 2e-6 + 1e-4 * size
         off = np.abs(a - b).max(initial=0.0)
-        if not off <= allowed:
+        if not off <= slack * allowed:
             found.append(f"{name}: {off:.3g} apart, largest {size:.3g}")
     return found
 
