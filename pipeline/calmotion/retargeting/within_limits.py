@@ -32,11 +32,12 @@ from calmotion.tolerance.motors.animation_limits import tempo_limits
 from calmotion.tolerance.pod_subspace import ReferenceRun
 from calmotion.tolerance.reduced_bodies import RunMemory
 from calmotion.tolerance.simulation import found_tracks
-from calmotion.tolerance.step_choice import chooses_step
+from calmotion.tolerance.step_choice import LAST, chooses_step
 from calmotion.tolerance.step_error import efforts_by, order_of
 
 LIMITED_SEARCHES = 4  # at most, one after the other
 ENOUGH = 5e-4  # share of a limit by which it counts as kept between the instants of a search
+COARSE = 2e-3  # excess of an effort that is left though finer steps were known, from which the step is halved
 SPARED = 5e-4  # share of the efforts that searches leave, since what finer steps have more is that of curves nearby
 FINE = 32  # instants of a frame at which curves are compared with their limits
 HALVED = 3  # most times that steps are halved for the efforts
@@ -85,6 +86,8 @@ def keep_limits(shot: CompiledShot, searches: Searches, found: Between) -> None:
         found = searches.between(shot)
         if done.interrupted or found.excess <= ENOUGH:
             break
+        if EFFORT in found.used and np.max(found.used[EFFORT]) > 1.0 + COARSE and searches.with_half_the_step():
+            found, efforts, shares[EFFORT] = searches.between(shot), None, np.full_like(shares[EFFORT], 1.0 - SPARED)
     searches.done = found.told(done)
 
 
@@ -119,6 +122,14 @@ class Searches:
         self.done = continued(self.done, latest) if self._count else latest
         self._count += 1
         return self.done
+
+    def with_half_the_step(self) -> bool:
+        """Let further searches have half the step of the last, and whether they have: not where the user chose it."""
+        shot = self._memory.searched
+        chosen = shot is not None and chooses_step(shot.character, self._options) and self.done.step_s > LAST
+        if chosen:
+            self._memory.step = 0.5 * self.done.step_s
+        return chosen
 
     def between(self, shot: CompiledShot) -> Between:
         """What the curves of the last do between its instants.
