@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import RunSettings
-from calmotion.simulation import CompiledShot, modes_of, prepare
+from calmotion.simulation import CompiledShot, modes_of, prepare, vibrating
 
-from .settings import LiveSettings
+from .settings import LONGEST, LiveSettings
 from .trial import Trial
 
 
@@ -34,7 +34,7 @@ class Worth:
 
 
 def worth_of_lookahead(shot: CompiledShot, settings: LiveSettings | None = None) -> tuple[list[Worth], tuple[str, ...]]:
-    """Without calming, then with look-aheads from 20 ms to the longest period of the robot.
+    """Without calming, then with look-aheads from 20 ms to the longest period of the robot, at most 5 s.
 
     Args:
         shot: The robot; its animation is the stream.
@@ -49,11 +49,12 @@ def worth_of_lookahead(shot: CompiledShot, settings: LiveSettings | None = None)
     shortest, rows = 0.02, 6
     settings = settings or LiveSettings()
     prepared = prepare(shot, RunSettings())
-    trial, (frequencies, _) = Trial(prepared), modes_of(prepared)
+    trial, (frequencies, damping) = Trial(prepared), modes_of(prepared)
     rms, largest = _errors(shot, trial.left(trial.curves.angles, trial.curves.rates, 0.0)[1])
     found, notes = [Worth(None, 0.0, rms, largest, {}, 0.0)], []
-    period = 1.0 / frequencies[0] if len(frequencies) else shortest
-    for lookahead in np.unique(np.geomspace(shortest, max(period, shortest), rows).round(3)).tolist():
+    periods = 1.0 / frequencies[vibrating(frequencies, damping)]
+    longest = float(np.clip(periods.max(initial=shortest), shortest, LONGEST))
+    for lookahead in np.unique(np.geomspace(shortest, longest, rows).round(3)).tolist():
         angles, rates, report = trial.streamed(shot, replace(settings, lookahead=lookahead))
         rms, largest = _errors(shot, trial.left(angles, rates, report["latency_s"])[1])
         found.append(Worth(lookahead, report["latency_s"], rms, largest, report["limited"], report["tick_s"]["median"]))

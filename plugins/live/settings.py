@@ -11,6 +11,8 @@ from calmotion.model import PRESCRIBED, contact_joints
 from calmotion.multibody import VelocityForces
 from calmotion.simulation import CompiledShot
 
+LONGEST = 5.0  # look-ahead that is accepted [s]
+
 
 @dataclass(frozen=True)
 class LiveSettings:
@@ -85,9 +87,9 @@ def refuse_unfit(shot: CompiledShot, settings: LiveSettings) -> None:
             found=f"{settings.rate:g} Hz",
             remedy="Use 10 to 2000 Hz; most controllers take 50 to 500.",
         )
-    if not 0.0 <= settings.lookahead <= 5.0:
+    if not 0.0 <= settings.lookahead <= LONGEST:
         raise SettingError(
-            "the look-ahead is not within 0 and 5 s",
+            f"the look-ahead is not within 0 and {LONGEST:g} s",
             path="--lookahead",
             found=f"{settings.lookahead:g} s",
             remedy="Use a third of the longest period of the robot, such as 120ms; see calmotion inspect --modes.",

@@ -30,6 +30,7 @@ from calmotion.simulation.inputs.shapers import best_delay as best_delay
 from calmotion.simulation.inputs.shapers import delay as delay
 from calmotion.simulation.inputs.shapers import impulses as impulses
 from calmotion.simulation.inputs.shapers import shaped as shaped
+from calmotion.simulation.inputs.shapers import vibrating as vibrating
 from calmotion.simulation.inputs.supported import refuse_half_turns as refuse_half_turns
 from calmotion.simulation.inputs.supported import refuse_unsupported as refuse_unsupported
 from calmotion.simulation.inputs.tempo import MotorEfforts as MotorEfforts

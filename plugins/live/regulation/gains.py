@@ -40,6 +40,7 @@ class Weighting:
     """
 
     LEAST_DAMPING = 1e-3  # ratio of critical, so that what no motor reaches dies away in the sums
+    FREE = 2e-3 * np.pi  # least angular frequency, so that free motions do, such as the spin of a ball joint [rad/s]
 
     tick: float
     window: int
@@ -125,8 +126,9 @@ def gains_at(pose: PoseModel, coupling: Array, weighting: Weighting) -> Gains:
     speed = a + robots * n
     flow = np.zeros((size, size))
     flow[d, rate] = flow[a, speed] = 1.0
-    omega = np.concatenate([factor * pose.omega for factor in weighting.frequencies])
-    damping = [pose.damping + np.diag(2.0 * weighting.LEAST_DAMPING * pose.omega)] * robots
+    natural = np.maximum(pose.omega, weighting.FREE)
+    omega = np.concatenate([factor * natural for factor in weighting.frequencies])
+    damping = [pose.damping + np.diag(2.0 * weighting.LEAST_DAMPING * natural)] * robots
     flow[speed, a] = -(omega**2)
     flow[np.ix_(speed, speed)] = -block_diag(*damping)
     flow[np.ix_(speed, rate)] = np.tile(pose.by_rate @ coupling, (robots, 1))

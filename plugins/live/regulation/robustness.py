@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.simulation import impulses
+from calmotion.simulation import impulses, vibrating
 
 from .gains import Gains
 
@@ -62,8 +62,11 @@ class Moves:
 
     def __init__(self, gains: Gains, coupling: Array, tick: float):
         self._coupling, self._tick, self._known = coupling, tick, len(gains.preview)
-        omega = min(float(gains.pose.omega.min(initial=np.inf)), 2.0 * np.pi * HIGHEST)
-        ratio = float(gains.pose.damping.ravel()[:1].sum()) / (2.0 * omega)
+        omega, ratio = 2.0 * np.pi * HIGHEST, 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):  # of free motions
+            ratios = np.diag(gains.pose.damping) / (2.0 * gains.pose.omega)
+        for k in np.flatnonzero(vibrating(gains.pose.omega / (2.0 * np.pi), ratios))[:1]:
+            omega, ratio = min(float(gains.pose.omega[k]), omega), float(ratios[k])
         period = min(2.0 * np.pi / omega, LONGEST_S / PERIODS)
         self._lasts, rest = PERIODS * period, round(2.0 * period / tick)
         self._times = tick * np.arange(-self._known - 1, round(self._lasts / tick) + rest + self._known + 1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from calmotion.multibody import WORLD, Mechanism, PoseModel, pose_model
 from calmotion_plugins.live import Weighting
@@ -27,6 +29,25 @@ def hinge(frequency=3.0, ratio=0.01, coupling=1.2):
     rows[0, 0] = 1.0
     damping, push = np.array([[2.0 * ratio * omega[0]]]), np.array([[-coupling]])
     return PoseModel(omega, damping, push, np.zeros((1, 1)), rows, rows, *[np.eye(1)] * 5, np.eye(2))
+
+
+def with_free_motion(pose: PoseModel, seen: float = 0.0) -> PoseModel:
+    """The robot with a mode of frequency zero that no motor moves, such as the spin of a ball joint.
+
+    Args:
+        seen: How far it moves the targets.
+    """
+
+    def beside(matrix, axes, value=0.0):
+        return np.pad(matrix, [(int(k in axes), 0) for k in range(matrix.ndim)], constant_values=value)
+
+    return replace(
+        pose, omega=np.array([0.0, *pose.omega]), damping=beside(pose.damping, (0, 1)),
+        by_acceleration=beside(pose.by_acceleration, (0,)), by_rate=beside(pose.by_rate, (0,)),
+        targets_by_mode=beside(pose.targets_by_mode, (2,), seen), shapes=beside(pose.shapes, (1,)),
+        deflections=beside(pose.deflections, (1,)), by_deflection=beside(pose.by_deflection, (0,)),
+        resistance=np.insert(pose.resistance, pose.by_rate.shape[1], 0.0, axis=1),
+    )  # fmt: skip
 
 
 def weighting(window, motors, penalty=1e-5, **changes):

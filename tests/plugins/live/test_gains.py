@@ -7,7 +7,7 @@ import pytest
 from calmotion.multibody import WORLD, Mechanism, pose_model
 from calmotion_plugins.live import LiveSettings, gains_at
 from calmotion_plugins.live.regulation.gains import riccati
-from hinges import TICK, hinge, moves, rms, two_hinges, weighting
+from hinges import TICK, hinge, moves, rms, two_hinges, weighting, with_free_motion
 
 
 def played(gains, intended, window):
@@ -54,6 +54,14 @@ def test_commands_with_all_of_the_future_known_are_the_least_squares_solution(po
         found.append(-gains.feedback @ x - np.einsum("kmi,ki->m", gains.preview[: ticks - k], impulses[k:]))
         x = A @ x + B @ found[-1] + E @ impulses[k]
     np.testing.assert_allclose(found, best, atol=1e-5 * np.abs(best).max())
+
+
+def test_a_free_motion_that_no_motor_reaches_leaves_the_commands_as_they_are():
+    pose = two_hinges()
+    intended, chosen = moves(4.0, 2, seed=2), weighting(40, 2)
+    one, other = (gains_at(p, np.eye(2), chosen) for p in (pose, with_free_motion(pose, seen=0.1)))
+    left = [played(gains, intended, 40) for gains in (one, other)]
+    np.testing.assert_allclose(left[1], left[0], atol=1e-6 * np.abs(left[0]).max())
 
 
 def test_gains_for_several_robots_leave_less_on_one_that_is_slower():

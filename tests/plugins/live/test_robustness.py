@@ -9,7 +9,7 @@ import pytest
 from calmotion.simulation import impulses
 from calmotion_plugins.live import gains_at
 from calmotion_plugins.live.regulation.robustness import EQUAL, PERIODS, SLACK, Moves, affordable_others
-from hinges import TICK, hinge, two_hinges, weighting
+from hinges import TICK, hinge, two_hinges, weighting, with_free_motion
 
 UNCERTAINTY = 0.1
 
@@ -34,6 +34,13 @@ def test_others_do_not_count_where_motors_cannot_do_what_the_targets_need():
     across[0, 1] = 1.0
     assert affordable_others(makes(replace(pose, targets_by_mode=across), 40), np.eye(1), TICK) == 0.0
     assert affordable_others(makes(pose, 60), np.eye(1), TICK) > 0.0
+
+
+def test_a_free_motion_of_the_robot_sets_no_period():
+    """As the spin of a ball joint, which is the mode of the lowest frequency."""
+    pose = two_hinges()
+    left = [Moves(makes(p, 40)(0.0), np.eye(2), TICK).left_by_shaper for p in (pose, with_free_motion(pose))]
+    assert left[1] == pytest.approx(left[0], rel=1e-9)
 
 
 def test_a_shaper_leaves_what_its_commands_do():

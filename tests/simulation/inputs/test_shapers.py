@@ -108,6 +108,13 @@ def test_what_cannot_be_shaped_is_refused(parts):
         assert error.value.remedy and error.value.found == kind
 
 
+def test_the_cutoff_of_a_filter_is_of_the_lowest_mode_that_is_no_free_motion(parts):
+    with_spin = np.array([0.0, *FREQUENCIES]), np.array([0.0, *RATIOS])
+    np.testing.assert_array_equal(
+        shaped(*parts, "lowpass", *with_spin).angles, shaped(*parts, "lowpass", FREQUENCIES, RATIOS).angles
+    )
+
+
 def test_a_cutoff_that_the_steps_do_not_hold_is_refused(parts):
     highest = 240.0 / FREQUENCIES[0]
     shaped(*parts, "lowpass", FREQUENCIES, RATIOS, 0.99 * highest)
@@ -131,7 +138,7 @@ def test_the_best_delay_is_the_one_by_which_a_motion_is_late(late):
 
 
 def test_modes_that_do_not_vibrate_are_not_shaped_for():
-    """The lowest that does is taken, also where heavier damped ones are lower."""
-    found = impulses("zv2", np.array([1.0, *FREQUENCIES]), np.array([1.2, *RATIOS]))
+    """The lowest that does is taken, also where heavier damped ones are lower, or a ball joint spins freely."""
+    found = impulses("zv2", np.array([0.0, 1e-5, 1.0, *FREQUENCIES]), np.array([0.0, 0.0, 1.2, *RATIOS]))
     for part, alone in zip(found, impulses("zv2", FREQUENCIES, RATIOS), strict=True):
         np.testing.assert_array_equal(part, alone)

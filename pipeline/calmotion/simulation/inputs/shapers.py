@@ -28,7 +28,15 @@ SHAPES = {
     "ei": ((1.0 + TOLERANCE, 2.0 * (1.0 - TOLERANCE), 1.0 + TOLERANCE), 1.0),
     "mzv": ((1.0 - np.sqrt(0.5), np.sqrt(2.0) - 1.0, 1.0 - np.sqrt(0.5)), 0.75),
 }
+SLOWEST = 1e-3  # frequency below which a mode moves freely, up to rounding [Hz]
 CUTOFF = 0.5  # of the low-pass filter, over the lowest frequency, where nobody says
+
+
+def vibrating(frequencies: Array, damping: Array) -> BoolArray:
+    """Which modes of some frequencies [Hz] and ratios of critical damping swing: not free motions, such as the spin of
+    a ball joint, nor those that are damped critically."""
+    found: BoolArray = (frequencies > SLOWEST) & (damping < 1.0)
+    return found
 
 
 def impulses(kind: str, frequencies: Array, damping: Array) -> tuple[Array, Array]:
@@ -37,12 +45,12 @@ def impulses(kind: str, frequencies: Array, damping: Array) -> tuple[Array, Arra
     Args:
         kind: One of `SHAPES` for the lowest mode that vibrates, with a 2 behind it for the lowest two.
         frequencies: Undamped, of the modes [Hz], ascending.
-        damping: Their ratios of critical; modes of one and more do not vibrate.
+        damping: Their ratios of critical. Modes that do not swing are passed over, see `vibrating`.
     """
     times, amplitudes = np.zeros(1), np.ones(1)
     count = 2 if kind.endswith("2") else 1
     shape, share = SHAPES[kind.removesuffix("2")]
-    vibrates = damping < 1.0
+    vibrates = vibrating(frequencies, damping)
     for frequency, ratio in zip(frequencies[vibrates][:count], damping[vibrates][:count], strict=True):
         periods = share * np.linspace(0.0, 1.0, len(shape))
         own = shape * np.exp(-2.0 * np.pi * ratio / np.sqrt(1.0 - ratio**2) * periods)
@@ -68,7 +76,8 @@ def shaped(
     Raises:
         ShotError: There is no such shaper, or no frequency to shape for.
     """
-    vibrates = len(frequencies) > 0 if kind == "lowpass" else np.any(damping < 1.0)
+    slow = frequencies[frequencies > SLOWEST]
+    vibrates = len(slow) > 0 if kind == "lowpass" else bool(np.any(vibrating(frequencies, damping)))
     if kind not in SHAPERS or not vibrates:
         raise ShotError(
             "there is no such shaper" if vibrates else "a robot that does not vibrate has no frequency for a shaper",
@@ -80,13 +89,13 @@ def shaped(
     if kind == "lowpass":
         from scipy.signal import butter, sosfiltfilt
 
-        edge, highest = cutoff * frequencies[0], 0.5 / grid.h
+        edge, highest = cutoff * slow[0], 0.5 / grid.h
         if not edge < highest:
             raise ShotError(
                 "the cutoff of the low-pass filter is too high for the time step",
                 attribute="retarget.shape.cutoff",
                 found=f"{cutoff:g}, which is {edge:.4g} Hz, with steps of {1e3 * grid.h:.3g} ms",
-                remedy=f"Use less than {highest / frequencies[0]:.3g}, or a smaller --step.",
+                remedy=f"Use less than {highest / slow[0]:.3g}, or a smaller --step.",
             )
         sections = butter(2, edge, fs=1.0 / grid.h, output="sos")
         angles = sosfiltfilt(sections, curves.angles, axis=0, padtype="constant", padlen=min(len(times) - 1, 4000))
