@@ -197,9 +197,8 @@ class EstimateMotorEffects(Operator):
         context.progress(0.0, "simulating the robot on compliant motors")
         options = run_settings(context.get(Source), context.get(ModelChoices))
         found = effects_of_gains(_representative(context), options)
-        if found is None:
+        if not found.motors:
             context.report("warning", "with the gains in the shot, its motors could not hold the robot")
-            return []
         return [found]
 
 

@@ -1,12 +1,14 @@
 """The analysis in the pipeline: what it simplifies is not run, and everything can be forced."""
 
+import dataclasses
 import sys
 
 import pytest
+from calmotion import ShotError
 from calmotion.host import NotAsked
 from calmotion.model import Character, FEMeshes, ModelChoices, Result, Simplification
 from calmotion.model.model_choice import ON
-from calmotion.model.outputs import PlannedStep
+from calmotion.model.outputs import MotorEffects, PlannedStep
 from calmotion.model.run import OutputPaths, RunSettings, Source
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.testing import host_with, run_operator, small_shot
@@ -97,6 +99,19 @@ def test_of_a_long_shot_an_inspection_simulates_the_busiest_part(host, monkeypat
     assert step.row.why == "planned" and len(seen) == 1
     assert seen[0].animation.frame_times[-1] == pytest.approx(0.25, abs=0.05)
     assert shot.animation.frame_times[-1] > 0.5
+
+
+def test_an_inspection_goes_on_where_the_gains_cannot_hold_the_robot(host, monkeypatch):
+    character, animation = small_shot()
+    motors = tuple(dataclasses.replace(motor, position_gain=1e-3) for motor in character.motors)
+    character = dataclasses.replace(character, motors=motors)
+
+    def failing(*given):
+        raise ShotError("it falls", path="/Arm")
+
+    monkeypatch.setattr("calmotion.tolerance.motors.motor_effects.by_fast_scheme", failing)
+    given = [character, animation, compile_shot(character, animation), _source("inspect")]
+    assert host.run(given, [MotorEffects]).finish().get(MotorEffects).motors == ()
 
 
 def test_unknown_kinds_are_wrong_usage(calmotion):

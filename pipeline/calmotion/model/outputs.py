@@ -193,8 +193,8 @@ class MotorEffects:
     """What the animation does if motors give by their gains, and if they are ideal; links are flexible in both.
 
     Attributes:
-        motors: Paths of the motors that have gains.
-        lag: Largest error of each target [m], shape [K].
+        motors: Paths of the motors that have gains; none where the robot could not follow the animation with them.
+        lag: Largest error of each target [m], shape [K]; here and below of no target where there are no motors.
         droop: Its error at rest at the start [m], shape [K].
         ideal_lag, ideal_droop: The same with ideal motors.
     """

@@ -330,7 +330,7 @@ def _rotor(motor: Motor, newtons: str, unit: str) -> dict[str, float | str]:
 
 def _effects(character: Character, effects: MotorEffects | None) -> list[dict[str, Any]]:
     """What the gains of the motors would do to the animation at each target; empty where that is not known."""
-    if effects is None:
+    if effects is None or not effects.motors:
         return []
     return [
         {

@@ -56,7 +56,7 @@ def quiet(fraction, message):
 
 
 def test_gains_that_are_not_used_tell_what_they_would_do_as_the_simulation_with_drives_does():
-    assert effects_of_gains(shot(IDEAL), OPTIONS) is None
+    assert effects_of_gains(shot(IDEAL), OPTIONS).motors == ()
     found = effects_of_gains(shot(with_gains("prescribed")), OPTIONS)
     same = replace(OPTIONS, integrator="generalized-alpha")
     simulated = simulate_shot(shot(with_gains("drive")), same, quiet).before
@@ -106,7 +106,7 @@ def test_where_rigid_links_cannot_be_simulated_the_result_is_told_without_these_
 
     monkeypatch.setattr(motor_effects, "run_forward", failing)
     assert with_error_shares(drives, result, OPTIONS, quiet) is result
-    assert effects_of_gains(drives, OPTIONS) is None
+    assert effects_of_gains(drives, OPTIONS).motors == ()
 
 
 @pytest.mark.parametrize("model", ["drive", "servo"])

@@ -41,9 +41,12 @@ def with_gains_used(character: Character) -> Character:
     return replace(character, motors=tuple(motors))
 
 
-def effects_of_gains(shot: CompiledShot, options: RunSettings) -> MotorEffects | None:
-    """What the gains that a shot carries would do to its animation; None where it has none, or where the robot would
-    not follow it.
+_UNKNOWN = MotorEffects((), *4 * (np.zeros(0),))
+
+
+def effects_of_gains(shot: CompiledShot, options: RunSettings) -> MotorEffects:
+    """What the gains that a shot carries would do to its animation; of no motors where it has none, or where the robot
+    would not follow it.
 
     Args:
         shot: Its motors may be ideal.
@@ -54,7 +57,7 @@ def effects_of_gains(shot: CompiledShot, options: RunSettings) -> MotorEffects |
     """
     character = with_gains_used(shot.character)
     if not motors_give(character):
-        return None
+        return _UNKNOWN
     options = replace(options, step=own_step(character, options))
     prepared = prepare(shot, options)
     found = []
@@ -62,7 +65,7 @@ def effects_of_gains(shot: CompiledShot, options: RunSettings) -> MotorEffects |
         try:
             errors = by_fast_scheme(options, partial(_errors, prepared, model))
         except ShotError:
-            return None
+            return _UNKNOWN
         lag = errors[prepared.grid.judged].max(axis=0, initial=0.0)
         found += [lag, np.zeros_like(lag) if prepared.grid.cyclic else errors[0]]
     return MotorEffects(tuple(m.path for m in character.motors if m.model != PRESCRIBED), *found)
