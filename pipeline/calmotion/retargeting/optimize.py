@@ -41,7 +41,7 @@ from calmotion.simulation.report import left_out_rows, limit_uses, performed_mot
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import compile_kernels
 from calmotion.simulation.target_errors import IntendedMotion
-from calmotion.tolerance.reduced_bodies import PRECONDITIONER, RunMemory
+from calmotion.tolerance.reduced_bodies import DIRECTIONS, RunMemory
 
 
 def optimize_shot(
@@ -115,7 +115,7 @@ def _optimized(
     problem, search = searched.problem, searched.search
     if memory is not None:
         memory.search = SearchMemory.of(problem, search)
-        memory.taken += [PRECONDITIONER] if searched.took_over else []
+        memory.taken += [DIRECTIONS] if searched.took_over else []
     fixed = searched.hold()
     curves, x = found_curves(problem, len(character.motors), search.x)
     after = problem.at(x)

@@ -30,6 +30,7 @@ from calmotion.retargeting.problem.problem import Evaluation, RetargetProblem
 from calmotion.retargeting.search_progress import SearchMemory, SearchProgress
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Ends, Search, minimize
+from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
 
@@ -54,7 +55,7 @@ class RetargetSearch:
         idle_gain: Gain that idle motors would bring at the end [m]; None where there are none.
         interrupted: Whether the user ended it.
         resumed_iterations: Iterations of the checkpoint from which it resumed.
-        took_over: Whether it began with the preconditioner or the derivatives of the search before.
+        took_over: Whether it began with the directions of the search before.
     """
 
     input: Evaluation
@@ -282,4 +283,4 @@ class RetargetSearch:
 
 def _restarted(search: Search, x: Array) -> Search:
     """The search restarted over other coefficients, with its counts and history."""
-    return replace(search, x=x, radius=np.inf, reason="")
+    return replace(search, x=x, radius=np.inf, recycled=Recycled.none(len(x)), reason="")

@@ -13,6 +13,7 @@ from calmotion.arrays import IntArray
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.gauss_newton import Search
 from calmotion.retargeting.solver.preconditioner import Sharpened
+from calmotion.retargeting.solver.recycling import Recycled
 
 FIRST_RATIO = 0.3  # of the gain after the first iteration to the one before it, until it is known
 PASS = 0.7  # share of a minimisation in what is left: others, on finer knots, may follow
@@ -85,24 +86,29 @@ class SearchMemory:
 
     Attributes:
         breaks, motors: Of its unknowns.
+        recycled: Directions of its linear systems.
         sharpened: Preconditioner by the responses of the flexible robot, with their point; None where it had none.
         responses: Derivatives under limits; None where it had none.
     """
 
     breaks: IntArray
     motors: IntArray
+    recycled: Recycled
     sharpened: Sharpened | None
     responses: Any
 
     @classmethod
     def of(cls, problem: RetargetProblem, search: Search) -> SearchMemory:
         """What the search of a problem leaves."""
-        return cls(problem.space.basis.breaks, problem.space.motors, search.sharpened, search.responses)
+        return cls(
+            problem.space.basis.breaks, problem.space.motors, search.recycled, search.sharpened, search.responses
+        )
 
     def begun(self, problem: RetargetProblem, search: Search) -> Search:
         """A search that has not begun, with what fits its problem."""
         space = problem.space
-        same = np.array_equal(self.motors, space.motors) and np.array_equal(self.breaks, space.basis.breaks)
-        if not same or (self.sharpened is None and self.responses is None):
+        if not np.array_equal(self.motors, space.motors) or not np.array_equal(self.breaks, space.basis.breaks):
             return search
-        return replace(search, sharpened=self.sharpened, responses=self.responses)
+        if self.recycled.p.shape[1] != len(search.x):
+            return search
+        return replace(search, recycled=self.recycled, sharpened=self.sharpened, responses=self.responses)

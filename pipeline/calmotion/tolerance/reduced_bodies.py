@@ -30,7 +30,7 @@ class ReducedBodies:
     reduction: BodyReduction | None = None
 
 
-SUBSPACES, TIME_STEP, PRECONDITIONER = "subspaces", "time step", "preconditioner"  # what a run may take over
+SUBSPACES, TIME_STEP, DIRECTIONS = "subspaces", "time step", "search directions"  # what a run may take over
 
 
 @dataclass(eq=False)

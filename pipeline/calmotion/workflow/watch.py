@@ -186,16 +186,16 @@ def _memory(data: Mapping[type, Any]) -> RunMemory | None:
 
 def _parts(data: Mapping[type, Any]) -> list[str]:
     """What a run of a shot could take over from the one before, of those that took time."""
-    from calmotion.tolerance.reduced_bodies import PRECONDITIONER, SUBSPACES, TIME_STEP
+    from calmotion.tolerance.reduced_bodies import DIRECTIONS, SUBSPACES, TIME_STEP
 
     if FEMeshes not in data or not data[FEMeshes].meshes:
         return []
-    memory = _memory(data)
+    memory, result = _memory(data), data.get(Result)
     names = ["meshes", "reduction"]
     if memory is not None and memory.projected is not None:
         names += [SUBSPACES, *([TIME_STEP] if memory.step else [])]
-    if memory is not None and memory.search is not None and memory.search.sharpened is not None:
-        names.append(PRECONDITIONER)
+    if memory is not None and result is not None and result.after is not None:
+        names.append(DIRECTIONS)
     return names
 
 

@@ -9,6 +9,7 @@ from calmotion.retargeting.solver import gauss_newton
 from calmotion.retargeting.solver.gauss_newton import Ends, Search, minimize
 from calmotion.retargeting.solver.limited_step import LimitedStep
 from calmotion.retargeting.solver.preconditioner import Sharpened
+from calmotion.retargeting.solver.recycling import Recycled
 
 
 class Problem:
@@ -119,7 +120,7 @@ class Saturating(Problem):
 
 def test_a_small_trust_region_is_no_minimum():
     """What little is to be gained within a region that shrank says nothing of what is to be gained."""
-    begin = Search(np.full(3, 1.5), 1e-9)
+    begin = Search(np.full(3, 1.5), 1e-9, Recycled.none(3))
     found = minimize(Saturating(), begin, np.zeros(3, bool), Ends(1e-12, 60))
     assert found.reason == "converged" and np.allclose(np.tanh(found.x), 0.5, atol=1e-5)
 
@@ -152,7 +153,7 @@ class Flat(Problem):
 def test_where_little_is_gained_beyond_a_small_region_limits_still_come_to_act(monkeypatch):
     asked = []
     monkeypatch.setattr(Point, "tightened", lambda point: asked.append(point.x))
-    found = minimize(Flat(), Search(np.zeros(1), 1e-9), np.zeros(1, bool), Ends(1e-3))
+    found = minimize(Flat(), Search(np.zeros(1), 1e-9, Recycled.none(1)), np.zeros(1, bool), Ends(1e-3))
     assert found.reason == "no further decrease" and len(asked) == 1 and np.array_equal(asked[0], found.x)
     assert found.x[0] > 0.0
 
@@ -195,6 +196,22 @@ def test_points_that_cannot_be_evaluated_are_kept_away_from():
 
     search = minimize(Walled(2), Search.start(np.zeros(5)), FREE, Ends(1e-12, 40))
     assert np.isfinite(search.history[-1].value) and np.linalg.norm(search.x) <= 0.2
+
+
+def test_products_of_one_system_precondition_the_next():
+    rng = np.random.default_rng(4)
+    M = rng.normal(size=(30, 30))
+    H = M @ M.T + 0.1 * np.eye(30)
+    from calmotion.retargeting.solver.truncated_cg import conjugate_gradients
+
+    g = rng.normal(size=30)
+    first = conjugate_gradients(lambda d: H @ d, g, lambda r: r, np.inf, 1e-12, 0.0, 40)
+    learned = Recycled.none(30).followed_by(first.p, first.Hp, 24)
+    inverse = learned.inverse(lambda r: r)
+    dense = np.column_stack([inverse(e) for e in np.eye(30)])
+    assert np.allclose(dense, dense.T, atol=1e-8 * np.abs(dense).max()) and np.linalg.eigvalsh(dense).min() > 0.0
+    second = conjugate_gradients(lambda d: (H + 1e-3 * np.eye(30)) @ d, g, inverse, np.inf, 1e-6, 0.0, 40)
+    assert len(second.p) < 0.7 * len(first.p)
 
 
 class Poor(Problem):

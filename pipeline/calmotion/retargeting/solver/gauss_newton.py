@@ -14,8 +14,10 @@ from calmotion.model.result import GOAL_REACHED
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.retargeting.solver.limited_step import LimitedStep, LinearLimited, limited_step
 from calmotion.retargeting.solver.preconditioner import Sharpened
+from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.retargeting.solver.truncated_cg import Path, conjugate_gradients
 
+RECYCLED_PAIRS = 24  # directions that are kept for the next system
 STEP_REDUCTIONS = 10  # most reductions of a step in one iteration
 FORCING_TERM = 0.01  # share of the decrease of an iteration at which conjugate gradients end
 UNPREDICTED_SHARE = 0.1  # of the gain that ends a search: systems may leave as much, which is not predicted then
@@ -113,6 +115,7 @@ class Search:
     Attributes:
         x: The best point, shape [n].
         radius: Of the trust region.
+        recycled: Search directions of earlier linear systems.
         sharpened: Preconditioner that was made on the way; None for the first one. Its point is of another size where
             the unknowns have changed since.
         responses: Derivatives as a matrix, of steps under limits; None where there were none.
@@ -124,6 +127,7 @@ class Search:
 
     x: Array
     radius: float
+    recycled: Recycled
     sharpened: Sharpened | None = None
     history: tuple[Iterate, ...] = ()
     evaluations: int = 0
@@ -136,7 +140,7 @@ class Search:
     @classmethod
     def start(cls, x: Array, at: Any = None) -> Search:
         """A search that has not begun."""
-        return cls(x, np.inf, at=at)
+        return cls(x, np.inf, Recycled.none(len(x)), at=at)
 
 
 @dataclass(frozen=True)
@@ -192,7 +196,7 @@ class _GaussNewton:
         self._fixed, self._ends, self._onto_limits = fixed, ends, onto_limits
         self._evaluations, self._gradients, self._products = search.evaluations + 1, search.gradients, search.products
         self._at = problem.at(search.x, search.at)
-        self._radius, self._history = search.radius, list(search.history)
+        self._radius, self._recycled, self._history = search.radius, search.recycled, list(search.history)
         self._sharpened, self._responses, self._share, self._stalled = search.sharpened, search.responses, 1.0, 0
         self._eager = self._sharpened is not None  # the first preconditioner has failed already
         if self._sharpened is not None and len(self._sharpened.point) != len(search.x):
@@ -200,7 +204,7 @@ class _GaussNewton:
 
     def state(self, reason: str) -> Search:
         """What the search has, from which another one may resume."""
-        found = self._at.x, self._radius, self._sharpened, tuple(self._history)
+        found = self._at.x, self._radius, self._recycled, self._sharpened, tuple(self._history)
         return Search(*found, self._evaluations, self._gradients, self._products, reason, self._at, self._responses)
 
     def iterate(self) -> str:
@@ -291,6 +295,7 @@ class _GaussNewton:
         before = self._radius
         for self._radius in (before, np.inf):
             path = self._path(linear, gradient)
+            self._recycled = self._recycled.followed_by(path.p, path.Hp, RECYCLED_PAIRS)
             _, predicted, length = path.within(self._radius)
             if self._gain_of(predicted) >= self._ends.gain or length < self._radius:
                 break
@@ -307,7 +312,7 @@ class _GaussNewton:
         if self._eager and patience is not None and self._sharpened is None:
             self._sharpened, patience = linear.sharpened(), None
         for limit in (most if patience is None else min(patience, most), most):
-            inverse = linear.precondition(self._fixed, self._sharpened)
+            inverse = self._recycled.inverse(linear.precondition(self._fixed, self._sharpened))
             path = conjugate_gradients(product, gradient, inverse, self._radius, FORCING_TERM, self._enough, limit)
             if len(path.p) < limit or limit == most:
                 break

@@ -19,7 +19,7 @@ class Path:
     Attributes:
         steps, curved: s and H s, shape [k + 1, n], the first zero.
         lengths: Norms of the steps in the preconditioner's metric, increasing, shape [k + 1].
-        p: Directions, shape [k, n].
+        p, Hp: Directions and their products, shape [k, n].
         gradient: g.
     """
 
@@ -27,6 +27,7 @@ class Path:
     curved: Array
     lengths: Array
     p: Array
+    Hp: Array
     gradient: Array
 
     @property
@@ -75,6 +76,7 @@ def conjugate_gradients(
     n = len(gradient)
     steps, curved, lengths = [np.zeros(n)], [np.zeros(n)], [0.0]
     directions: list[Array] = []
+    products: list[Array] = []
     r = gradient.copy()
     z = inverse(r)
     p, rz = -z, float(r @ z)
@@ -90,6 +92,7 @@ def conjugate_gradients(
         if not curvature > 0.0:
             break
         directions.append(p)
+        products.append(Hp)
         a = rz / curvature
         steps.append(steps[-1] + a * p)
         curved.append(curved[-1] + a * Hp)
@@ -104,8 +107,11 @@ def conjugate_gradients(
         b = new / rz
         p, rz = b * p - z, new
         sp, pp = b * (sp + a * pp), new + b * b * pp
-    p_all = np.reshape(directions, (len(directions), n))
-    return Path(np.array(steps), np.array(curved), np.array(lengths), p_all, gradient)
+    shape = (len(directions), n)
+    return Path(
+        np.array(steps), np.array(curved), np.array(lengths), np.reshape(directions, shape),
+        np.reshape(products, shape), gradient,
+    )  # fmt: skip
 
 
 def _orthogonal(r: Array, residuals: list[Array], inverted: list[Array]) -> Array:
