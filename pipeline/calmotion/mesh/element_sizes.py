@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.arrays import Array, Indices
 from calmotion.mesh.surfaces.distances import ray_length
 from calmotion.mesh.tetrahedra import surface_area, surface_volume
+from calmotion.mesh.tetrahedralize.tetwild import SIMPLE
 
 ACCURACY = 5e-3  # relative, of the first frequencies
 MAX_NODES = 15_000  # of the ten-node tetrahedra: some seconds and half a gigabyte to reduce
@@ -25,7 +26,6 @@ _LEAST = 2e-4  # of the diagonal; below, the tetrahedraliser takes minutes for a
 # Elements as long as that, of the thickness, in walls of more triangles are those of a thin round shell: following a
 # tube of 2 mm within 0.05 mm takes more than 36 s, within 0.25 mm some 30 s, for a frequency that is 0.05% off
 _SHELL, _FLAT = 2.0, 100
-SIMPLE = 600  # triangles; below, the surface is that of a box or a tube: following it closely costs a second
 
 
 @dataclass(frozen=True)

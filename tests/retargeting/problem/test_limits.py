@@ -102,9 +102,10 @@ def weak_arm(share):
 @pytest.mark.parametrize("tolerance", [None, 1e-3, 1e-4])
 @pytest.mark.parametrize("share", [0.9, 0.75])
 def test_robots_without_error_keep_limits_that_cost_a_hundred_times_their_tolerance(share, tolerance):
-    options = RunSettings(step=0.01, tolerance=tolerance)
+    """Rounding decides how long the longest takes: 22 iterations, or 35 with another order of operations."""
+    options = RunSettings(step=0.01, tolerance=tolerance, max_iterations=60)
     found = optimize_shot(weak_arm(share), options, ignore_progress)
-    assert found.search.stopped == "converged" and found.search.forward_simulations <= 45
+    assert found.search.stopped == "converged" and found.search.forward_simulations <= 75
     assert max(use.excess for use in found.limits) <= 1e-3
 
 

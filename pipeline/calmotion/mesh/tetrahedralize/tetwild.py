@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.element_sizes import SIMPLE
 from calmotion.mesh.tetrahedra import flat_tets, surface_volume
 from calmotion.support.caching.cache_folder import MESHES
 from calmotion.support.caching.caches import key_of, store_arrays, stored_arrays
@@ -29,6 +28,7 @@ _CUBES = 1_000.0  # elements in a large volume
 # Default limit of the processor time of a body [s]: three times the 20 s that a link may take on a fast machine, since
 # slow and busy machines shall make the same meshes
 TIME_LIMIT = 60.0
+SIMPLE = 600  # triangles; below, the surface is that of a box or a tube: following it closely costs a second
 DENSE = 2_500  # triangles to which surfaces are simplified where that takes away small details alone
 # A process that takes no processor time, such as one that is blocked, ends after this many times its limit.
 _PATIENCE = 100.0

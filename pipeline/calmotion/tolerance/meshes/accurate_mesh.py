@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.mesh.element_sizes import SIMPLE, envelope
+from calmotion.mesh.element_sizes import envelope
 from calmotion.mesh.mass import balance_note, density_note, mass_of_tets
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.mesh.tetrahedralize.filling import INTERSECTS, MAX_VOLUME_ERROR, filled
-from calmotion.mesh.tetrahedralize.tetwild import ProcessorTime
+from calmotion.mesh.tetrahedralize.tetwild import SIMPLE, ProcessorTime
 from calmotion.model import Body, Character, FEMesh, Frame
 from calmotion.model.meshes import MeshQuality, Part
 
