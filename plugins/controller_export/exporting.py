@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.host import Settings
-from calmotion.model import Animation, Character, Provenance, Result, RunSettings, Source, tolerance_of
+from calmotion.model import Animation, Character, Provenance, Result, RunSettings, Source, switched_motors, tolerance_of
 from calmotion.simulation import CompiledShot
 from calmotion.support import temporary_folder
 from calmotion.tolerance import compiled_in
@@ -279,7 +279,7 @@ class _Exporter:
         exact = self._loss(written.exact, step)
         loss = self._loss(written.read, step, given.delay) if given.delay else rounded
         lowest = self._lowest(loss) if search else None
-        switched = [motor.path for motor in compiled.character.motors if motor.powered is not None]
+        switched = [compiled.character.motors[motor].path for motor in switched_motors(compiled.character)]
         notes = written.notes
         if switched:
             what = f"calm:motor:powered switches {', '.join(switched)} off and on, which the file does not say"

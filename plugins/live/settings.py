@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
-from calmotion.model import PRESCRIBED, contact_joints
+from calmotion.model import PRESCRIBED, contact_joints, switched_motors
 from calmotion.multibody import VelocityForces
 from calmotion.simulation import CompiledShot
 
@@ -109,7 +109,7 @@ def notes_of(shot: CompiledShot, forces: VelocityForces) -> tuple[str, ...]:
     if free:
         names = ", ".join(free) if len(free) < len(shot.character.motors) or len(free) < 4 else "all of them"
         found.append(f"a jump is played within a tick by motors without a limit of speed: {names}")
-    switched = [motor.path.rpartition("/")[2] for motor in shot.character.motors if motor.powered is not None]
+    switched = [shot.character.motors[k].path.rpartition("/")[2] for k in switched_motors(shot.character)]
     if switched:
         found.append(f"motors that the shot switches off (calm:motor:powered) stay on: {', '.join(switched)}")
     delays = {motor.delay for motor in shot.character.motors if motor.model != PRESCRIBED}

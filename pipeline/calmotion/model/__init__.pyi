@@ -21,6 +21,7 @@ from calmotion.model.character import Target as Target
 from calmotion.model.character import TetGeometry as TetGeometry
 from calmotion.model.character import contact_joints as contact_joints
 from calmotion.model.character import motors_give as motors_give
+from calmotion.model.character import switched_motors as switched_motors
 from calmotion.model.character import with_ideal_motors as with_ideal_motors
 from calmotion.model.character import with_settings as with_settings
 from calmotion.model.curves import Sample as Sample

@@ -92,6 +92,11 @@ class Schedule:
     times: Array
     active: BoolArray
 
+    @property
+    def changes(self) -> bool:
+        """Whether it comes or goes at all."""
+        return len(set(self.active.tolist())) > 1
+
     def holds_at(self, time: float) -> bool:
         """Whether it holds from a time [s] on."""
         return bool(self.held(np.array([time + 1e-9]))[0])

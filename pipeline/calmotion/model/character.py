@@ -320,6 +320,11 @@ def contact_joints(character: Character) -> list[int]:
     return [k for k, joint in enumerate(character.joints) if joint.contact is not None]
 
 
+def switched_motors(character: Character) -> list[int]:
+    """The motors that are switched off and on."""
+    return [k for k, motor in enumerate(character.motors) if motor.powered is not None]
+
+
 def motors_give(character: Character) -> bool:
     """Whether a joint does not follow the curve of its motor exactly."""
     return any(motor.model != PRESCRIBED for motor in character.motors)

@@ -208,15 +208,11 @@ def retimed(animation: Animation, tempo: TimeMap, frame_times: Array) -> Animati
     )  # fmt: skip
 
 
-def with_schedules_at(character: Character, moved: Callable[[Array], Array]) -> Character:
-    """The character whose feet come and go, and whose motors are switched, at other times.
-
-    Args:
-        moved: Maps times of the shot [s], shape [k], to when it happens.
-    """
+def with_schedules_at(character: Character, tempo: TimeMap) -> Character:
+    """The character whose feet come and go, and whose motors are switched, at a tempo."""
 
     def at(schedule: _Schedule) -> _Schedule:
-        return None if schedule is None else replace(schedule, times=moved(schedule.times))
+        return None if schedule is None else replace(schedule, times=tempo.performed(schedule.times))
 
     joints = tuple(replace(joint, contact=at(joint.contact)) for joint in character.joints)
     motors = tuple(replace(motor, powered=at(motor.powered)) for motor in character.motors)

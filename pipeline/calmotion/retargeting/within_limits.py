@@ -42,7 +42,6 @@ SPARED = 5e-4  # share of the efforts that searches leave, since what finer step
 FINE = 32  # instants of a frame at which curves are compared with their limits
 HALVED = 3  # most times that steps are halved for the efforts
 OF_FINER = 1.25e-3  # estimated error of efforts by these steps, as a share of their limits, before it is extrapolated
-KEPT = 1e-3  # share of a limit by which an excess between instants is told
 
 
 def optimize_within_limits(
@@ -208,9 +207,8 @@ def told_between(limits: Sequence[LimitUse], used: dict[str, Array]) -> tuple[Li
     told = []
     for use in limits:
         share = float(used[use.quantity][use.motor]) if use.quantity in used else 0.0
-        beyond = share - 1.0 > max(KEPT, use.excess)
-        value = float(np.copysign(share * use.limit, use.after))
-        told.append(replace(use, after=value, excess=share - 1.0) if beyond else use)
+        between = replace(use, after=float(np.copysign(share * use.limit, use.after)), excess=share - 1.0)
+        told.append(use if is_kept(between) or between.excess <= use.excess else between)
     return tuple(told)
 
 

@@ -26,6 +26,7 @@ from calmotion.simulation.inputs.curves import sample_curves as sample_curves
 from calmotion.simulation.inputs.curves import sample_tracks as sample_tracks
 from calmotion.simulation.inputs.roots import root_tracks as root_tracks
 from calmotion.simulation.inputs.roots import sample_roots as sample_roots
+from calmotion.simulation.inputs.shapers import SLOWEST as SLOWEST
 from calmotion.simulation.inputs.shapers import best_delay as best_delay
 from calmotion.simulation.inputs.shapers import delay as delay
 from calmotion.simulation.inputs.shapers import impulses as impulses

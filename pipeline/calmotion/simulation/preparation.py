@@ -9,7 +9,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.model import Animation, Character
-from calmotion.model.character import contact_joints
+from calmotion.model.character import contact_joints, switched_motors
 from calmotion.model.motor import SERVO, Motor
 from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.deflection import largest_deflection
@@ -60,7 +60,7 @@ def prepare(shot: CompiledShot, options: RunSettings) -> Prepared:
     refuse_unsupported(character, animation, options)
     grid = grid_of(character, animation, options)
     # only what comes and goes needs the model, which is compiled when it is first used
-    changing = contact_joints(character) or any(motor.powered is not None for motor in character.motors)
+    changing = contact_joints(character) or switched_motors(character)
     world = sample_world(character, animation, shot.model, grid) if changing else sample_roots(animation.moving, grid)
     return Prepared(shot, grid, world)
 

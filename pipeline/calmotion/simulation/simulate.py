@@ -10,7 +10,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Result, Track
-from calmotion.model.character import contact_joints
+from calmotion.model.character import contact_joints, switched_motors
 from calmotion.model.limits.bounds import excesses, motor_bounds
 from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import SimulationFailure
@@ -56,7 +56,7 @@ def shape_tracks(shot: CompiledShot, options: RunSettings, kind: str, cutoff: fl
     """
     character = shot.character
     changing = [character.joints[joint].path for joint in contact_joints(character)]
-    changing += [motor.path for motor in character.motors if motor.powered is not None]
+    changing += [character.motors[motor].path for motor in switched_motors(character)]
     if changing:
         raise ShotError(
             "a shaper delays the motion, and contacts with the ground and switches of motors would not be",

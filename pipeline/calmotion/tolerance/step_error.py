@@ -62,7 +62,7 @@ class StepRun:
 def order_of(character: Character) -> int:
     """With which power of the step the error of a simulation goes: the first where contacts come and go."""
     contacts = [character.joints[joint].contact for joint in contact_joints(character)]
-    switched = any(contact is not None and len(set(contact.active.tolist())) > 1 for contact in contacts)
+    switched = any(contact is not None and contact.changes for contact in contacts)
     return ORDER_AT_IMPACTS if switched else ORDER
 
 

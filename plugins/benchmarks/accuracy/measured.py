@@ -202,13 +202,13 @@ def replays(
     They are of the shots without a recording, or, without any, of the largest motion that the fit has not seen.
     """
     rows = []
+    spans = {name: np.ptp(shot.animation.current[0].values) for name, (shot, _) in machine.takes.items()}
+    channels = [c for _, found in machine.takes.values() for one in found for c in one.channels]
+    sensors = {path for channel in channels for path in (channel.path, channel.to)}
     for own, fit in fits.items() if by or peer else ():
-        spans = {name: np.ptp(shot.animation.current[0].values) for name, (shot, _) in machine.takes.items()}
         largest = max((name for name in spans if name not in own), key=spans.__getitem__)
         for name in machine.motions or [largest]:
             robot = machine.robot(name, fit.estimates).shot
-            recordings = [one for _, found in machine.takes.values() for one in found]
-            sensors = {path for one in recordings for c in one.channels for path in (c.path, c.to)}
             gain = machine.robot(name).shot.character.motors[0].position_gain
             error = partial(peer.largest_error_mm, gain / peer.bench.unit_gain) if peer else by[own].largest_error_mm
             rows.append(replayed(", ".join(own), name, robot, unexplained_share(fit), error, STEP, sensors))

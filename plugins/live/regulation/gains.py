@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from calmotion.arrays import Array, BoolArray
 from calmotion.multibody import PoseModel
+from calmotion.simulation import SLOWEST
 from scipy.linalg import block_diag, expm
 
 from .efforts import Efforts
@@ -40,7 +41,9 @@ class Weighting:
     """
 
     LEAST_DAMPING = 1e-3  # ratio of critical, so that what no motor reaches dies away in the sums
-    FREE = 2e-3 * np.pi  # least angular frequency, so that free motions do, such as the spin of a ball joint [rad/s]
+    FREE = (
+        2.0 * np.pi * SLOWEST
+    )  # least angular frequency, so that free motions do, such as the spin of a ball joint [rad/s]
 
     tick: float
     window: int

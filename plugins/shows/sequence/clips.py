@@ -14,7 +14,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.host import SettingError, parse_quantity
-from calmotion.model import Character, held_curve
+from calmotion.model import Character, held_curve, switched_motors
 from calmotion.support import read_toml
 from calmotion.workflow import Shot
 
@@ -150,11 +150,10 @@ def _besides_motors(shot: Shot) -> Iterator[tuple[str, str]]:
         if max(np.ptp(frame.positions, axis=0).max(), np.ptp(frame.rotations, axis=0).max()) > AT_ONE_PLACE:
             yield character.joints[frame.joint].path, "physics:body0"
     for joint in character.joints:
-        if joint.contact is not None and len(set(joint.contact.active.tolist())) > 1:
+        if joint.contact is not None and joint.contact.changes:
             yield joint.path, "calm:contact:active"
-    for motor in character.motors:
-        if motor.powered is not None:
-            yield motor.prim_path, "calm:motor:powered"
+    for motor in switched_motors(character):
+        yield character.motors[motor].prim_path, "calm:motor:powered"
     for free in animation.free:
         yield character.motors[free.motor].prim_path, "calm:motor:optimize"
     for weight in animation.weights:

@@ -179,7 +179,7 @@ def test_a_shot_switches_its_motor_off(shot):
 
 def test_its_times_follow_the_tempo(shot):
     character, _, _ = read_shot(str(shot))
-    slower = with_schedules_at(character, TimeMap(np.array([0.0, 1.0]), np.array([0.0, 2.0])).performed)
+    slower = with_schedules_at(character, TimeMap(np.array([0.0, 1.0]), np.array([0.0, 2.0])))
     assert slower.motors[0].powered.times.tolist() == [0.0, 1.0]
     assert slower.joints[0].contact is None
 

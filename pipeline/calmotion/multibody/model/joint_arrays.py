@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.arrays import Array, IntArray
-from calmotion.model.character import WORLD, Character, Frame
+from calmotion.model.character import WORLD, Character, Frame, switched_motors
 from calmotion.multibody.model.system import SERVO_COLUMNS
 from calmotion.multibody.model.topology import Tree
 from calmotion.reduction.reduced_body import Marker, ReducedBody
@@ -74,7 +74,7 @@ def joint_arrays(
     moved, contact = np.full(count, -1, np.int32), np.zeros(count, np.int32)
     contacts = [k for k in order if character.joints[k].contact is not None]
     moving = [*moving, *contacts]
-    switched = [k for k, item in enumerate(character.motors) if item.powered is not None]
+    switched = switched_motors(character)
     position, rotation = np.zeros((count, 2, 3)), np.zeros((count, 2, 3, 3))
     Phi, Psi = np.zeros((count, 2, 3, r_max)), np.zeros((count, 2, 3, r_max))
     rest = np.zeros(count)

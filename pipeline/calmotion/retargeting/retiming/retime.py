@@ -65,4 +65,4 @@ def _performed(shot: CompiledShot, given: TempoInput, found: FoundTempo) -> Reti
     tempo = found.map or TimeMap(given.times, given.times)
     frames = np.arange(found.frames, dtype=np.float64) * given.frame
     performed = retimed(shot.animation, tempo, frames)
-    return Retimed(performed, with_schedules_at(shot.character, tempo.performed), found.report)
+    return Retimed(performed, with_schedules_at(shot.character, tempo), found.report)

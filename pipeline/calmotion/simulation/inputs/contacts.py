@@ -9,7 +9,7 @@ from calmotion.arrays import Array, BoolArray
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.model import Animation, Character
 from calmotion.model.animation import Schedule
-from calmotion.model.character import contact_joints
+from calmotion.model.character import contact_joints, switched_motors
 from calmotion.model.run import RunSettings
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.kernels.so3 import matrix_of
@@ -65,7 +65,7 @@ def refuse_unsupported_contacts(character: Character, options: RunSettings) -> N
             frame. An `IntegrationError` where another integrator would do.
     """
     joints = [character.joints[k] for k in contact_joints(character)]
-    switched = [motor.path for motor in character.motors if motor.powered is not None]
+    switched = [character.motors[motor].path for motor in switched_motors(character)]
     if not joints and not switched:
         return
     what, remove = ("contacts", "CalmContactAPI") if joints else ("motors that are switched", "calm:motor:powered")

@@ -10,7 +10,7 @@ from numpy.polynomial.polynomial import polyder, polyval
 
 from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.model import Animation, Character
-from calmotion.model.character import contact_joints
+from calmotion.model.character import contact_joints, switched_motors
 from calmotion.model.curves import Sample, held_curve
 
 MAX_STEP = 1.0 / 480.0
@@ -151,7 +151,7 @@ def busiest(character: Character, animation: Animation, seconds: float) -> Anima
     stands, and where, follows from all that was before.
     """
     times = animation.frame_times
-    changing = contact_joints(character) or any(motor.powered is not None for motor in character.motors)
+    changing = contact_joints(character) or switched_motors(character)
     if len(times) < 2 or times[-1] <= seconds or not animation.tracks or character.retarget.cyclic or changing:
         return animation
     values = np.stack([held_curve(track, times[-1])(times, 2) for track in animation.tracks], axis=1)

@@ -98,7 +98,7 @@ def read_shot(
     animation = Animation(clock.frame_times(), tracks, current, read.moving, weights, free)
     if tempo is not None:
         made = retimed(dataclasses.replace(animation, current=tracks), tempo, shown.frame_times())
-        character, animation = with_schedules_at(character, tempo.performed), dataclasses.replace(made, current=current)
+        character, animation = with_schedules_at(character, tempo), dataclasses.replace(made, current=current)
     return character, animation, provenance
 
 

@@ -149,7 +149,7 @@ def free_tracks(stage: Usd.Stage, motors: Sequence[Motor], clock: Clock) -> tupl
     ranges = []
     for index, motor in enumerate(motors):
         free = schedule_of(stage.GetPrimAtPath(motor.prim_path), _SCHEMA, _FREE, clock)
-        if len(set(free.active.tolist())) > 1:
+        if free.changes:
             ranges.append(FreeTrack(free.times, free.active, index))
     return tuple(ranges)
 
