@@ -1,7 +1,5 @@
 """What tests of several rooms share: the repository, the command line in a process, and plugins made on the spot."""
 
-from __future__ import annotations
-
 import io
 import os
 import subprocess

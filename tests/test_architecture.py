@@ -4,8 +4,6 @@ plugin that can be deleted (docs/architecture.md).
 All imports count: those inside functions, and those for type checkers.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 import textwrap

@@ -1,7 +1,5 @@
 """The main job on the bartender through the command line: calmer tenfold, reproducible, within limits."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

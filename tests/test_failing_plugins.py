@@ -1,7 +1,5 @@
 """Plugins that fail, each in its way: the host lives, the rest is done, and the message names who and what to do."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """The guide for authors of plugins, followed word by word: its commands, in its order, in an empty folder."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """The pages of the reference, the citation and the container file, against what they describe."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import re

@@ -1,7 +1,5 @@
 """A wheel in an empty environment does the main job, far from the checkout."""
 
-from __future__ import annotations
-
 import ast
 import json
 import os

@@ -4,8 +4,6 @@
 with CALMOTION_BLENDER_PYTHON.
 """
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import json

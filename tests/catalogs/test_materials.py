@@ -1,7 +1,5 @@
 """The table of materials, and the user's own."""
 
-from __future__ import annotations
-
 import pytest
 from calmotion.catalogs.materials import GROUPS, MATERIALS, material_named, materials, read_materials
 from calmotion.errors import ShotError

@@ -1,7 +1,5 @@
 """The table of real motors, and tables of the user."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """The command line on plugins made for the test; the main job on a real shot is in test_wheel.py."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """`calmotion materials`."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 

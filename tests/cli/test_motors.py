@@ -1,7 +1,5 @@
 """`calmotion motors`."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 

@@ -1,7 +1,5 @@
 """The help: one screen by task, with examples that the commands accept."""
 
-from __future__ import annotations
-
 import shlex
 
 import pytest

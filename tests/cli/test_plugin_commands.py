@@ -1,7 +1,5 @@
 """Commands that plugins bring: listed from their manifests, imported when they are called."""
 
-from __future__ import annotations
-
 import json
 import sys
 import tomllib

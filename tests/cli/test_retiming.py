@@ -1,7 +1,5 @@
 """Options of the tempo: what they mean for the search, and what is refused."""
 
-from __future__ import annotations
-
 import argparse
 
 import pytest

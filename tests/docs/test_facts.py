@@ -1,7 +1,5 @@
 """What pages name exists: paths, links, commands, operators, numbers, messages, rooms."""
 
-from __future__ import annotations
-
 import ast
 import json
 import re

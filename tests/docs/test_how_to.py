@@ -1,7 +1,5 @@
 """How-to pages, followed by their text alone in an empty folder."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """The documentation builds without a warning, its pages are short, and a newcomer finds what is asked."""
 
-from __future__ import annotations
-
 import html
 import os
 import re

@@ -1,7 +1,5 @@
 """What newcomers want to do has a page that is found, and whose commands are accepted."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

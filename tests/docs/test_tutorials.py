@@ -1,7 +1,5 @@
 """Tutorials and guides, followed by their text alone in an empty folder."""
 
-from __future__ import annotations
-
 import json
 import re
 

@@ -1,7 +1,5 @@
 """The sentences of pages, help and messages are short and plain."""
 
-from __future__ import annotations
-
 import argparse
 import ast
 import re

@@ -6,8 +6,6 @@ was only slow because other programs left it no processor is to be removed there
 `build/fuzz/TARGET`.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -3,8 +3,6 @@
 An input is either the file itself, or drives random edits of a valid one (`Bytes`), so that coverage guides both.
 """
 
-from __future__ import annotations
-
 import atexit
 import io
 import random

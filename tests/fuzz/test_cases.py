@@ -3,8 +3,6 @@
 Every target reads its seeds, damaged ones and what fuzzing has found; `make fuzz` goes on for ten minutes a target.
 """
 
-from __future__ import annotations
-
 import random
 import sys
 from pathlib import Path

@@ -3,8 +3,6 @@
 `make fuzz RUNS=50 SEED=1 FUZZED=` goes on.
 """
 
-from __future__ import annotations
-
 import copy
 import sys
 from pathlib import Path

@@ -8,8 +8,6 @@ verdict is the same, and the first frequencies are within 2%. The robots of othe
 CALMOTION_DATA, and left out where they are not there.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """Plugins that the user disabled stay so, and only for that user."""
 
-from __future__ import annotations
-
 import pytest
 from calmotion.host import PluginState, SettingError, open_host
 from calmotion.host.settings import FILE_NAME, choose, configuration_folder, disabled_plugins

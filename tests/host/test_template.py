@@ -1,7 +1,5 @@
 """A new plugin works from the start."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tomllib

@@ -1,7 +1,5 @@
 """Hostile command lines: options that contradict each other, values that are none, inputs of the wrong kind."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Hostile combinations: outputs of `watch`, logs and folders in odd places, tables of motions, URDF robots."""
 
-from __future__ import annotations
-
 from commands import FAIL, ROBOT, SOFT, beside, imported, words
 from hostile import DONE, REFUSED, USAGE, Case
 

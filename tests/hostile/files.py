@@ -1,7 +1,5 @@
 """Hostile files and layers: names in all scripts, links, packages, layers that loop or are gone, instances, meshes."""
 
-from __future__ import annotations
-
 import os
 import zipfile
 from collections.abc import Callable

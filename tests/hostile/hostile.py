@@ -5,8 +5,6 @@ must hold. The judge sees what no case may do: end in a traceback, tell numbers 
 file, give an error without its place and remedy, or tell a verdict that its own numbers do not support.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import io

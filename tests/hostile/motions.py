@@ -1,7 +1,5 @@
 """Hostile motions: time codes that jump, one frame, a hundred thousand, wraps, spikes, gaps, splines, wrong units."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

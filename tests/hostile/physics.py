@@ -1,7 +1,5 @@
 """Hostile physics: extreme moduli, masses, inertias, units, damping, motors, limits, closed chains and targets."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Hostile scenes: composition, splines, schemas and bodies as animators and converters of robots author them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

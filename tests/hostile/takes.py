@@ -1,7 +1,5 @@
 """Hostile recordings: other units, other times, no motion, cells that are no numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

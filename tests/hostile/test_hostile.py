@@ -1,7 +1,5 @@
 """Hostile commands end as they should: a sample of cheap ones here, others with `pytest -m long` and `make torture`."""
 
-from __future__ import annotations
-
 import faulthandler
 import random
 import sys

@@ -1,7 +1,5 @@
 """Eigenpairs of matrices whose eigenvalues are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.linear_algebra.block_lanczos import lowest_by_lanczos

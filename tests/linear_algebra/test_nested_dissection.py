@@ -1,7 +1,5 @@
 """Nested dissection."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.linear_algebra.nested_dissection import dissect

@@ -1,7 +1,5 @@
 """Sparse Cholesky factors against dense solutions and SciPy's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.linear_algebra import multifrontal

@@ -1,7 +1,5 @@
 """Element size from the wanted accuracy, and how closely a mesh follows the surface."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.mesh.element_sizes import (

@@ -1,7 +1,5 @@
 """How often surfaces wind around the corners of a grid, against the solid angle."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

@@ -1,7 +1,5 @@
 """Linear tetrahedra."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 

@@ -1,7 +1,5 @@
 """An animation at another tempo: everything in it is a function of the animation's own time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.model import Animation, FreeTrack, MovingFrame, Track, WeightTrack

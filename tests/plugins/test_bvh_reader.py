@@ -1,7 +1,5 @@
 """BVH motions onto motors."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

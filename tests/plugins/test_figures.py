@@ -1,7 +1,5 @@
 """The figures: they show the numbers they name, the renderer sees what is in front, and files are whole or absent."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The page of a result: its words, its numbers, and what a browser shows of them."""
 
-from __future__ import annotations
-
 import base64
 import dataclasses
 import gzip

@@ -1,7 +1,5 @@
 """Mode shapes as files."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import replace
 

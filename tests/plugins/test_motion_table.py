@@ -1,7 +1,5 @@
 """Motions from CSV and NPZ tables."""
 
-from __future__ import annotations
-
 import zipfile
 
 import numpy as np

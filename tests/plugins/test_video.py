@@ -1,7 +1,5 @@
 """Videos: they show the shot and then its worst moment in slow motion, frame by frame, and are whole or absent."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import shutil

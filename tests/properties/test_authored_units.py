@@ -5,8 +5,6 @@ as its numbers are, which for most is to 6e-8. Here every number is one that sin
 units: short binary fractions of metres and kilograms, which stay short when multiplied by hundreds and thousands.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

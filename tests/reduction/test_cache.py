@@ -1,7 +1,5 @@
 """Reduced bodies on disk."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The estimated error of frequencies against meshes that are finer."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.reduction.basis.natural_modes import clamped_modes

@@ -1,7 +1,5 @@
 """Inertia integrals against direct quadrature of Seed (4)-(9): docs/formulation.md, identities 1 and 2."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from boxes import quadratic_shapes

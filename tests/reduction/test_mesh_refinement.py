@@ -1,7 +1,5 @@
 """One refinement of a mesh: its error against far finer meshes, and the stiffness that a coarse one takes from it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

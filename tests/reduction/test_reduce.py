@@ -1,7 +1,5 @@
 """From a mesh to the reduced body."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A body of scaled stiffness is the body of a material that is scaled likewise, for every elastic law."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

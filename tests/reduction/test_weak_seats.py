@@ -1,7 +1,5 @@
 """Joints whose seats decide how stiff a body is: found without a mode more, and told with two frequencies."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Beams with analytic solutions: frequencies of a clamped beam, and deflection under its own weight."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from beams import timoshenko_frequencies

@@ -1,7 +1,5 @@
 """Matrices and frequencies of meshes that others computed, read where they are (the data's README has the sources)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.mesh.tetrahedra import oriented_tets

@@ -5,8 +5,6 @@ give. A quadruped whose motors have the gains of its own file gets commands with
 step.
 """
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

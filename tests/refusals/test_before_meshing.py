@@ -1,7 +1,5 @@
 """What follows from a shot's input alone is refused before the first mesh is made."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion import optimize, simulate

@@ -1,7 +1,5 @@
 """Broken shots end in an error that helps, or in a repair that is told; nothing is lost, and nothing half-written."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import subprocess

@@ -1,7 +1,5 @@
 """The search over changes of contacts: commands for a robot whose motors give, on its feet."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import pytest
 from pxr import Sdf, UsdShade

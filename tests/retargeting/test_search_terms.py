@@ -1,7 +1,5 @@
 """Terms of plugins that are wrong are refused with their own names, before the search."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

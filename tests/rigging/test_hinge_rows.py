@@ -1,7 +1,5 @@
 """Hinges that perform rotations: how many, about which axes, by which angles."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.rigging.hinge_rows import derivatives, follow, hinge_pair, hinges_for, residuals

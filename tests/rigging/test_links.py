@@ -1,7 +1,5 @@
 """Which joints become links, and which links matter."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.mesh.moments import is_closed, surface_moments

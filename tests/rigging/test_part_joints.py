@@ -1,7 +1,5 @@
 """Joints found from motions that were made with known ones, and by other formulas."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.rigging.part_joints import BALL, FIXED, FREE, PRISMATIC, REVOLUTE, find_joint, with_hinges

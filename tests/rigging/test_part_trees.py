@@ -1,7 +1,5 @@
 """Trees of parts from their motion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.rigging.part_joints import BALL, FIXED, FREE, REVOLUTE

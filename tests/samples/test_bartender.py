@@ -1,7 +1,5 @@
 """What the bartender alone is held to: its size, and margins that are tighter than those of all samples."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The curve that the samples are keyed with."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

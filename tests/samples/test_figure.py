@@ -1,7 +1,5 @@
 """The figure that drums and boxes: one layer of its own, and two shots that reference it."""
 
-from __future__ import annotations
-
 import importlib
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What `inspect` says of the gains in a sample, against the simulation of the sample with drives."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """The lamp, whose servos give: curves that are right for ideal motors fail on them, commands for them do not."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """A real robot with closed loops: Disney's legs, walking with their pelvis held (the shared data)."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

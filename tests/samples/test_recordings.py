@@ -1,7 +1,5 @@
 """The recording of every sample read back: what is in it, when, and with the values of the table."""
 
-from __future__ import annotations
-
 import pytest
 from sample_recordings import check_recording
 from sample_shots import KINDS, path_of

@@ -1,7 +1,5 @@
 """What holds for every sample: built to the byte, valid, closed meshes, bodies where their joints say."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Least slowing against closed forms: one hinge under limits of speed, acceleration and effort."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.simulation import MotorEfforts, TempoLimits, needed_tempo

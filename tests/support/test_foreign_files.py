@@ -1,7 +1,5 @@
 """A robot or a table in the place of a shot, a motion or settings is named, with what to do with it."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -1,7 +1,5 @@
 """Rotations as matrices and as quaternions."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.support import quaternion_from_rotation, rotation_from_quaternion
 

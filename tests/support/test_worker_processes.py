@@ -1,7 +1,5 @@
 """Work in processes that raise, crash and hang."""
 
-from __future__ import annotations
-
 import os
 
 from calmotion.support.worker_processes import Fault, results_of

@@ -5,8 +5,6 @@ others. It must end with the same result as an undisturbed run, with a clear ref
 status 130, and the next run must end with the result and leave no file that nothing uses.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import random

@@ -4,8 +4,6 @@ An event has a label of what is written and how: `checkpoint: rename`, `kernels:
 of the file that they become, which tells the outputs apart.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable

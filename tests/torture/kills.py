@@ -3,8 +3,6 @@
 A series kills the same command up to four times, each time with a part of the caches missing, and then lets it end.
 """
 
-from __future__ import annotations
-
 import itertools
 import os
 import random

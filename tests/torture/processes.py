@@ -1,7 +1,5 @@
 """Several processes at once."""
 
-from __future__ import annotations
-
 import random
 
 import runs

@@ -4,8 +4,6 @@ A fork spares the seconds of imports, which are most of a run, so that a thousan
 are started anew are killed while they import, too. Faults are installed in the child.
 """
 
-from __future__ import annotations
-
 import fcntl
 import importlib
 import os

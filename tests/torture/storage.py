@@ -1,7 +1,5 @@
 """Full disks, folders that cannot be written or vanish, and caches and checkpoints that are damaged bit by bit."""
 
-from __future__ import annotations
-
 import os
 import random
 import resource

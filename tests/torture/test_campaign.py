@@ -1,7 +1,5 @@
 """The judges of the campaign see what they look for, and a short campaign is clean."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

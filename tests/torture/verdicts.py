@@ -1,7 +1,5 @@
 """What a run must leave: the same result, a clear refusal, or an interrupted one; and no file that stays for ever."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """The folder of a campaign: a tiny shot, warm caches with a copy, the outputs, and the result of an undisturbed run."""
 
-from __future__ import annotations
-
 import os
 import random
 import shutil

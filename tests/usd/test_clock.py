@@ -1,7 +1,5 @@
 """Time codes and seconds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.usd.clock import Clock, clock_of

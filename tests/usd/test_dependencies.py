@@ -1,7 +1,5 @@
 """Files that a shot names in places that are never opened."""
 
-from __future__ import annotations
-
 import math
 import os
 

@@ -1,7 +1,5 @@
 """The page about reading USD has the attributes of other programs that the code has."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

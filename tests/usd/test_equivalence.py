@@ -1,7 +1,5 @@
 """The same character in other units, with another axis up, or read again, is the same."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

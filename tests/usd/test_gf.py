@@ -1,7 +1,5 @@
 """Values survive the way to NumPy and back."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.usd import gf
 from pxr import Gf, Sdf, Vt

@@ -1,7 +1,5 @@
 """Length motors and moving roots through the command line: from a shot to curves, tables and figures."""
 
-from __future__ import annotations
-
 import csv
 import json
 

@@ -1,7 +1,5 @@
 """The codeless schemas: generated, found, registered in time."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

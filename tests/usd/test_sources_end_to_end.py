@@ -1,7 +1,5 @@
 """Whatever animates the motors, the written result simulated on its own does what the optimisation promised."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Opening shots, broken ones too, and telling our own layers."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Rigid poses out of matrices."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion import ShotError

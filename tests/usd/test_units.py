@@ -1,7 +1,5 @@
 """Stage units to SI."""
 
-from __future__ import annotations
-
 import pytest
 from calmotion import ShotError
 from calmotion.usd.units import StageUnits, other_units, units_of

@@ -1,7 +1,5 @@
 """Checks before the costly work: everything at once, with places and remedies."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """Motions sampled for pictures, and the points they carry."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import synthetic

@@ -1,7 +1,5 @@
 """The renderer: it shows what is in front, without gaps, and at the right distance."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.views.raster import barycentric, rasterize

@@ -1,7 +1,5 @@
 """Pictures of a character: camera, poses, scenery, shadow, and the outline of the intended motion."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

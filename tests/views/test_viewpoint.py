@@ -1,7 +1,5 @@
 """The viewpoint sees what moves, from the side it moves on."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The Python interface on a small robot in USD: arrays by prim path, report, files, cancelling."""
 
-from __future__ import annotations
-
 import csv
 import json
 import threading

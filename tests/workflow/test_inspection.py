@@ -1,7 +1,5 @@
 """What an inspection says of a body."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

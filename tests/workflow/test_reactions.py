@@ -1,7 +1,5 @@
 """Reactions of the world: what a base carries, and when one that only stands would tip over."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """What a report tells of a run."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import calmotion as cm

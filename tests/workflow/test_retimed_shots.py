@@ -1,7 +1,5 @@
 """What else works with a performance at another tempo, or says that it does not."""
 
-from __future__ import annotations
-
 import json
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Rigid open chains against MuJoCo: torques of ideal motors, and places of the targets with compliant ones."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

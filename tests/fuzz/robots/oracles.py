@@ -1,7 +1,5 @@
 """One robot told in two ways has the same motion, and what is written performs as it was told."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import replace
 from pathlib import Path

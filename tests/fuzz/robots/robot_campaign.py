@@ -6,8 +6,6 @@ optimize writes performs as it was told. `mujoco`: ideal motors of a rigid open 
 inverse dynamics, and compliant ones leave the targets where its simulation has them.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import io

@@ -1,7 +1,5 @@
 """Random robots in SI units, drawn from a seed, told in one way; `stages` writes them to USD in many."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import dataclass, field
 

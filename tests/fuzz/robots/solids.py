@@ -1,7 +1,5 @@
 """Transforms, geometry and masses of bodies in USD."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.testing import beam_mesh
 from pxr import Gf, Sdf, UsdGeom, UsdPhysics, UsdShade, Vt

@@ -1,7 +1,5 @@
 """Writes a robot to USD in the way of a telling."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

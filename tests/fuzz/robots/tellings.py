@@ -1,7 +1,5 @@
 """In how many ways a robot is told in USD that mean the same."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import dataclass, field, replace
 

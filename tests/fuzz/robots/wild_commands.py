@@ -1,7 +1,5 @@
 """Commands on wild robots: each ends in numbers, or is refused with a place and a remedy."""
 
-from __future__ import annotations
-
 import contextlib
 import random
 import shutil

@@ -1,7 +1,5 @@
 """Boxes of tetrahedra, and quadrature that is not the one under test."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.mesh.tetrahedra import measure_quality, oriented_tets
 from calmotion.model import FEMesh

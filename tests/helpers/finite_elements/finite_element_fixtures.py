@@ -1,7 +1,5 @@
 """Materials, and the functions of `boxes`, for the tests of finite elements."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from boxes import box_tets, conical_quadrature, fe_mesh

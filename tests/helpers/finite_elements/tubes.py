@@ -1,7 +1,5 @@
 """A skin for the tests."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """Small robots and motions for tests of `live`."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A four-bar with a flexible coupler, a synthetic closed chain for benchmarks and tests."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import (

@@ -1,7 +1,5 @@
 """The compiled forces of a nonlinear body, called with scratch of their own."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.multibody.kernels.components import ElasticLaw
 from calmotion.multibody.kernels.neohookean import neohookean_forces

@@ -1,7 +1,5 @@
 """Rigid characters whose passive hinges have no stiffness at rest; some of them are constrained by closed chains."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Systems made of particles, whose integrals are sums: an independent way to every term of the dynamics."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Meshes as they should not be: a link of known volume, damaged in every way that robots' files are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Values and operators that tests of the host order and run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

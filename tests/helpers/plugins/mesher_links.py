@@ -1,7 +1,5 @@
 """Boxes as links, and what the tests of the mesher do with them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

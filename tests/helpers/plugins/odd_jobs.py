@@ -1,7 +1,5 @@
 """A function that processes run, and that refuses, raises, crashes or hangs: they import it by its name."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

@@ -1,7 +1,5 @@
 """Players of exported files that share nothing with Calmotion: they parse the files and interpolate on their own."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -3,8 +3,6 @@
 A fixed base, a box link that turns about z and bends by one mode (x / L)^2 along y, and a rigid ball at its tip.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

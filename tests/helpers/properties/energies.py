@@ -3,8 +3,6 @@
 Both follow from inertia integrals, elastic laws and multipliers, none from the equations of a step.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.arrays import Array, IntArray
 from calmotion.multibody.analysis.reactions import reactions

@@ -1,7 +1,5 @@
 """The same shot told in another way: bodies in another order, elsewhere in the world, in units of another size."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

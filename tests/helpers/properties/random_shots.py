@@ -4,8 +4,6 @@ Everything is drawn in SI. What a property needs in another form is made from th
 `likenesses`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from unittest.mock import patch
 

@@ -1,7 +1,5 @@
 """Theories of beams that the solids are held against, solved by themselves."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm

@@ -4,8 +4,6 @@ Written from the equations, with nothing of `calmotion.fem` but the mesh: Total 
 positions of all nodes as unknowns, so that large rotations are in the Green strain and need no floating frame.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

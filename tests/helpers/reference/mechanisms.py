@@ -1,7 +1,5 @@
 """Planar mechanisms of rigid bars with hinges about y, for reference problems."""
 
-from __future__ import annotations
-
 import numpy as np
 from arms import Z_TO_Y, frame
 from calmotion.model import WORLD, Body, Character, Frame, Joint, MassProperties, Motor, Target

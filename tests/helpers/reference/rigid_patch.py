@@ -1,7 +1,5 @@
 """Statics of a full mesh, part of whose nodes move as one rigid body: what a link does between two hard neighbours."""
 
-from __future__ import annotations
-
 import numpy as np
 from full_order import FullOrder
 from scipy.sparse import coo_matrix

@@ -1,7 +1,5 @@
 """Barkour (Google DeepMind's quadruped) on its feet: motions of its motors by inverse kinematics, and its contacts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -6,8 +6,6 @@ t, tip = arm.swing(quintic(np.pi / 2, 0.5), step=1e-3, duration=1.0)   # tip: al
 along, across = arm.pushed(20.0)                                       # static load across the end
 """
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

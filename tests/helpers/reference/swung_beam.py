@@ -3,8 +3,6 @@
 t, tip = swing(length, beam, load, angle, step=5e-4, duration=0.45)   # tip: along and across the hinge's direction
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A straight beam on a driven hinge at the world, reduced: what several reference problems have in common."""
 
-from __future__ import annotations
-
 import numpy as np
 from arms import Z_TO_Y, frame
 from boxes import box_tets, fe_mesh

@@ -1,7 +1,5 @@
 """Pages that are followed by their text alone: their shell blocks, in an empty folder."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -1,7 +1,5 @@
 """A synthetic arm with a closed chain: a four-bar linkage drives the elbow from the shoulder, as on the rapper."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import (

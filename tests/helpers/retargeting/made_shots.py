@@ -1,7 +1,5 @@
 """Synthetic shots with flexible links, ready to be simulated and optimised."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.model.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for

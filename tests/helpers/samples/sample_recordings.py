@@ -1,7 +1,5 @@
 """The recording of a run against its table."""
 
-from __future__ import annotations
-
 import csv
 
 import numpy as np

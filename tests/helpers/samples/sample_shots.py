@@ -1,7 +1,5 @@
 """The sample shots: where they are, and what is special about each."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 SAMPLES = Path(__file__).resolve().parents[3] / "samples"

@@ -1,7 +1,5 @@
 """Synthetic shots, each of which allows one simplification, to measure its gain and its error."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -4,8 +4,6 @@ Most are the arm of `small_shots` with an edit; the others are files that are da
 that names its place, or, where it says so, in a repair that is told.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The arm of `small_shots` with generic joints in place of hinges."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

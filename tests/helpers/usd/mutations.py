@@ -1,7 +1,5 @@
 """Random edits of a shot's layer; the same random numbers make the same edit."""
 
-from __future__ import annotations
-
 import math
 import random
 

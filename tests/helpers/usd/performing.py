@@ -1,7 +1,5 @@
 """What a rigid robot does with the curves of a shot, for comparison with what USD composes."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.model import MotorCurve, Result, Simulation, Track
 from calmotion.model.run import RunSettings

@@ -1,7 +1,5 @@
 """The arm of `small_shots`, animated by the transforms of its bodies or by a skeleton instead of its drives."""
 
-from __future__ import annotations
-
 from pxr import Gf, Sdf, UsdGeom, UsdSkel, Vt
 from small_shots import ELBOW, FORE, FRAMES, LENGTH, SHOULDER, TARGET_POSITION, UPPER, angles
 

@@ -1,7 +1,5 @@
 """Reads the robots and characters of a folder as commands do, and tells what became of each."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Edits of the arm of `small_shots`, each of which breaks something."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import posed_shots

@@ -1,7 +1,5 @@
 """An arm of six links of 0.2 m on six hinges, one of them oblique, as a USD shot of one second, and its tip."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation

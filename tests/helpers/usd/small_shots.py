@@ -4,8 +4,6 @@ The arm in SI: a base fixed to the world at (0, 0, 1), an upper arm (box 0.4 x 0
 about y, a forearm (mesh box of the same size) on a hinge about y at the end of the upper arm, a hand on its tip.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

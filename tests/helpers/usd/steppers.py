@@ -5,8 +5,6 @@ shot, the left one in the second half, and the torso goes with them; each foot l
 pose on flat feet, so that the motion of the rigid robot follows from its motors and contacts alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The mesher as the host loads it, and a cache of its own for each test."""
 
-from __future__ import annotations
-
 import pytest
 from calmotion.testing import host_with
 from mesher_links import PLUGIN

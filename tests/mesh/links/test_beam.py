@@ -1,7 +1,5 @@
 """A beam that stands for a body without geometry."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Caps of holes of any size."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

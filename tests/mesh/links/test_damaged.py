@@ -1,7 +1,5 @@
 """The corpus of damaged meshes: each is repaired with its volume kept, or refused for the right reason."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A limit of time or a thin connection gives a worse mesh with a message, never none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

@@ -1,7 +1,5 @@
 """Hollow parts that are modelled by their outer surfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

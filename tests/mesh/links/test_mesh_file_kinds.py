@@ -1,7 +1,5 @@
 """External meshes: every kind of element and of file that comes from CAD and finite-element programs."""
 
-from __future__ import annotations
-
 import meshio
 import numpy as np
 import pytest

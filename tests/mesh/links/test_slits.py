@@ -1,7 +1,5 @@
 """Slits of wrapped solids are filled where a mesh cannot follow them, and nothing else is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Thin-walled and hollow parts at the automatic size against frequencies that are known otherwise."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

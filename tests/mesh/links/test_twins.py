@@ -1,7 +1,5 @@
 """Copies and mirror images of links are meshed once."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """First frequencies of damaged parts that are wrapped, and of beams, against the undamaged part."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a joint holds of a body when nobody says."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.mesh.patches.automatic_patch import automatic_radius, end_face

@@ -1,7 +1,5 @@
 """Where a joint takes hold of a body that its frame does not touch."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Patches of the surface that joints hold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

@@ -1,7 +1,5 @@
 """Patches from named surfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from beams import timoshenko_frequencies

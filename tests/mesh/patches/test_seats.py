@@ -1,7 +1,5 @@
 """The seat of a servo horn or a flange, on surfaces with screw holes, recesses and none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

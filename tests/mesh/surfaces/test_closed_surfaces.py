@@ -1,7 +1,5 @@
 """Surfaces as chains of triangles."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

@@ -1,7 +1,5 @@
 """The isometries between surfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.mesh.surfaces.congruence import isometries

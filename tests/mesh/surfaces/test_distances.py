@@ -1,7 +1,5 @@
 """Closest points and rays."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.mesh.surfaces.distances import closest_on_triangles, meets_plane, ray_length

@@ -1,7 +1,5 @@
 """Which free joints stand in neutral equilibrium, and that a shot with them says so."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

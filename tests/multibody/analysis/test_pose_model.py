@@ -1,7 +1,5 @@
 """The linear model of a pose against the tangent of the nonlinear simulation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.multibody import WORLD, Mechanism, linearize, pose_model, simulate

@@ -1,7 +1,5 @@
 """Forces by velocities against the change of the mass matrix, and against friction."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.model import Rotor

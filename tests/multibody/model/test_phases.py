@@ -1,7 +1,5 @@
 """Contacts that come and go: impacts, phases, and derivatives over changes of contacts."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

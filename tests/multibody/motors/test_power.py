@@ -1,7 +1,5 @@
 """Servos that are switched off and on: their differential equations, derivatives, and what a shot says of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import calmotion as cm

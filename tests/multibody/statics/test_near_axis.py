@@ -1,7 +1,5 @@
 """Free joints whose load lies next to their axis hang down; where rounding alone turns them, they stay as they are."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Local poses of bodies and the motors' values in them: round trips, closed chains, moving roots."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import calmotion as cm

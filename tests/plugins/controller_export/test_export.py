@@ -1,7 +1,5 @@
 """Commands for controllers, from a shot, from a written layer and from a result, with what they cost."""
 
-from __future__ import annotations
-
 import json
 
 import calmotion as cm

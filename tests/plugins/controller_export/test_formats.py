@@ -1,7 +1,5 @@
 """Formats of commands: what is in the files, read by others than what wrote them, and what is refused."""
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import json

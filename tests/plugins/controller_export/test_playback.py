@@ -1,7 +1,5 @@
 """The loss by played commands, against an independent replay and known delays."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.model import Track

@@ -1,7 +1,5 @@
 """Players of commands against other programs' interpolation, and against what they must hold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion_plugins.controller_export.commands import (

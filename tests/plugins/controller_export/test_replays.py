@@ -1,7 +1,5 @@
 """What each export is said to cost, against an independent replay of its files on an independent model of the robot."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Commands that are sampled so that their player is on time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.testing import small_shot

@@ -1,7 +1,5 @@
 """What recordings say of a robot with a closed chain: what encoders alone tell, and no guess beyond it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.multibody import span_tree

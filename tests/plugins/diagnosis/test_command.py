@@ -1,7 +1,5 @@
 """`calmotion diagnose`: encoders and commands alone, and a shot."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

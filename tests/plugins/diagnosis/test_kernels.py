@@ -1,7 +1,5 @@
 """The equations of motion against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion_plugins.diagnosis.kernels import follow, follow_with_play, march, oscillate

@@ -1,7 +1,5 @@
 """`calmotion live`: JSON lines and OSC."""
 
-from __future__ import annotations
-
 import json
 import socket
 import subprocess

@@ -1,7 +1,5 @@
 """Commands that keep the motors' efforts, against other ways to compute the same."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

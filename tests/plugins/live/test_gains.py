@@ -1,7 +1,5 @@
 """The regulator with preview against the least squares problem that it solves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.multibody import WORLD, Mechanism, pose_model

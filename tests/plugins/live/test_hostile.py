@@ -1,7 +1,5 @@
 """Streams as bad as they come, on the samples: no limit is exceeded, nothing raises, and rest is rest."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.model import RunSettings

@@ -1,7 +1,5 @@
 """Motions whose accelerations may change by so much only."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion_plugins.live import Stream

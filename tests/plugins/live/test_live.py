@@ -1,7 +1,5 @@
 """A robot that is streamed to, played back by the full simulation, and the command."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

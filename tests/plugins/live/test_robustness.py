@@ -1,7 +1,5 @@
 """How much robots of other frequencies count unless one says so."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

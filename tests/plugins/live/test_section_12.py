@@ -4,8 +4,6 @@ The page does not say which random moves it has. These ones (seed, longest rest 
 motion itself and the shapers leave what the page says, on three robots; what `live` leaves is not chosen.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.simulation import impulses

@@ -1,7 +1,5 @@
 """Samples as they arrive, and limits of commands that run straight between ticks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion_plugins.live import Stream

@@ -1,7 +1,5 @@
 """Readers of recordings."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.errors import ShotError

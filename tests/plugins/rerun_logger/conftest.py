@@ -1,7 +1,5 @@
 """One recording for all tests that only read it."""
 
-from __future__ import annotations
-
 import pytest
 import synthetic
 from calmotion.model.outputs import Recording

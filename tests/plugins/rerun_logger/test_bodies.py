@@ -1,7 +1,5 @@
 """Bodies in the recording: meshes, motion, colours and ghosts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import synthetic

@@ -1,7 +1,5 @@
 """The layout of the recording in the viewer."""
 
-from __future__ import annotations
-
 import colorsys
 
 import synthetic

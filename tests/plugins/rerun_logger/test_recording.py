@@ -1,7 +1,5 @@
 """The file of the recording: what is refused or fails leaves nothing behind."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import subprocess

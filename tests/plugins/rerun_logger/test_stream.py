@@ -1,7 +1,5 @@
 """Curves, spectra and progress in the recording."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import synthetic

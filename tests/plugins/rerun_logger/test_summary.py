@@ -1,7 +1,5 @@
 """The text of the recording."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Trails of the targets in the recording."""
 
-from __future__ import annotations
-
 import numpy as np
 import synthetic
 from calmotion.views.playback import sample_motion

@@ -1,7 +1,5 @@
 """What the table of attributes says becomes of each attribute of URDF and MJCF."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import re

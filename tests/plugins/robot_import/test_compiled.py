@@ -1,7 +1,5 @@
 """Masses, springs, gains and limits of an imported MJCF robot are those that MuJoCo compiles."""
 
-from __future__ import annotations
-
 import os
 
 import calmotion as cm

@@ -1,7 +1,5 @@
 """The environment of the converters, and what they say, with scripts in their place."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import stat

@@ -1,7 +1,5 @@
 """URDF and MJCF files before they are converted."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -3,8 +3,6 @@
 Torques agree to 1e-4 of the largest, bodies to a micrometre. MuJoCo runs in the environment of the converters.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Springs and dampers hold what no motor drives."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Links of an MJCF robot without mass."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

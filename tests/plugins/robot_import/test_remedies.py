@@ -1,7 +1,5 @@
 """What an import tells to do works: each case is refused, changed as its remedy says, and imported."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Repairs of what converters refuse: the copies say the same as the robot."""
 
-from __future__ import annotations
-
 import os
 import xml.etree.ElementTree as xml
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A robot's file becomes a shot: with a converter in place of the real one, and with the real ones where they are."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The layer over a converted robot, read again."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

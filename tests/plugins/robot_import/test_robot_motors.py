@@ -1,7 +1,5 @@
 """Motors of robots that are USD: what is driven stays, otherwise all joints are, but not those of a closed chain."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.errors import ShotError

@@ -4,8 +4,6 @@ A test of each kind of file: the SO-101 as URDF, the xArm7 of MuJoCo's menagerie
 a recorded dancer (G1 Moves), a table without names and times.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """The basis that a known load_envelope needs, against static solutions of the unreduced body."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The reduced basis."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

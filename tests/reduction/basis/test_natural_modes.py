@@ -1,7 +1,5 @@
 """Eigenpairs of the full model."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from boxes import box_tets

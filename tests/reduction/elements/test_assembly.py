@@ -1,7 +1,5 @@
 """Mass and stiffness of quadratic tetrahedra."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Points tied to a mesh."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.mesh.quadratic import quadratic_mesh

@@ -1,7 +1,5 @@
 """Full models: links that are alike have one, and only what decides a model tells them apart."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 

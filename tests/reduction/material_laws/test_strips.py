@@ -1,7 +1,5 @@
 """Strips whose thickness is a part of their width, which quadratic strain of modes may lock."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Beams by sections against closed forms, and that no mesh is made for them."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

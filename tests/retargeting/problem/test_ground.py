@@ -1,8 +1,6 @@
 """Limits of what feet ask of the ground: their values against the report of feet, their derivatives against
 differences."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import calmotion as cm

@@ -1,7 +1,5 @@
 """Contacts on a time grid, and what shots with contacts are not combined with."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Tracks as smooth curves, played once and in a loop."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the ground does to feet while they are held, from the motion of a walking robot."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

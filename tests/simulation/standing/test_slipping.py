@@ -1,7 +1,5 @@
 """Feet that cannot stay where they are held."""
 
-from __future__ import annotations
-
 import re
 
 import calmotion as cm

@@ -1,7 +1,5 @@
 """What a spline animates is seen where what time samples animate is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import small_shots as shots

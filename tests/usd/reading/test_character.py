@@ -1,7 +1,5 @@
 """The whole character: order, what is left out, what holds it."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

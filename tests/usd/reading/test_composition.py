@@ -1,7 +1,5 @@
 """Shots that are composed: the animation is read as USD composes it, wherever it lies."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.usd.reading import read_shot

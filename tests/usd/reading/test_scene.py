@@ -1,7 +1,5 @@
 """Gravity, and the settings of the optimisation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.model.uncertainty import Uncertainty

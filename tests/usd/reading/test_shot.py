@@ -1,7 +1,5 @@
 """Real robots, read whole."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.model import WORLD

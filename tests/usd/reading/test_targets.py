@@ -1,7 +1,5 @@
 """Targets, authored and chosen."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion import ShotError

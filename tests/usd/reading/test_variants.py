@@ -1,7 +1,5 @@
 """Physics in a variant that the stage does not select."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

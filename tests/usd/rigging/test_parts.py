@@ -1,7 +1,5 @@
 """Meshes below Xforms with keys become a robot that does what they do."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 

@@ -1,7 +1,5 @@
 """A skinned character becomes a robot that does what the skeleton does."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 

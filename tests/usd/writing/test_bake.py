@@ -1,7 +1,5 @@
 """Baked motion, opened again with the shot: every point is where the motion says, whatever the prims are like."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Motor curves as time samples."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

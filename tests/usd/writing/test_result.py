@@ -1,7 +1,5 @@
 """Layers that are written: what they hold, that they read back, and that nothing else is touched."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 

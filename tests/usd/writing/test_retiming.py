@@ -1,7 +1,5 @@
 """A performance at another tempo in USD: its map, its length, what else moves, and how it is read back."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

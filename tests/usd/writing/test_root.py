@@ -1,7 +1,5 @@
 """Root layers, and results over results."""
 
-from __future__ import annotations
-
 import shutil
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Curves go back to where they came from: transforms of bodies, joints of a skeleton, drives that the shot lacks."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import os

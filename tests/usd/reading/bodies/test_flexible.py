@@ -1,7 +1,5 @@
 """Settings of flexible bodies."""
 
-from __future__ import annotations
-
 import pytest
 from calmotion.errors import ShotError
 from calmotion.usd.reading import read_shot

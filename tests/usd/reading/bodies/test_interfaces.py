@@ -1,7 +1,5 @@
 """Named interfaces of flexible bodies."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion import ShotError

@@ -1,7 +1,5 @@
 """UsdPhysics' precedence for mass, and its conventions for "not authored"."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.usd.reading import read_shot

@@ -1,7 +1,5 @@
 """Integrals of solids against exact values."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion import ShotError

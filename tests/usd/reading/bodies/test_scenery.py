@@ -1,7 +1,5 @@
 """Scenery: still geometry that belongs to no body is read for pictures, and never makes a shot fail."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.usd.reading import read_shot

@@ -1,7 +1,5 @@
 """Geometry of a body: frames, orientation, copies, colours, tetrahedra."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion import ShotError

@@ -1,7 +1,5 @@
 """Joints of several directions: their hinges and sliders, and dynamics that MuJoCo's agree with."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

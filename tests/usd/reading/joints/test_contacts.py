@@ -1,7 +1,5 @@
 """CalmContactAPI in a stage: which feet are held and when, floating bases, and what is refused."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

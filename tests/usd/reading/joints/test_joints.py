@@ -1,7 +1,5 @@
 """Joints: frames, axes, limits, the world, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.errors import ShotError

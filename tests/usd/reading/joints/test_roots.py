@@ -1,7 +1,5 @@
 """Roots that the shot moves, from its transforms to frames over time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.model import WORLD

@@ -1,7 +1,5 @@
 """Groups, distances from the world, and leaves."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.model import Frame
 from calmotion.usd.reading.joints.joint_prims import JointPrim

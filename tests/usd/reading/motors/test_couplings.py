@@ -1,7 +1,5 @@
 """Gear joints of PhysX: which hinge follows, by which ratio, from which pose."""
 
-from __future__ import annotations
-
 import calmotion as cm
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Which joints are motors, and their limits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion import ShotError

@@ -1,7 +1,5 @@
 """Joints that are geared to others, in several dialects."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion import ShotError

@@ -1,7 +1,5 @@
 """Motors that are animated by a skeleton."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion import ShotError

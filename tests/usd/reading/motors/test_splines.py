@@ -1,7 +1,5 @@
 """Splines are taken as authored: uneven tangents, corners and steps."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tracks: seconds and radians, splines, held ends, broken samples."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calmotion.usd.reading import read_shot

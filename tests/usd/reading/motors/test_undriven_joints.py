@@ -1,7 +1,5 @@
 """What is told of joints without a motor."""
 
-from __future__ import annotations
-
 from calmotion.usd.reading import read_shot
 from generic_arm import driven, generic
 from pxr import UsdPhysics
