@@ -23,11 +23,7 @@ def test_a_tempo_is_settings_of_the_search(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "pinned"),
-    [
-        ("beat,time_s\n1,0.5\n2,1.0\n", "0.5s,1s"),
-        ("time_code\n24\n48\n", "24,48"),
-        ("24\n48\n", "24,48"),
-    ],
+    [("beat,time_s\n1,0.5\n2,1.0\n", "0.5s,1s"), ("time_code\n24\n48\n", "24,48"), ("24\n48\n", "24,48")],
 )
 def test_pinned_times_come_from_a_table(tmp_path, text, pinned):
     path = tmp_path / "beats.csv"

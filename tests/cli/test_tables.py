@@ -122,7 +122,7 @@ def test_one_thing_has_no_plural():
         (0.2, 0.0, "kg", ("0.2 kg", "-")),
         (0.2, math.inf, "kg", ("0.2 kg", "-")),
     ],
-)  # fmt: skip
+)
 def test_an_estimate_has_the_digits_of_its_standard_deviation(value, deviation, unit, texts):
     assert measured(value, deviation, unit) == texts
 

@@ -39,9 +39,7 @@ RIDDLES = (
 
 
 @pytest.mark.parametrize(
-    "page",
-    [page for page in PAGES if page.parent.name != "decisions" and page.name != "CHANGELOG.md"],
-    ids=name_of,
+    "page", [page for page in PAGES if page.parent.name != "decisions" and page.name != "CHANGELOG.md"], ids=name_of
 )
 def test_the_sentences_of_a_page_are_short_and_plain(page):
     text = page.read_text()

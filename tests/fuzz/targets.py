@@ -345,4 +345,4 @@ SEEDS: dict[str, tuple[bytes, ...]] = {
     ),
     "manifests": (_MANIFEST.encode(), _MANIFEST.encode("utf-16")),
     "settings": (b'[fe.mesh]\nelement_size = "5mm"\n', b"a.b=5mm", b"5mm"),
-}  # fmt: skip
+}

@@ -236,11 +236,7 @@ def test_nothing_runs_where_a_wanted_value_is_refused():
     check, _ = refusing(Ore)
     write = operator("smithy.write", requires=[Iron], uses=[Ore], provides=[Steel], checks=[Ore], check=check)
     run = host_of(DIG, MELT, write).run([], [Iron, Steel]).finish()
-    assert outcomes(run) == {
-        "mine.dig": Outcome.DONE,
-        "smithy.write": Outcome.FAILED,
-        "smithy.melt": Outcome.BLOCKED,
-    }
+    assert outcomes(run) == {"mine.dig": Outcome.DONE, "smithy.write": Outcome.FAILED, "smithy.melt": Outcome.BLOCKED}
 
 
 def test_work_that_others_use_goes_on_where_settings_of_optional_values_are_refused():

@@ -15,10 +15,7 @@ def test_what_is_not_an_assignment_is_refused(text):
 def test_a_file_has_a_table_for_each_operator(tmp_path):
     file = tmp_path / "settings.toml"
     file.write_text('[fe.mesh]\nelement_size = "5mm"\nsmooth = true\n[usd.write]\nrate = 48\n')
-    assert read_settings_file(file) == {
-        "fe.mesh": {"element_size": "5mm", "smooth": True},
-        "usd.write": {"rate": 48},
-    }
+    assert read_settings_file(file) == {"fe.mesh": {"element_size": "5mm", "smooth": True}, "usd.write": {"rate": 48}}
 
 
 @pytest.mark.parametrize("text", ["element_size = 5\n", "[fe.mesh\n"])

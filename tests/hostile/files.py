@@ -236,16 +236,11 @@ CASES: dict[str, Case] = {
     "a sublayer that is muted by its offset": simulate(
         DONE,
         make=layer(
-            partial(shifted, offset=1000.0, scale=2.0),
-            more='#usda 1.0\nover "Arm"\n{\n    float calm:x = 1\n}\n',
+            partial(shifted, offset=1000.0, scale=2.0), more='#usda 1.0\nover "Arm"\n{\n    float calm:x = 1\n}\n'
         ),
     ),
     "a sublayer on a scale of zero": simulate(
-        EITHER,
-        make=layer(
-            partial(shifted, offset=0.0, scale=0.0),
-            more="#usda 1.0\n",
-        ),
+        EITHER, make=layer(partial(shifted, offset=0.0, scale=0.0), more="#usda 1.0\n")
     ),
     "a sublayer of the network": simulate(
         REFUSED, "example.com", make=then(lambda f: _sublayer(f, "https://example.com/a.usda"))

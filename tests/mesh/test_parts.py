@@ -169,10 +169,7 @@ def first_frequency(points, tets, parts):
 @pytest.mark.parametrize("across", [1, 2, 3])
 def test_a_bar_of_two_layers_bends_about_the_axis_of_both_whatever_the_elements(helpers, across):
     """Euler and Bernoulli with the section transformed to one material (Timoshenko 1925, bimetal strips)."""
-    layers = (
-        cut((0, 0, 0), (1, 1, 0.5), "Steel", 10.0, 3.0),
-        cut((0, 0, 0.5), (1, 1, 1), "Nylon", 1.0, 1.0),
-    )
+    layers = (cut((0, 0, 0), (1, 1, 0.5), "Steel", 10.0, 3.0), cut((0, 0, 0.5), (1, 1, 1), "Nylon", 1.0, 1.0))
     found, model = first_frequency(*helpers.box((40, across, across), (LENGTH, WIDTH, WIDTH)), layers)
     h, moduli, heights = WIDTH / 2, np.array([10.0, 1.0]), np.array([0.25, 0.75]) * WIDTH
     axis = moduli @ heights / moduli.sum()

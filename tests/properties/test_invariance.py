@@ -11,18 +11,7 @@ from calmotion import ShotError
 from hypothesis import assume, event, given
 from hypothesis import strategies as st
 from likenesses import Units, apart, in_units, moved, reach, reordered
-from random_shots import (
-    STEP,
-    Frame,
-    beams,
-    linkages,
-    lumps,
-    quaternion,
-    rotation_of,
-    shots,
-    simulated,
-    triples,
-)
+from random_shots import STEP, Frame, beams, linkages, lumps, quaternion, rotation_of, shots, simulated, triples
 from scipy.spatial.transform import Rotation
 
 SAME = 1e-9

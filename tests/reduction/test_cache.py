@@ -186,7 +186,7 @@ def test_several_processes_at_once_never_see_half_a_file(folder, repository):
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-        )  # fmt: skip
+        )
         for k in range(4)
     ]
     results = [(process.communicate(timeout=600), process.returncode) for process in running]

@@ -44,9 +44,7 @@ class Arm:
         self.tip = int(self.end[np.linalg.norm(X[self.end] - [LENGTH, 0, 0], axis=1).argmin()])
 
     def reduced(self, law, modes=8):
-        return TurningBeam(
-            LENGTH, THICKNESS, self.material, (CELLS, 1, 1), law, modes, payload=(PAYLOAD, INERTIA)
-        )  # fmt: skip
+        return TurningBeam(LENGTH, THICKNESS, self.material, (CELLS, 1, 1), law, modes, payload=(PAYLOAD, INERTIA))
 
     def difference(self, law, truth, angle, rate, duration):
         """Largest distance between the tips, of the largest deflection."""

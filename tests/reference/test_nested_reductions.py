@@ -23,9 +23,7 @@ TOLERANCE = 0.9e-3  # [m]
 
 def soft_arm():
     """An arm, a move of it, and its meshes, refined as those of a shot are."""
-    character, meshes = beam_arm(
-        2, 0.28955, 0.010862, 2.00036e9, payload=0.17, damping=0.0246, cells=13, across=1
-    )  # fmt: skip
+    character, meshes = beam_arm(2, 0.28955, 0.010862, 2.00036e9, payload=0.17, damping=0.0246, cells=13, across=1)
     away, back = quintic(0.43, 0.264, 0.1), quintic(-0.49, 0.414, 0.464)
     finer = []
     for mesh in meshes.meshes:

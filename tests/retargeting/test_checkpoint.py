@@ -56,9 +56,7 @@ def agree(again, whole):
 
 
 @pytest.mark.parametrize("evaluations", [1, 4, 5, 8])
-def test_a_killed_search_ends_at_the_same_result(
-    limited, animation, bodies, whole, tmp_path, monkeypatch, evaluations
-):  # fmt: skip
+def test_a_killed_search_ends_at_the_same_result(limited, animation, bodies, whole, tmp_path, monkeypatch, evaluations):
     path = tmp_path / "kept.npz"
     with monkeypatch.context() as patch:
         stopping(patch, evaluations, Killed())
@@ -157,7 +155,7 @@ def stored(limited, animation, bodies, tmp_path_factory):
 @pytest.mark.parametrize("how", FORGED)
 def test_a_forged_checkpoint_is_refused_with_a_warning(
     limited, animation, bodies, whole, stored, tmp_path, caplog, how
-):  # fmt: skip
+):
     path = tmp_path / "kept.npz"
     path.write_bytes(stored.read_bytes())
     edited(path, **FORGED[how])
@@ -196,7 +194,7 @@ def test_a_search_that_had_ended_goes_on_from_its_end(limited, animation, bodies
     lines = []
     again = optimize_shot(
         compile_shot(limited, animation, bodies), OPTIONS, lambda done, text: lines.append(text), stored
-    )  # fmt: skip
+    )
     assert not caplog.messages and any("resuming after" in line for line in lines)
     assert again.search.iterations < whole.search.iterations
     assert 0 < again.search.resumed_iterations <= whole.search.iterations and whole.search.resumed_iterations == 0

@@ -58,8 +58,7 @@ class Unweighted(Weighted):
 
 
 @pytest.mark.parametrize(
-    ("term", "said"),
-    [(Effort(), "the name of a limit"), (Feet(), "the name of a limit"), (Strength(), "has no name")],
+    ("term", "said"), [(Effort(), "the name of a limit"), (Feet(), "the name of a limit"), (Strength(), "has no name")]
 )
 def test_a_term_does_not_take_the_place_of_a_limit_of_the_motors(term, said):
     character, _ = small_shot()

@@ -167,9 +167,7 @@ def test_joints_of_a_flexible_link_lie_inside_its_ends(name):
         ("boxer", {"LeftGloveTarget", "RightGloveTarget"}, 10.0, {"HeadTurn", "HeadNod"}),
     ],
 )
-def test_the_shake_falls_and_a_simulation_of_what_was_written_agrees(
-    name, mains, fold, untouched, calmotion, tmp_path
-):  # fmt: skip
+def test_the_shake_falls_and_a_simulation_of_what_was_written_agrees(name, mains, fold, untouched, calmotion, tmp_path):
     table, recording = tmp_path / "calm.csv", tmp_path / "calm.rrd"
     run = calmotion(
         "optimize", path_of(name), "-o", tmp_path / "calm.usda", "--json", "--csv", table, "--rrd", recording,

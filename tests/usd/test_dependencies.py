@@ -102,8 +102,7 @@ def template(start: float, end: float, stride: float) -> str:
 
 
 @pytest.mark.parametrize(
-    "clips",
-    ["asset[] assetPaths = [@pipe.usda@]", "asset manifestAssetPath = @pipe.usda@", template(0.0, 9.0, 1.0)],
+    "clips", ["asset[] assetPaths = [@pipe.usda@]", "asset manifestAssetPath = @pipe.usda@", template(0.0, 9.0, 1.0)]
 )
 def test_a_named_pipe_as_a_value_clip_is_refused(tmp_path, clips):
     for name in ("pipe.usda", "pipe.3.usda"):

@@ -53,7 +53,7 @@ def test_baked_bodies_of_a_posed_shot_are_the_curves(calmotion, tmp_path):
     report = json.loads(done.stdout)
     predicted = calmotion(
         "simulate", tmp_path / "calm_root.usda", "-o", tmp_path / "moved.usda", "--bake=simulated", *options
-    )  # fmt: skip
+    )
     assert predicted.returncode == 0, predicted.stdout
     found = json.loads(predicted.stdout)
     assert found["max_error_m"] == pytest.approx(report["max_error_after_m"], rel=0.02, abs=2e-6)

@@ -92,8 +92,7 @@ def test_an_attribute_whose_schema_is_not_applied_is_reported(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("schema", "path"),
-    [("CalmFlexibleBodyAPI", "/Arm/joints"), ("CalmDampingAPI", FORE), ("CalmMotorAPI", FORE)],
+    ("schema", "path"), [("CalmFlexibleBodyAPI", "/Arm/joints"), ("CalmDampingAPI", FORE), ("CalmMotorAPI", FORE)]
 )
 def test_a_schema_on_the_wrong_prim_is_reported(tmp_path, schema, path):
     def edit(stage):

@@ -5,14 +5,7 @@ import pytest
 import synthetic
 from calmotion.model import Body, Motion
 from calmotion.support import rotation_from_quaternion
-from calmotion.views.playback import (
-    carriers,
-    deformed_points,
-    deviations,
-    relative_poses,
-    sample_motion,
-    world_points,
-)
+from calmotion.views.playback import carriers, deformed_points, deviations, relative_poses, sample_motion, world_points
 from calmotion.views.raster import split_at_creases
 
 

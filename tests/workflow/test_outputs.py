@@ -82,16 +82,7 @@ def test_a_root_layer_of_others_is_not_replaced(folder, calmotion, monkeypatch, 
 def test_what_calmotion_wrote_before_is_replaced(folder, calmotion, monkeypatch):
     monkeypatch.chdir(folder)
     for _ in range(2):
-        arguments = (
-            "simulate",
-            "shot.usda",
-            "-o",
-            "calm.usda",
-            "--csv",
-            "a.csv",
-            "--step",
-            "10ms",
-        )
+        arguments = ("simulate", "shot.usda", "-o", "calm.usda", "--csv", "a.csv", "--step", "10ms")
         assert calmotion(*arguments, "--quiet").returncode == 0
 
 

@@ -81,7 +81,7 @@ def test_feet_come_and_go_at_the_tempo_of_the_performance(tmp_path):
 
     result = cm.optimize(
         write_stepper(tmp_path / "stepper.usda", slow_hips), step=1 / 96, tolerance="1mm", retime={"slowest": 3.0}
-    )  # fmt: skip
+    )
     report = result.report()
     assert 0.0 < report["retime"]["lower_bound_s"] < report["retime"]["added_s"] < 0.1
     assert result.max_error < 1e-3 and not any(row["exceeded"] for row in report["limits"])

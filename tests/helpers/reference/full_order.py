@@ -29,9 +29,7 @@ class FullOrder:
         mass: Consistent, with the lumps [kg], shape [3 n', 3 n'].
     """
 
-    def __init__(
-        self, points, tets, youngs_modulus, poissons_ratio, density, law="stvk", lumps=None, retardation=0.0
-    ):  # fmt: skip
+    def __init__(self, points, tets, youngs_modulus, poissons_ratio, density, law="stvk", lumps=None, retardation=0.0):
         from skfem import Basis, ElementTetP2, MeshTet
 
         mesh = MeshTet(np.ascontiguousarray(points.T, dtype=float), np.ascontiguousarray(tets.T, dtype=np.int64))

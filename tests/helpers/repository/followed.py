@@ -41,7 +41,7 @@ def run(commands: str, folder: Path, work: Path) -> str:
     environment = os.environ | {
         "PATH": os.pathsep.join(map(str, (tools, Path(sys.executable).parent, os.environ["PATH"]))),
         "PYTHONPATH": str(REPOSITORY / "pipeline"),
-    }  # fmt: skip
+    }
     done = subprocess.run(
         ["bash", "-e", "-c", commands], cwd=work, env=environment, capture_output=True, text=True, timeout=3600
     )

@@ -90,9 +90,7 @@ def gantry(masts: int = 3) -> SimplificationShot:
         targets.append(Target(f"/Gantry/Load{k}", load, _frame(0.0)))
         meshes.append(FEMesh(mast, *beam_mesh(0.6, 0.02, 12), MeshQuality(0.0, 0.0, 0.0)))
     motors = (Motor(0, joints[0].path, _LENGTH, linear=True),)
-    character = Character(
-        "/Gantry", tuple(bodies), tuple(joints), motors, tuple(targets), np.array([0.0, 0.0, -9.81])
-    )  # fmt: skip
+    character = Character("/Gantry", tuple(bodies), tuple(joints), motors, tuple(targets), np.array([0.0, 0.0, -9.81]))
     made = FEMeshes(tuple(meshes))
     return SimplificationShot("gantry", _with_geometry(character, made), shot_of(quintic(0.5, 0.5, 0.2), 2.0), made)
 

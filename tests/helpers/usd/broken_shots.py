@@ -175,7 +175,8 @@ CASES: dict[str, Case] = {
     ),
     "a reference to a prim that is not there": of_layer(
         lambda layer: layer.GetPrimAtPath(FORE).referenceList.Prepend(Sdf.Reference("./other.usda", "/Gone")),
-        FORE, more={"other.usda": '#usda 1.0\ndef "There" {}\n'},
+        FORE,
+        more={"other.usda": '#usda 1.0\ndef "There" {}\n'},
     ),
     "a reference out of the folder": of_layer(
         lambda layer: layer.GetPrimAtPath(FORE).referenceList.Prepend(Sdf.Reference("../../../../../../etc/passwd")),
@@ -235,7 +236,8 @@ CASES: dict[str, Case] = {
     "an axis of a wrong type": edited(attribute(ELBOW, "physics:axis", "Float", 1.0), ELBOW, "physics:axis"),
     "a rotation of length zero": edited(
         lambda stage: stage.GetPrimAtPath(ELBOW).GetAttribute("physics:localRot0").Set(Gf.Quatf(0)),
-        ELBOW, "physics:localRot0",
+        ELBOW,
+        "physics:localRot0",
     ),
     "a position that is no number": edited(vector(ELBOW, "physics:localPos0", NAN, 0, 0), ELBOW, "physics:localPos0"),
     "a position of a wrong type": edited(attribute(ELBOW, "physics:localPos0", "String", "here"), ELBOW, "localPos0"),
@@ -264,9 +266,7 @@ CASES: dict[str, Case] = {
     "gears in a circle": edited(gears_in_a_circle, "/Arm/joints"),
     "a joint of a skeleton that is not there": edited(skel_joint, ELBOW, "calm:motor:skelJoint"),
     "a target position by a connection": edited(connected, ELBOW, "/Arm/control.angle", "connection"),
-    "a skeleton with too few rotations": edited(
-        rotations(lambda own: own[:1]), posed_shots.ANIMATION, "time code 5"
-    ),
+    "a skeleton with too few rotations": edited(rotations(lambda own: own[:1]), posed_shots.ANIMATION, "time code 5"),
     "rotations of length two": edited(
         rotations(lambda own: [2.0 * one for one in own]), posed_shots.ANIMATION, "unit length", "time code 5"
     ),
@@ -311,9 +311,7 @@ CASES: dict[str, Case] = {
     "faces of another number of corners": edited(
         mesh("faceVertexCounts", Vt.IntArray([3] * 6)), SKIN, "faceVertexCounts"
     ),
-    "a box twisted by half a turn, which encloses nothing": edited(
-        mesh("points", TWISTED), SKIN
-    ),
+    "a box twisted by half a turn, which encloses nothing": edited(mesh("points", TWISTED), SKIN),
     "a mesh without points": edited(mesh("points", Vt.Vec3fArray()), SKIN),
     "tetrahedra of points that are not there": edited(tet_mesh(SQUARE, [(0, 1, 2, 9)]), f"{FORE}/tets"),
     "no tetrahedra": edited(tet_mesh(SQUARE, []), f"{FORE}/tets", "tetVertexIndices"),
@@ -341,7 +339,7 @@ CASES: dict[str, Case] = {
     "limits the wrong way round": edited(
         both(number(ELBOW, "physics:lowerLimit", 90.0), number(ELBOW, "physics:upperLimit", -90.0)), repaired=""
     ),
-}  # fmt: skip
+}
 
 
 def write_all(folder: Path) -> None:

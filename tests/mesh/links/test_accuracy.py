@@ -54,10 +54,7 @@ def test_a_stated_mass_that_the_material_does_not_give_is_reported():
 
 
 def test_a_volume_that_is_not_that_of_the_surface_is_reported_unless_it_winds_around_more():
-    note, wound = (
-        accurate_mesh.volume_note,
-        filling.INTERSECTS,
-    )
+    note, wound = (accurate_mesh.volume_note, filling.INTERSECTS)
     (text,) = note(MeshQuality(20.0, 8e-5, 0.021))
     assert text == "its volume differs from that of the surface by 2.1%"
     assert note(MeshQuality(20.0, 8e-5, 0.0005)) == note(MeshQuality(20.0, 8e-5, 0.021, (wound,))) == ()

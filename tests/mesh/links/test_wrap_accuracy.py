@@ -86,12 +86,7 @@ def test_first_frequencies_of_wrapped_parts_are_within_five_percent_and_of_a_bea
         assert wrapped == pytest.approx(whole, rel=0.05), name
     made = solid(surface(arm(), "/a"), surface(boss(), "/b"))
     mass = mass_of_solid(made.points, made.triangles, FLEXIBLE.material.density)
-    beam = body_mesh.mesh_body(
-        0,
-        body := replace(link(element_size=0.009), mass=mass),
-        MeshOptions(),
-        (ROOT, TIP),
-    )
+    beam = body_mesh.mesh_body(0, body := replace(link(element_size=0.009), mass=mass), MeshOptions(), (ROOT, TIP))
     found = first(beam, body)
     print("beam", np.round(found / whole - 1.0, 4))
     assert beam.quality.source == "equivalent beam" and found[:2] == pytest.approx(whole[:2], rel=0.2)

@@ -27,7 +27,7 @@ REPORT = {
         (False, 40, "--rate 40"),
         (False, None, "no rate is enough"),
     ],
-)  # fmt: skip
+)
 def test_the_answer_is_first_and_the_next_step_before_the_numbers(kept, lowest, then):
     stream = io.StringIO()
     _print(REPORT | {"loss_kept": kept, "lowest_rate_hz": lowest}, console_on(stream))

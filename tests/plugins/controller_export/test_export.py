@@ -77,7 +77,7 @@ def test_a_layer_of_results_is_opened_with_its_shot(shot_file, tmp_path, calmoti
     (tmp_path / "calm.usda").write_text(
         HEAD.replace("ROLE", "curves").replace("SUBLAYERS", "") + 'over "Robot" {\n over "Hinge" {\n'
         f"float drive:angular:physics:targetPosition.timeSamples = {{ {new} }}\n }}\n}}\n"
-    )  # fmt: skip
+    )
     below = "subLayers = [@./calm.usda@, @./shot.usda@]"
     (tmp_path / "calm_root.usda").write_text(HEAD.replace("ROLE", "root").replace("SUBLAYERS", below))
     done = calmotion("export", tmp_path / "calm.usda", "--to", "ros2", "--rate", "20", "-o", tmp_path / "a.yaml")

@@ -304,11 +304,7 @@ def test_the_format_of_the_page_is_one_file(example, curves, tmp_path):
         ("return (file,)", "return file", "write of the format xml returns no tuple of paths"),
         ("Commands(LINEAR, times, curves", 'Commands("lines", times, curves', "sampled .* 'lines' is none of hold"),
         ("Commands(LINEAR, times, values", 'Commands("cubic", times, values', "read .* cubic needs velocities"),
-        (
-            "values / per_unit(curves)",
-            "(values / per_unit(curves))[:, :1]",
-            r"read .* shape \[61, 1\]",
-        ),
+        ("values / per_unit(curves)", "(values / per_unit(curves))[:, :1]", r"read .* shape \[61, 1\]"),
         ("Commands(LINEAR, times, values", "Commands(LINEAR, times * 0.0, values", "read .* times do not increase"),
     ],
 )

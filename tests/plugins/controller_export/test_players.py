@@ -2,12 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion_plugins.controller_export.commands import (
-    HOLD,
-    LINEAR,
-    SETTLED,
-    Commands,
-)
+from calmotion_plugins.controller_export.commands import HOLD, LINEAR, SETTLED, Commands
 from calmotion_plugins.controller_export.players import played
 
 TIMES = np.array([0.0, 0.1, 0.2, 0.35])

@@ -9,16 +9,7 @@ from calmotion.host import SettingError
 from calmotion.model import Follows, Rotor, RunSettings, Track, TurnsWith
 from calmotion.model.animation import Schedule
 from calmotion.multibody import Workspace
-from calmotion.simulation import (
-    Curves,
-    best_delay,
-    compile_shot,
-    modes_of,
-    prepare,
-    rigid_motion,
-    run_forward,
-    shaped,
-)
+from calmotion.simulation import Curves, best_delay, compile_shot, modes_of, prepare, rigid_motion, run_forward, shaped
 from calmotion.simulation.forward import PerformedCurves
 from calmotion.testing import small_shot
 from calmotion_plugins.live import Live, LiveSettings, worth_of_lookahead

@@ -83,9 +83,7 @@ OPTION = "<option {}><flag {}/></option>"
 NOTHING = {
     "line": robot(extra=EQUALITY.format("0.1 1 0 0 0", "")),
     "inactive": robot(extra=EQUALITY.format("0 1 2 0 0", 'active="false"')),
-    "inactive_class": robot(
-        extra='<default><equality active="false"/></default>' + EQUALITY.format("0 1 2 0 0", "")
-    ),
+    "inactive_class": robot(extra='<default><equality active="false"/></default>' + EQUALITY.format("0 1 2 0 0", "")),
     "still_air": robot(extra=OPTION.format('wind="0 0 0" density="0"', 'spring="enable"')),
     "contacts_off": robot(extra=OPTION.format("", 'contact="disable" eulerdamp="disable"')),
     "no_gravcomp": robot(body='<body gravcomp="0"/>'),
@@ -104,7 +102,7 @@ NOTHING = {
         extra='<transmission name="t"><type>x</type><actuator name="m"><mechanicalReduction>50</mechanicalReduction>'
         "</actuator></transmission>"
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", NOTHING)
@@ -140,13 +138,12 @@ NOTED = {
     "muscle": (robot(extra=ACTUATOR.format("muscle", "")), "only which joints they move is read: drive"),
     "speed": (robot(extra=ACTUATOR.format("velocity", 'kv="1"')), "the command of these actuators is a speed"),
     "delay": (robot(extra=ACTUATOR.format("motor", 'delay="0.1"')), "calm:motor:delay"),
-    "crank": (
-        robot(extra='<actuator><motor name="c" cranksite="a" slidersite="b"/></actuator>'), "drive nothing: c"
-    ),
+    "crank": (robot(extra='<actuator><motor name="c" cranksite="a" slidersite="b"/></actuator>'), "drive nothing: c"),
     "plugin": (robot(body='<plugin plugin="mujoco.elasticity.cable"/>'), "plugins of MuJoCo are not run"),
     "newer": (robot(joint='creep="2"'), "not known, and not read: joint hip creep"),
     "gazebo": (
-        arm(extra='<gazebo reference="j"><springStiffness>3</springStiffness></gazebo>'), "Gazebo are not read: j"
+        arm(extra='<gazebo reference="j"><springStiffness>3</springStiffness></gazebo>'),
+        "Gazebo are not read: j",
     ),
     "ros2_control": (
         arm(
@@ -157,7 +154,7 @@ NOTED = {
     ),
     "jerk": (arm().replace("effort=", 'jerk="3" effort='), "acceleration and jerk are not read"),
     "gap": (arm(extra='<transmission name="t"><gap_joint name="g"/></transmission>'), "transmission couples"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", NOTED)

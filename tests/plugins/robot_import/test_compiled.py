@@ -235,10 +235,8 @@ LIMITS = {
         robot(head='<default><motor forcerange="-0.4 0.4"/></default>', tail=MOTOR.format('ctrlrange="-1 1" gear="5"')),
         2.0,
     ),
-    "gain": (
-        robot(tail='<actuator><general joint="lift" gainprm="3" ctrlrange="-1 1"/></actuator>'), 3.0
-    ),
-}  # fmt: skip
+    "gain": (robot(tail='<actuator><general joint="lift" gainprm="3" ctrlrange="-1 1"/></actuator>'), 3.0),
+}
 
 
 @pytest.mark.parametrize("name", LIMITS)

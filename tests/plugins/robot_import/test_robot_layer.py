@@ -162,7 +162,7 @@ def test_targets_are_links_and_frames(make):
         ({"motion": MotorTracks("a.csv", TIMES, {"shoulder_pan": TIMES})}, "no joint", "Did you mean shoulder-pan?"),
         ({"flexible": (FlexibleLinks("*", "abs", ABS),) * 2}, "two patterns", "narrower"),
     ],
-)  # fmt: skip
+)
 def test_names_that_nothing_has_are_refused(make, options, problem, remedy):
     with pytest.raises(ShotError) as refused:
         make(**options)

@@ -94,7 +94,7 @@ def peaks_of(load_envelope, rng):
         sign(load_envelope.acceleration),
         sign(load_envelope.angular_acceleration),
         sign(load_envelope.angular_velocity),
-    )  # fmt: skip
+    )
     return accelerations, np.concatenate([sign(load_envelope.force[0]), sign(load_envelope.moment[0])])
 
 

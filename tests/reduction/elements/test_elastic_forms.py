@@ -5,12 +5,7 @@ import pytest
 from boxes import box_tets, conical_quadrature
 from calmotion.model import ElasticMaterial
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.elements.elastic_forms import (
-    GradientRule,
-    lame_constants,
-    linear_stress,
-    strain_gram,
-)
+from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, linear_stress, strain_gram
 
 MATERIAL = ElasticMaterial("/Looks/Any", 3.0, 0.3, 1.0)
 LAME, MU = lame_constants(3.0, 0.3)

@@ -20,8 +20,7 @@ WORST = RobustSettings("worst", 3, 20)
 
 def uncertain(modulus=0.1, damping=1.0, payload=0.1, gains=0.2):
     return lambda arm: dataclasses.replace(
-        arm,
-        retarget=dataclasses.replace(arm.retarget, uncertainty=Uncertainty(modulus, damping, payload, gains)),
+        arm, retarget=dataclasses.replace(arm.retarget, uncertainty=Uncertainty(modulus, damping, payload, gains))
     )
 
 

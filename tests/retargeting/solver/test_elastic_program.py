@@ -45,7 +45,7 @@ def test_constraints_that_exclude_each_other_are_exceeded_least():
     )
     least = linprog(
         np.r_[np.zeros(3), np.ones(8)], np.c_[G, -np.eye(8)], b, bounds=[(None, None)] * 3 + [(0.0, None)] * 8
-    )  # fmt: skip
+    )
     assert least.fun > 0.1
     assert excess.sum() == pytest.approx(least.fun, rel=1e-5)
 

@@ -12,13 +12,7 @@ from calmotion.simulation.body_reduction import load_envelopes
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.tolerance.simplification.analysis import analyse
 from calmotion.tolerance.step_error import distance, simulate_at
-from simplification_shots import (
-    arm_with_head,
-    clevis_arm,
-    gantry,
-    mixed_arm,
-    plastic_arm,
-)
+from simplification_shots import arm_with_head, clevis_arm, gantry, mixed_arm, plastic_arm
 
 FAST = RunSettings(step=1 / 120)
 

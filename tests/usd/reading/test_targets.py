@@ -3,15 +3,7 @@
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.model import (
-    Body,
-    ElasticMaterial,
-    FlexibleSettings,
-    Frame,
-    Joint,
-    MassProperties,
-    SurfaceMesh,
-)
+from calmotion.model import Body, ElasticMaterial, FlexibleSettings, Frame, Joint, MassProperties, SurfaceMesh
 from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd.reading import read_shot
 from calmotion.usd.reading.targets import default_targets

@@ -121,8 +121,4 @@ def test_bodies_that_are_switched_off_are_named_with_their_attribute(tmp_path):
             prim.GetAttribute("physics:rigidBodyEnabled").Set(False)
     stage.Save()
     error = refused(path)
-    assert error.attribute == "physics:rigidBodyEnabled" and error.path in (
-        UPPER,
-        FORE,
-        BASE,
-    )
+    assert error.attribute == "physics:rigidBodyEnabled" and error.path in (UPPER, FORE, BASE)

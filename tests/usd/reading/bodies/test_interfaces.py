@@ -59,7 +59,7 @@ def test_subsets_of_other_families_mean_nothing(tmp_path):
         (lambda s: subset(s, "elbow", [0], element="point"), "elementType", "faces of a Mesh"),
         (lambda s: (subset(s, "elbow", [0]), subset(s, "again", [1], ELBOW)), None, "already"),
     ],
-)  # fmt: skip
+)
 def test_prims_that_are_not_interfaces_are_refused(tmp_path, edit, attribute, words):
     with pytest.raises(ShotError, match=words) as caught:
         fore(tmp_path, edit)
