@@ -15,16 +15,12 @@ WHAT = {
     "meshing": ("links.meshing", "links of robots: their solids, meshes, frequencies and errors"),
     "integrators": ("integrators.integrators", "orders of the integrators, against RK4 at a fine step"),
     "stability": ("integrators.stability", "maps of each integrator over stiffness, speed, load and step"),
-    "gradients": ("optimizer.gradients", "both adjoints against differences"),
-    "optimizer": ("optimizer.optimizer", "Gauss-Newton and a quasi-Newton method"),
-    "baselines": ("optimizer.baselines", "input shapers, a filter and the optimised curves"),
     "motor-commands": ("motors.commands", "optimised commands of servos, replayed in MuJoCo"),
-    "diagnose": ("accuracy.diagnosis", "known faults of random arms, found from noisy recordings"),
     "tempo": ("motors.tempo", "time and error that slower motors cost, against TOPP-RA and one tempo"),
     "live": ("motors.live", "streams that are calmed while they are played, and input shapers"),
     "speed": ("speed.stages", "where the time of a run goes"),
     "robots": ("speed.robots", "processor time by stage and memory of robots with two flexible links"),
-    "scaling": ("speed.scaling", "growth of the run time; Exudyn"),
+    "scaling": ("speed.scaling", "growth of the run time with bodies, steps and modes"),
 }
 BENCHMARKS = {name: module for name, (module, _) in WHAT.items()}
 

@@ -12,13 +12,11 @@ is left. A folder with `beam.toml` (the entries of `two_mode_beam.Strip`) gets t
 strip too, and one with `servo.toml` (the entries of `servo_model.Bench`) the error of the model of
 `better-actuator-models`, fitted to all recordings. Commands that were optimised for each fit are replayed in these
 models: of the shots without a recording, else of the largest motion that the fit has not seen. Rigid arms with
-ideal motors get the error of classic identification, a linear regression of efforts. Without a folder, the command
-compares a published cantilever with its finite elements.
+ideal motors get the error of classic identification, a linear regression of efforts.
 """
 
 from __future__ import annotations
 
-import argparse
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -49,7 +47,7 @@ from calmotion_plugins.calibration import (
 from scipy.interpolate import CubicSpline
 
 from ..common.reporting import bench_parser, finish, keep, say
-from . import cantilever, inverse_dynamics, servo_model, two_mode_beam
+from . import inverse_dynamics, servo_model, two_mode_beam
 from .replays import Replayed, replayed
 from .servo_model import FittedServo
 from .two_mode_beam import Fitted
@@ -276,37 +274,16 @@ def covered(fits: dict[tuple[str, ...], Calibration]) -> dict[str, tuple[int, in
     return found
 
 
-@dataclass(frozen=True)
-class Frequency:
-    """One of the published cantilever, computed and measured [Hz], and their difference."""
-
-    computed_hz: float
-    measured_hz: float
-    difference_percent: float
-
-
-def _cantilever(options: argparse.Namespace) -> None:
-    """The published cantilever."""
-    found, modulus = cantilever.cantilever()
-    rows = [
-        Frequency(float(f), m, 100.0 * (float(f) / m - 1.0)) for f, m in zip(found, cantilever.MEASURED, strict=True)
-    ]
-    finish(options, f"A steel cantilever, modulus {1e-9 * modulus:.4g} GPa", rows, modulus_pa=modulus)
-
-
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("measured", __doc__)
-    parser.add_argument("folder", metavar="FOLDER", nargs="?", help="shots and recordings of one machine")
+    parser.add_argument("folder", metavar="FOLDER", help="shots and recordings of one machine")
     parser.add_argument("--fit", type=int, default=2, metavar="N", help="shots that are fitted together (default: 2)")
     parser.add_argument("--most", type=int, metavar="N", help="fits, spread over all of them (default: all)")
     parser.add_argument(
         "--parameters", nargs="+", metavar="KIND", default=CalibrationSettings.parameters, help="as of calibrate"
     )
     options = parser.parse_args(arguments)
-    if options.folder is None:
-        _cantilever(options)
-        return 0
     machine = machine_in(Path(options.folder))
     names = list(machine.takes)
     nominal = {name: machine.error(name) for name in names}

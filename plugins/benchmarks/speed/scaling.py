@@ -1,12 +1,10 @@
-"""Growth of the run time with bodies, duration and modes, and comparison with Exudyn.
+"""Growth of the run time with bodies, duration and modes.
 
 `calmotion bench scaling [--quick]` measures, in one run and with one thread,
 
 - time per step of chains of 4 to 128 flexible links, of 1,000 to 100,000 steps, and of 4 to 64 modes in a link, with
   the exponents of their growth;
-- a step of a tree of 14 flexible bodies of 10 modes;
-- where it is installed (the optional extra `bench`), the swung arm against Exudyn's reduced flexible bodies, at equal
-  error.
+- a step of a tree of 14 flexible bodies of 10 modes.
 """
 
 from __future__ import annotations
@@ -15,7 +13,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from importlib.util import find_spec
 
 import numpy as np
 from calmotion.arrays import Array
@@ -33,9 +30,8 @@ from calmotion.multibody import (
 )
 from calmotion.testing import branched_links, link_chain
 
-from ..common.reporting import bench_parser, cells_of, heads_of, keep, show
+from ..common.reporting import bench_parser, keep, show
 from ..common.timing import median_time
-from .exudyn_arm import LEVELS, Run, compare, time_at
 
 STEP = 1.0 / 480.0
 BODIES, DURATIONS, MODES = (4, 8, 16, 32, 64, 128), (1_000, 10_000, 100_000), (4, 8, 16, 32, 64)
@@ -100,29 +96,13 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     measured = growths((4, 8, 16, 32), (1_000, 5_000), (4, 8, 16, 32)) if options.quick else growths()
     tree = step_time(prepared(*branched_links()), 400)
-    runs = [] if options.quick or find_spec("exudyn") is None else compare()
-    keep(options, Run, runs)
-    faster = [
-        {"code": code, "error_m": level, "ratio": time_at(runs, "exudyn", level) / time_at(runs, code, level)}
-        for code in dict.fromkeys(run.code for run in runs if run.code != "exudyn")
-        for level in LEVELS
-    ]
+    keep(options, Growth, measured)
     if options.json:
-        found = {
-            "growth": [asdict(growth) | {"exponent": growth.exponent} for growth in measured],
-            "tree_step_s": tree,
-            "exudyn": [asdict(run) for run in runs],
-            "times_faster_than_exudyn": faster,
-        }
-        print(json.dumps(found))
+        growth = [asdict(growth) | {"exponent": growth.exponent} for growth in measured]
+        print(json.dumps({"growth": growth, "tree_step_s": tree}))
         return 0
     for growth in measured:
         cells = [[str(v), f"{1e6 * seconds:.0f}"] for v, seconds in zip(growth.values, growth.seconds, strict=True)]
         show(f"{growth.name}: exponent {growth.exponent:.2f}", [growth.name, "time [us]"], cells)
     print(f"a step of 14 bodies of 10 modes: {1e6 * tree:.0f} us")
-    if not runs:
-        print("not compared with Exudyn: install the extra `bench`, and leave out --quick")
-    show("The swung arm, 14 coordinates", heads_of(Run), [cells_of(run) for run in runs])
-    for row in faster:
-        print(f"{row['code']}: {row['ratio']:.3g} times as fast as Exudyn at an error of {row['error_m']:.0e} m")
     return 0

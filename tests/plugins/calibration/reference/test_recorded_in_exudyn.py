@@ -18,9 +18,9 @@ from calmotion_plugins.calibration.identification.calibrate import CalibrationSe
 from calmotion_plugins.calibration.identification.robots import robot_with
 from calmotion_plugins.calibration.identification.signals import signals_of
 from calmotion_plugins.calibration.model.estimates import HIGHER_MODES
+from exudyn_arm import ExudynArm as Arm
 from scipy.interpolate import make_interp_spline
 
-Arm = pytest.importorskip("calmotion_plugins.benchmarks.scenes.exudyn_arm").ExudynArm
 MESH = (24, 4, (2.0, 1.5))  # of the model: elements of the arm along and across, and their grading
 OTHER_MESH = (20, 3, (2.0, 1.5))  # of the arm in Exudyn
 SECONDS, AFTER, RATE = 1.5, 0.8, 1920

@@ -1,1 +1,0 @@
-"""Gradients, Gauss-Newton against L-BFGS, and input shapers as baselines."""
