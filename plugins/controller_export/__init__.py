@@ -1,4 +1,4 @@
-"""Motor curves for controllers and programs of animation: `calmotion export`, and `export` in Python.
+"""Motor curves for controllers: `calmotion export`, and `export` in Python.
 
 Plugins with formats of their own take `CommandFormat` and what it works with from here.
 """
@@ -8,12 +8,10 @@ from calmotion.public_names import public_names
 
 from .formats.bottango import BottangoCurves
 from .formats.csv_table import CsvTable
-from .formats.gltf import GltfFile
-from .formats.keyframes import Keyframes
 from .formats.ros2 import Ros2Trajectory
 from .formats.ticks import ServoTicks
 from .formats.ur_script import UrScript
 
-register, unregister = registration(Ros2Trajectory, CsvTable, ServoTicks, UrScript, BottangoCurves, Keyframes, GltfFile)
+register, unregister = registration(Ros2Trajectory, CsvTable, ServoTicks, UrScript, BottangoCurves)
 
 __getattr__, __dir__ = public_names(__name__)

@@ -37,7 +37,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--to",
         metavar="FORMAT",
         required=True,
-        help="format: ros2, csv, ticks (servos), ur, bottango, keyframes, gltf, or that of a plugin",
+        help="format: ros2, csv, ticks (servos), ur, bottango, or that of a plugin",
     )
     command.add_argument("--rate", metavar="HZ", type=_rate, default=100.0, help="commands a second (default: 100)")
     command.add_argument(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.model import Animation, Character, Motor
+from calmotion.model import Motor
 
 HOLD, LINEAR, CUBIC, QUINTIC, BEZIER, FOLLOW = "hold", "linear", "cubic", "quintic", "bezier", "follow"
 LOWEST_RATE, HIGHEST_RATE = 1.0, 1e5  # commands a second [Hz]
@@ -51,8 +51,6 @@ class MotorCurves:
         names: Names of their joints as a controller knows them.
         limits: Lower and upper limit of each joint [rad or m], shape [M, 2]; infinite where there is none.
         sample: Times within the shot [s], shape [n], and the order of the derivative -> [rad or m, s], shape [n, M].
-        character: The robot, and
-        animation: its moving roots, for formats that hold its bodies; None where there are only curves.
     """
 
     shot: str
@@ -62,8 +60,6 @@ class MotorCurves:
     names: tuple[str, ...]
     limits: Array
     sample: Callable[[Array, int], Array]
-    character: Character | None = None
-    animation: Animation | None = None
 
     def at(self, times: Array, order: int = 0) -> Array:
         """The same at any time: a shot that loops goes on, any other holds its last pose, at rest."""

@@ -62,7 +62,7 @@ def curves_of(outcome: Outcome, result: Result | None) -> MotorCurves:
     shot = Path(outcome.require(Provenance).shot).name
     return MotorCurves(
         shot, float(animation.frame_times[-1]), character.retarget.cyclic, motors, tuple(own), limits.reshape(-1, 2),
-        commanded_curves(character, animation, result), character, animation,
+        commanded_curves(character, animation, result),
     )  # fmt: skip
 
 

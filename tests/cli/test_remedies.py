@@ -151,7 +151,7 @@ REFUSED = {
         ("optimize", SHOT, "--quiet"), ("-o", "calm.txt"), r"extension (\.usda)", ("-o", "calm$1"),
     ),
     "a shaper that is not there": (SIMULATE, ("--shaper", "xyz"), "Remove the option", ()),
-    "a format that is not there": (EXPORT, ("--to", "nothing"), "Use one of .*(keyframes)", ("--to", "$1")),
+    "a format that is not there": (EXPORT, ("--to", "nothing"), "Use one of .*(ros2)", ("--to", "$1")),
     "a controller of other robots": (EXPORT, ("--to", "ur"), "Use ros2 or (csv)", ("--to", "$1")),
     "a material that is not there": (("materials",), ("wood",), "Use ([a-z]+),", ("$1",)),
     "a motor that is not there": (("motors",), ("wood",), "`calmotion (motors)` lists", ()),

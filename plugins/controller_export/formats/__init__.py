@@ -1,1 +1,1 @@
-"""Formats of `calmotion export`, one a file: ROS 2, CSV, servo ticks, URScript, Bottango, keyframes, glTF."""
+"""Formats of `calmotion export`, one a file: ROS 2, CSV, servo ticks, URScript, Bottango."""

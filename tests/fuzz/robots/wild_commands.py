@@ -18,7 +18,7 @@ for folder in (TESTS / "hostile", TESTS / "helpers" / "usd"):
 import hostile  # noqa: E402
 
 LONGEST = 240  # processor time of one run [s]
-FORMATS = ("ros2", "csv", "ticks", "ur", "bottango", "keyframes", "gltf")
+FORMATS = ("ros2", "csv", "ticks", "ur", "bottango")
 OUTPUTS = (
     "out.usda", "out_root.usda", "out_model.usda", "out_model_root.usda", "out.csv", "out.html", "commands.out",
     "figures",

@@ -3,12 +3,10 @@
 import csv
 import json
 import re
-import struct
 
 import numpy as np
 import yaml
 from scipy.interpolate import BPoly
-from scipy.spatial.transform import Rotation, Slerp
 
 SETTLED = 0.01  # within which a motor reaches a held command [s]
 
@@ -72,22 +70,6 @@ def replay_ur(files, names, at):
     return lines(at, h * np.arange(len(track)), np.array(track))
 
 
-def replay_keyframes(files, names, at):
-    with open(files[0]) as stream:
-        content = json.load(stream)
-    columns = []
-    for name in names:
-        (motor,) = [entry for entry in content["motors"] if entry["name"] == name]
-        frames, column = motor["keyframes"], np.empty(len(at))
-        for one, other in zip(frames[:-1], frames[1:], strict=True):
-            p = [(one["time"], one["value"]), np.add((one["time"], one["value"]), one["out"])]
-            p += [np.add((other["time"], other["value"]), other["in"]), (other["time"], other["value"])]
-            inside = (at >= one["time"] - 1e-9) & (at <= other["time"] + 1e-9)
-            column[inside] = casteljau(np.array(p, float), at[inside])
-        columns.append(column)
-    return np.stack(columns, axis=1)
-
-
 def replay_bottango(files, names, at):
     with open(files[1]) as stream:
         motors = {entry["name"]: entry for entry in json.load(stream)["motors"]}
@@ -103,48 +85,6 @@ def replay_bottango(files, names, at):
             column[inside] = casteljau(p, 1e3 * at[inside] - start) / 8192
         columns.append(motor["minimum"] + (motor["maximum"] - motor["minimum"]) * column)
     return np.stack(columns, axis=1)
-
-
-def replay_gltf(files, at):
-    """World transforms of the nodes by name, as the specification composes and interpolates them."""
-    with open(files[0], "rb") as stream:
-        raw = stream.read()
-    size = struct.unpack_from("<I", raw, 12)[0]
-    content, binary = json.loads(raw[20 : 20 + size]), raw[28 + size :]
-    nodes, (animation,) = content["nodes"], content["animations"]
-
-    def read(index):
-        accessor = content["accessors"][index]
-        start = content["bufferViews"][accessor["bufferView"]]["byteOffset"]
-        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
-        numbers = struct.unpack_from(f"<{width * accessor['count']}f", binary, start)
-        return np.reshape(numbers, (-1, width))
-
-    moving = {}
-    for channel in animation["channels"]:
-        sampler = animation["samplers"][channel["sampler"]]
-        assert sampler["interpolation"] == "LINEAR"
-        times, values = read(sampler["input"])[:, 0], read(sampler["output"])
-        key = (channel["target"]["node"], channel["target"]["path"])
-        inside = np.clip(at, times[0], times[-1])
-        if key[1] == "rotation":
-            moving[key] = Slerp(times, Rotation.from_quat(values))(inside)
-        else:
-            moving[key] = lines(inside, times, values)
-    worlds = {}
-
-    def visit(index, place, turn):
-        node = nodes[index]
-        shift = moving.get((index, "translation"), np.tile(node.get("translation", [0.0, 0.0, 0.0]), (len(at), 1)))
-        rest = Rotation.from_quat(np.tile(node.get("rotation", [0.0, 0.0, 0.0, 1.0]), (len(at), 1)))
-        place, turn = place + turn.apply(shift), turn * moving.get((index, "rotation"), rest)
-        worlds[node["name"]] = (place, turn)
-        for child in node.get("children", []):
-            visit(child, place, turn)
-
-    identity = Rotation.from_quat(np.tile([0.0, 0.0, 0.0, 1.0], (len(at), 1)))
-    visit(content["scenes"][0]["nodes"][0], np.zeros((len(at), 3)), identity)
-    return worlds
 
 
 def lines(at, times, values):
