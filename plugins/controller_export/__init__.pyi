@@ -22,8 +22,6 @@ from .exporting import export as export
 from .exporting import write_curves as write_curves
 from .formats.bottango import BottangoCurves as BottangoCurves
 from .formats.csv_table import CsvTable as CsvTable
-from .formats.gltf import GltfFile as GltfFile
-from .formats.keyframes import Keyframes as Keyframes
 from .formats.ros2 import Ros2Trajectory as Ros2Trajectory
 from .formats.ticks import ServoTicks as ServoTicks
 from .formats.ur_script import UrScript as UrScript

@@ -201,13 +201,6 @@ class OptimizeShot(Operator):
             maximum=999,
             description="Number of these robots, the model among them",
         ),
-        Property(
-            "avoid_reversals",
-            float,
-            0.0,
-            minimum=0.0,
-            description="Weight of the motion across the backlash relative to that of the error; 0: none",
-        ),
         Property("retime", bool, False, description="Slow the animation down where limits of motors ask for it"),
         Property(
             "slowest",
@@ -310,7 +303,6 @@ class OptimizeShot(Operator):
             knot_spacing=values.knot_spacing or None,
             smoothness=values.smoothness,
             adjoint=values.adjoint,
-            avoid_reversals=values.avoid_reversals,
             retime=self._tempo(context) if values.retime else None,
             robust=None
             if values.robust == "off"

@@ -114,7 +114,6 @@ CASES: dict[str, Case] = {
     "a robust search without anything flexible": optimized("-o out.usda --robust", statuses=EITHER),
     "a set of robots that is no set": optimized("-o out.usda --robust best", "--robust", statuses=USAGE),
     "robots without a robust search": optimized("-o out.usda --scenarios 3", "--robust", statuses=FAIL),
-    "a negative weight of reversals": optimized("-o out.usda --avoid-reversals=-1", "--avoid-reversals", statuses=FAIL),
     # outputs that contradict
     "the shot as its own output": simulated("-o shot.usda", "shot.usda"),
     "the shot as its own manifest": simulated("--manifest shot.usda", "shot.usda"),

@@ -239,7 +239,7 @@ def assignments(args: argparse.Namespace) -> dict[str, dict[str, object]]:
     writer: dict[str, object] = {
         name: value for name, empty in names.items() if (value := getattr(args, name, empty)) != empty
     }
-    searched = ("robust", "scenarios", "avoid_reversals", "goal")
+    searched = ("robust", "scenarios", "goal")
     search = {name: value for name in searched if (value := getattr(args, name, None)) is not None}
     search |= retime_settings(args)
     if getattr(args, "retime_scene", None) is not None:

@@ -30,8 +30,6 @@ class RunSettings:
         motors: `auto`, `on` (every motor may change) or `off` (idle motors are not checked at the end).
         ideal_motors: Whether joints follow their curves exactly, whatever the models of their motors say.
         directions: `auto`, `on` (bodies keep all coordinates) or `off` (the smallest POD subspaces at any error).
-        avoid_reversals: Weight of the squared ways of the targets across the play of gears, over squared errors; 0:
-            play does not count.
         retime: How the tempo may change; None: not at all.
         limited_by_tempo: Whether a tempo keeps the limits that it can, so that a search need not.
         narrowed: Shares of the limits within which a search keeps each motor, by the name of the quantity; those of
@@ -55,7 +53,6 @@ class RunSettings:
     ideal_motors: bool = False
     directions: str = "auto"
     robust: RobustSettings | None = None
-    avoid_reversals: float = 0.0
     retime: TempoSettings | None = None
     limited_by_tempo: bool = False
     narrowed: tuple[tuple[str, tuple[float, ...]], ...] = ()

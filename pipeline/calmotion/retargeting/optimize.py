@@ -17,7 +17,6 @@ from calmotion.model.tolerance import goal_of, tolerance_of
 from calmotion.model.uncertainty import Scenario
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.retargeting.avoided_reversals import play_of, with_reversals
 from calmotion.retargeting.checkpoint import Checkpoint, problem_key
 from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.left_out import search_rows
@@ -100,8 +99,6 @@ def _optimized(
     tolerance = tolerance_of(character, options.tolerance)
     at = problem.at(np.zeros(problem.size))
     refuse_open_joints(character, prepared.model, prepared.grid, at.run, options)
-    if options.avoid_reversals:
-        at = with_reversals(at, play_of(character), options.avoid_reversals)
     at = with_terms(with_kept_feet(prepared, at), character, options.terms)
     at = before = with_first_penalty(at, tolerance)
     problem = at.problem

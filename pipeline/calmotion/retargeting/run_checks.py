@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from calmotion.model import Animation, Character
 from calmotion.model.run import RunSettings
-from calmotion.retargeting.avoided_reversals import refuse_without_play
 from calmotion.retargeting.optimize import refuse_other_integrators
 from calmotion.retargeting.problem.posing import unknowns
 from calmotion.retargeting.retiming.settings import refuse_tempo
@@ -18,12 +17,11 @@ def check_search(character: Character, animation: Animation, options: RunSetting
     """Refuse what a search would refuse.
 
     Raises:
-        ShotError: A setting that is not supported, options that contradict each other, no motor that may change, a
-            robot of which nothing is uncertain, to be robust against, or none whose gears have play to avoid reversals.
+        ShotError: A setting that is not supported, options that contradict each other, no motor that may change, or
+            a robot of which nothing is uncertain, to be robust against.
     """
     refuse_other_integrators(options)
     refuse_terms(options, character)
-    refuse_without_play(character, options)
     if options.retime is not None:
         refuse_tempo(character, animation, options.retime)
     if options.robust is not None:

@@ -98,8 +98,8 @@ def main(arguments: list[str] | None = None) -> int:
     tree = step_time(prepared(*branched_links()), 400)
     keep(options, Growth, measured)
     if options.json:
-        growth = [asdict(growth) | {"exponent": growth.exponent} for growth in measured]
-        print(json.dumps({"growth": growth, "tree_step_s": tree}))
+        rows = [asdict(growth) | {"exponent": growth.exponent} for growth in measured]
+        print(json.dumps({"growth": rows, "tree_step_s": tree}))
         return 0
     for growth in measured:
         cells = [[str(v), f"{1e6 * seconds:.0f}"] for v, seconds in zip(growth.values, growth.seconds, strict=True)]

@@ -21,12 +21,11 @@ _VALUES = (
     "pre_roll",
     "robust",
     "scenarios",
-    "avoid_reversals",
     "goal",
     "bake",
     "samples_per_second",
 )
-_OF_SEARCHES = ("robust", "scenarios", "avoid_reversals", "goal", "retime")
+_OF_SEARCHES = ("robust", "scenarios", "goal", "retime")
 _FLAGS = ("verify", "strict", "splines")
 _LISTS = {"keep": "--keep", "leave_out": "--leave-out", "run": "--run", "set": "--set"}
 
@@ -49,9 +48,6 @@ def forwarded_options(command: argparse.ArgumentParser, tempo: bool = True) -> N
     )
     group.add_argument("--robust", nargs="?", const="worst", choices=("worst", "mean"), help="robust curves")
     group.add_argument("--scenarios", metavar="N", help="number of robots of --robust")
-    group.add_argument(
-        "--avoid-reversals", metavar="WEIGHT", nargs="?", const="10", help="avoid reversals of gears with backlash"
-    )
     group.add_argument(
         "--goal",
         metavar="LENGTH",

@@ -31,7 +31,7 @@ WORDS = (
         (*OPTIMIZE, *more.split())
         for more in (
             "--retime", "--bake simulated", "--bake motors", "--splines", "--verify", "--goal 1mm", f"{ROBUST}=mean",
-            f"{ROBUST}=worst", "--set retarget.optimize.avoid_reversals=1", "--motors ideal", "--pre-roll 0s",
+            f"{ROBUST}=worst", "--motors ideal", "--pre-roll 0s",
             "--samples-per-second 100",
         )
     ),

@@ -147,14 +147,6 @@ def test_a_loop_is_searched_by_sweeps(arm, animation, bodies):
     assert found.errors[0].max() <= max(2.0 * ALLOWED, before[0].max())
 
 
-def test_the_play_of_gears_counts(arm, started):
-    play = tuple(dataclasses.replace(m, backlash=0.01) for m in arm.motors)
-    shot = started[0].with_character(dataclasses.replace(arm, motors=play))
-    found = searched((shot, *started[1:]), ALLOWED, dataclasses.replace(OPTIONS, avoid_reversals=1e-3))
-    assert largest(started, found.tracks)[0] <= ALLOWED
-    assert largest(started, found.tracks)[1] < largest(started, started[1])[1]
-
-
 def test_a_robot_without_derivatives_where_the_search_begins_is_left_out(started, monkeypatch):
     posed, lost = worst_case._posed, started[2][1]
 

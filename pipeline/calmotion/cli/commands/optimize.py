@@ -32,15 +32,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="error at the targets that is accepted after optimising, with a unit (2mm): the search ends there, and "
         "the report says where it cannot be reached (default: that of the shot, calm:retarget:goal, or none)",
     )
-    command.add_argument(
-        "--avoid-reversals",
-        metavar="WEIGHT",
-        nargs="?",
-        const=10.0,
-        type=quantity("", positive=True),
-        help="avoid reversals of torque in gears with backlash (calm:motor:backlash) where they move the targets: "
-        "weight of the motion across the backlash relative to that of the error (default: 10)",
-    )
     retime_options(command)
     group = command.add_argument_group(
         "robust curves",

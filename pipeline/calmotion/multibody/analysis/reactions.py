@@ -116,10 +116,3 @@ def reactions(
     )
     _reactions(system, states, Inputs(angles, rates, trajectory.world[instants]), work, result)
     return result
-
-
-def transmitted(system: System, found: Reactions) -> Array:
-    """What each joint's gear transmits along its axis [N m or N], shape [T, J]: not what a servo's motor exerts, which
-    also turns its rotor."""
-    loads = np.where((system.sliding == 1)[:, None], found.forces, found.moments)
-    return np.asarray(np.einsum("tji,tji->tj", found.axes[..., 2], loads))

@@ -95,8 +95,8 @@ class Model:
         """Efforts of the motors, shape [..., M], from those along the axes of the joints, shape [..., J].
 
         Args:
-            through_gears: Whether those of servos are what their joints transmit, as in sweeps and `transmitted`, not
-                what acts on their rotors.
+            through_gears: Whether those of servos are what their joints transmit, as in sweeps, not what acts on
+                their rotors.
         """
         found = joint_efforts.copy()
         for own in self.coupled:

@@ -276,7 +276,7 @@ def block_tangent(
             that one on, shape [n, J, Q].
         component: On whose coordinates each quantity depends, shape [r].
         jacobian: Derivatives of the quantities by (R^T c, phi, u) of their component, shape [T, r, N].
-        joints: Whose efforts (`reactions.transmitted`) are wanted as well, shape [e].
+        joints: Whose efforts (what their gears transmit) are wanted as well, shape [e].
 
     Returns:
         Shape [n, r + e, Q].

@@ -175,7 +175,7 @@ def tangent(
 
     Returns:
         (R^T dc, dphi, du) of each component, shape [T, B, N], and the change of what driven joints transmit
-        (`reactions.transmitted`), shape [T, J], or [0, J] without `efforts`.
+        (what their gears transmit), shape [T, J], or [0, J] without `efforts`.
     """
     dX = np.zeros((len(d_angle), len(lin.system.parent), lin.system.size))
     return dX, sweep_tangent(lin, d_angle, d_rate, efforts, allocate_memory(lin.system, 3), dX, d_load)

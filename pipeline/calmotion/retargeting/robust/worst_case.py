@@ -15,7 +15,6 @@ from calmotion.arrays import Array, BoolArray
 from calmotion.model import Track
 from calmotion.model.run import RunSettings
 from calmotion.model.uncertainty import Scenario
-from calmotion.retargeting.avoided_reversals import play_of, with_reversals
 from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.problem.limits import MARGIN, LimitTerms
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
@@ -195,8 +194,6 @@ def _posed(
     alike = [Scenario(scenario.factors, 1.0 / len(scenarios)) for scenario in scenarios]
     problem = replace(nominal.for_robots(robots_of(prepared, nominal, alike, options)), by_responses=True)
     at = problem.at(np.zeros(problem.size))
-    if options.avoid_reversals:
-        at = with_reversals(at, play_of(prepared.character), options.avoid_reversals)
     at = with_terms(with_kept_feet(prepared, at), prepared.character, options.terms)
     limits = at.problem.limits or LimitTerms({}, grid.judged, grid.h, 1.0)
     limits = replace(limits, on=True, rho=limits.penalty_beside(at.objective_value))
