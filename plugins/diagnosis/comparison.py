@@ -15,8 +15,7 @@ from .explanations.loops import Delay, Friction, ServoGains
 from .explanations.stream import Stream
 from .explanations.structure import Base, Links
 from .fitting import Fit, fit, scores
-from .formats import read_spectrum
-from .ringing import peaks, ringing
+from .ringing import ringing
 from .situation import CLOSED, Situation
 
 NONE, UNKNOWN = "none", "unknown"
@@ -237,17 +236,6 @@ class Comparison:
                 {"name": sensor.name, "unit": unit, "error_rms": error, "noise": noise, "unexplained_rms": left}
             )
         return tuple(rows)
-
-
-def of_spectrum(file: str) -> Diagnosis:
-    """What a table of resonances alone says: where it rings.
-
-    Raises:
-        ShotError: It cannot be read.
-    """
-    rows = tuple(peaks(*read_spectrum(file), path=""))
-    told = "record encoders and an accelerometer during a motion, and name the robot's shot: a spectrum has no cause"
-    return Diagnosis((Cause(UNKNOWN, 1.0, 1.0, told, rows),), "", (), None, None)
 
 
 def diagnosis_of(situation: Situation, progress: Callable[[float], None] | None = None) -> Diagnosis:

@@ -1,13 +1,11 @@
-"""Readers of recordings: tables, accelerometer logs of 3D printers, motion captures in C3D, bags of ROS 2."""
+"""Readers of recordings: tables, motion captures in C3D, bags of ROS 2."""
 
 from __future__ import annotations
 
 from typing import ClassVar
 
 from calmotion.host import Property, PropertyValues, registration
-from calmotion.recordings import RecordingReader, RecordingRequest, SensorRecording, first_line
-
-PRINTER_HEAD = "#time,accel_x,accel_y,accel_z"
+from calmotion.recordings import RecordingReader, RecordingRequest, SensorRecording
 
 
 class ReadRecordedTable(RecordingReader):
@@ -20,45 +18,11 @@ class ReadRecordedTable(RecordingReader):
         Property("map", str, "", description="TOML map of the columns; without it FILE.toml beside the recording"),
     )
 
-    @classmethod
-    def reads(cls, request: RecordingRequest) -> bool:
-        """Tables that are no accelerometer log."""
-        return super().reads(request) and not _of_printer(request)
-
     def read(self, request: RecordingRequest, properties: PropertyValues) -> SensorRecording:
         """The recording."""
         from .tables import read_table
 
         return read_table(request, properties.map)
-
-
-class ReadPrinterAccelerometer(RecordingReader):
-    """The log of an accelerometer as Klipper writes it (`#time,accel_x,accel_y,accel_z`, mm/s^2)."""
-
-    idname = "recording.accelerometer"
-    label = "Read the accelerometer"
-    suffixes: ClassVar[tuple[str, ...]] = (".csv",)
-    properties: ClassVar[tuple[Property, ...]] = (
-        Property("prim", str, "", description="Prim at which the accelerometer sits, in whose axes it measures"),
-        Property(
-            "axes",
-            str,
-            "x, y, z",
-            description="Axes of the accelerometer that lie along x, y and z of the prim, such as y, -x, z",
-        ),
-        Property("unit", str, "mm/s^2", choices=("mm/s^2", "m/s^2", "g"), description="Unit of the log"),
-    )
-
-    @classmethod
-    def reads(cls, request: RecordingRequest) -> bool:
-        """Tables with the head that printers write."""
-        return super().reads(request) and _of_printer(request)
-
-    def read(self, request: RecordingRequest, properties: PropertyValues) -> SensorRecording:
-        """The recording."""
-        from .printers import read_log
-
-        return read_log(request, properties.prim, properties.axes, properties.unit)
 
 
 class ReadMotionCapture(RecordingReader):
@@ -95,8 +59,4 @@ class ReadBag(RecordingReader):
         return read_bag(request, properties.map)
 
 
-def _of_printer(request: RecordingRequest) -> bool:
-    return first_line(request.file).replace(" ", "").lower().startswith(PRINTER_HEAD)
-
-
-register, unregister = registration(ReadRecordedTable, ReadPrinterAccelerometer, ReadMotionCapture, ReadBag)
+register, unregister = registration(ReadRecordedTable, ReadMotionCapture, ReadBag)

@@ -204,8 +204,8 @@ def recordings(data: bytes) -> None:
     from calmotion.errors import ShotError
     from calmotion.recordings import RecordingRequest
 
-    kind, (content, _, table) = data[0] % 3 if data else 0, data[1:].partition(b"\n====\n")
-    path = _file(f"take{('.csv', '.csv', '.mcap')[kind]}", content)
+    kind, (content, _, table) = data[0] % 2 if data else 0, data[1:].partition(b"\n====\n")
+    path = _file(f"take{('.csv', '.mcap')[kind]}", content)
     beside = path.with_suffix(".toml")
     beside.unlink(missing_ok=True)
     if table:
@@ -216,8 +216,6 @@ def recordings(data: bytes) -> None:
         try:
             if kind == 0:
                 found = _plugin("recording_readers", "tables").read_table(request, "")
-            elif kind == 1:
-                found = _plugin("recording_readers", "printers").read_log(request, "", "x, y, z", "mm/s^2")
             else:
                 found = _plugin("recording_readers", "bags").read_bag(request, "")
         except ShotError as error:
@@ -335,9 +333,7 @@ SEEDS: dict[str, tuple[bytes, ...]] = {
         b"\0time_s,/Arm/hand.x,/Arm/hand.y,/Arm/hand.z,/Arm/joints/elbow.angle\n0,0,0,1,0\n0.01,0,0.1,1,2\n0.02,,,,3\n",
         b'\0t;a;b\n0;1;2\n1;3;4\n\n====\n[time]\ncolumn = "t"\nunit = "ms"\n[[channel]]\nprim = "/Arm/joints/elbow"\n'
         b'kind = "angle"\ncolumns = ["-a"]\nunit = "deg"\nnoise = 0.1\n',
-        b'\1#time,accel_x,accel_y,accel_z\n0,1,2,3\n0.001,2,3,4\n\n====\nprim = "/Arm/hand"\naxes = "y, -x, z"\n'
-        b'unit = "g"\n',
-        b"\2" + _bag() + b'\n====\n[joints]\nelbow = "/Arm/joints/elbow"\n',
+        b"\1" + _bag() + b'\n====\n[joints]\nelbow = "/Arm/joints/elbow"\n',
     ),
     "motions": (
         b"time_s,/Arm/joints/elbow\n0,1\n0.1,2\n0.2,3\n",

@@ -1,7 +1,6 @@
 """Public names of `calmotion.recordings`: each is imported when it is first used."""
 
 from calmotion.recordings.reading import RecordingReader as RecordingReader
-from calmotion.recordings.reading import first_line as first_line
 from calmotion.recordings.reading import hash_of as hash_of
 from calmotion.recordings.reading import measured_prims as measured_prims
 from calmotion.recordings.reading import read_recordings as read_recordings

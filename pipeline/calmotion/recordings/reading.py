@@ -76,17 +76,6 @@ def hash_of(file: str) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def first_line(file: str) -> str:
-    """The first line of a file that is not empty, up to 4 kB of it; empty where it cannot be read."""
-    try:
-        refuse_special(file)
-        with open(file, encoding="utf-8", errors="replace") as stream:
-            lines = stream.read(4096).lstrip("\ufeff").splitlines()
-    except OSError:
-        return ""
-    return next((line for line in lines if line.strip()), "")
-
-
 AT = "@/"  # FILE@/PRIM: where the sensor of a file sits
 
 

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 EXAMPLES = (
     ("calmotion calibrate shot.usda --recording take.csv -o robot.usda", "markers, encoders"),
-    ("calmotion calibrate shot.usda --recording accel.csv@/Arm/Hand/sensor -o robot.usda", "a printer's log"),
     ("calmotion calibrate shot.usda --recording a.csv --parameters modulus damping", "these alone"),
     ("calmotion calibrate --shot a.usda --recording a.csv --shot b.usda --recording b.csv -o robot.usda", "two shots"),
 )

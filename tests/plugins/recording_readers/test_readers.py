@@ -107,14 +107,11 @@ def test_a_rate_replaces_times(read):
 
 
 def test_the_log_of_a_printer_is_in_millimetres_and_its_axes_are_chosen(read):
-    (sensor,) = read(LOG, prim="/Arm/Hand/sensor").channels
-    assert sensor.path == "/Arm/Hand/sensor" and sensor.kind == "accelerometer"
-    assert sensor.values[0] == pytest.approx([0.1, 0.2, 9.81]) and np.isnan(sensor.values[1, 1])
-    settings = {"recording.accelerometer": {"prim": "/A", "axes": "y, -x, z", "unit": "m/s^2"}}
-    (sensor,) = read(LOG, **settings).channels
-    assert sensor.path == "/A" and sensor.values[0].tolist() == [200.0, -100.0, 9810.0]
-    (sensor,) = read(LOG, beside='prim = "/B"\naxes = "z, x, y"\nnoise = 80\n').channels
-    assert sensor.path == "/B" and sensor.sigma == pytest.approx(0.08) and sensor.values[0, 0] == pytest.approx(9.81)
+    beside = '[time]\ncolumn = "time"\n[[channel]]\nkind = "accelerometer"\nprim = "/B"\nunit = "mm/s^2"\nnoise = 80\n'
+    (sensor,) = read(LOG, beside=beside + 'columns = ["accel_y", "-accel_x", "accel_z"]\n').channels
+    assert sensor.path == "/B" and sensor.kind == "accelerometer" and sensor.sigma == pytest.approx(0.08)
+    assert sensor.values[0] == pytest.approx([0.2, -0.1, 9.81]) and np.isnan(sensor.values[1, 0])
+    assert sensor.times.tolist() == [10.0, 10.01, 10.02]
 
 
 @pytest.mark.parametrize(
@@ -126,7 +123,7 @@ def test_the_log_of_a_printer_is_in_millimetres_and_its_axes_are_chosen(read):
         ("time_s,/A.q\n0,1\n", "no column of a recording"), ("time_s,/A.x,/A.x\n0,1,1\n", "same name"),
         ("time_s,/A.x\n1,1\n0,1\n", "must not go back"), ("time_s,/A.x\n,1\n", "no time"),
         ("0,1\n1,2\n", "does not name its columns"), ("time_s,/A.error\n0,1\n", "no channel"),
-        (LOG, "where the accelerometer"), ("time_s,/A.x\n0,inf\n", "line 2.*not hold 2 numbers"),
+        (LOG, "no column of a recording"), ("time_s,/A.x\n0,inf\n", "line 2.*not hold 2 numbers"),
         ("time_s,/A.x\n0,0,5\n", "decimal commas by semicolons"),
     ],
 )  # fmt: skip
