@@ -156,7 +156,7 @@ blender-test: $(INSTALLED_DEV) $(BLENDER_VENV)/.installed
 	CALMOTION_BLENDER_PYTHON=$(CURDIR)/$(BLENDER_VENV)/bin/python $(RUN) -m pytest -q tests/blender
 
 blender-pictures: $(INSTALLED) $(BLENDER_VENV)/.installed
-	CALMOTION_COMMAND="$(CURDIR)/$(RUN) -m calmotion" $(BLENDER_VENV)/bin/python plugins/blender/demo/render.py \
+	CALMOTION_COMMAND="$(CURDIR)/$(RUN) -m calmotion" $(BLENDER_VENV)/bin/python samples/blender/render.py \
 		plugins/blender build/blender
 	$(RUN) samples/pictures.py --frames build/blender docs/tutorials/blender.webp
 

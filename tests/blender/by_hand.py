@@ -31,7 +31,7 @@ def poses(rig: bpy.types.Object) -> list[list[tuple[float, ...]]]:
 
 def export() -> None:
     """File > Export > Universal Scene Description, with Animation and Armatures."""
-    runpy.run_path(str(EXTENSION / "demo" / "arm.py"), run_name="__main__")
+    runpy.run_path(str(EXTENSION.parents[1] / "samples" / "blender" / "arm.py"), run_name="__main__")
     bpy.ops.wm.usd_export(filepath=str(FOLDER / "character.usda"), export_animation=True, export_armatures=True)
 
 

@@ -3,6 +3,7 @@
 import importlib.util
 import math
 import os
+import runpy
 import sys
 from pathlib import Path
 
@@ -26,9 +27,8 @@ def character(folder: Path, size: float = 1.0, names: tuple[str, str, str] = BON
     scene = bpy.context.scene
     scene.unit_settings.scale_length = 1.0 / size
     scene.frame_start, scene.frame_end, scene.render.fps = 1, 25, 24
-    from calmotion_extension.demo.arm import rigged
-
-    rig = rigged(names, Vector((0.0, 0.0, size)), Vector((size * LENGTH, 0.0, 0.0)), tube(size))
+    arm = runpy.run_path(str(Path(__file__).parents[2] / "samples" / "blender" / "arm.py"))
+    rig = arm["rigged"](names, Vector((0.0, 0.0, size)), Vector((size * LENGTH, 0.0, 0.0)), tube(size))
     for frame in range(1, 26):
         turn = 2.0 * math.pi * (frame - 1) / 24.0
         for name, angle in ((names[1], 0.5 * math.sin(turn)), (names[2], 0.6 * (1.0 - math.cos(turn)))):

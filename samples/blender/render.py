@@ -12,6 +12,7 @@ import importlib.util
 import sys
 from pathlib import Path
 
+import arm  # beside this file
 import bpy
 from mathutils import Vector
 
@@ -32,7 +33,7 @@ def extension(folder: Path) -> None:
 def character() -> None:
     """The arm that waves, alone in the scene."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    importlib.import_module("calmotion_extension.demo.arm").waving_arm()
+    arm.waving_arm()
     bpy.data.objects["Skin"].data.materials.append(material("Skin", (0.55, 0.53, 0.48)))
 
 
