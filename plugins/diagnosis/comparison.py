@@ -54,19 +54,19 @@ class Diagnosis:
         tells: What further measurement would tell the first two apart.
         channels: `name`, `unit`, `error_rms`, `noise`, `unexplained_rms` of each.
         fit: The explanations as they were fitted; None where there is nothing to explain.
-        situation: What was commanded and recorded; None of a spectrum.
+        situation: What was commanded and recorded.
     """
 
     causes: tuple[Cause, ...]
     tells: str
     channels: tuple[Mapping[str, Any], ...]
     fit: Fit | None
-    situation: Situation | None
+    situation: Situation
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What was noticed."""
-        return () if self.situation is None else self.situation.notes
+        return self.situation.notes
 
 
 class Comparison:

@@ -65,7 +65,7 @@ class DiagnosedShot:
                 "causes": [vars(cause) for cause in found.causes],
                 "tells": found.tells,
                 "channels": found.channels,
-                "model": found.situation is not None and found.situation.known,
+                "model": found.situation.known,
                 "notes": found.notes,
                 "figures": self.figures,
                 "html": None,  # a page has words of this report, and is written after it

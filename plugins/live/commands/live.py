@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 SLOWEST = 1.0  # samples a second of a sender whose stamps may be right
 
 EXAMPLES = (
-    ("calmotion live robot.usda --table", "which look-ahead buys what?"),
     ("calmotion live robot.usda --rate 250 --lookahead 120", "JSON lines in and out"),
     ("calmotion live robot.usda --in osc://127.0.0.1:9000 --out osc://127.0.0.1:9001", "faders over OSC"),
     ("calmotion live robot.usda --replay calm_root.usda", "play the motion of a shot as a stream"),
@@ -83,11 +82,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="clock that times the commands. wall: that of the machine (default of a pipe and of OSC); stamps: the "
         "time stamps of the samples, as fast as they can be read (default of a file and of --replay)",
     )
-    command.add_argument(
-        "--table",
-        action="store_true",
-        help="print the errors for look-aheads from 20 ms to the robot's longest period, and play nothing",
-    )
     command.add_argument("--seconds", metavar="S", type=quantity("s", positive=True), help="stop after this time")
 
 
@@ -116,8 +110,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
     from ..opening import live
     from ..settings import LiveSettings
 
-    if args.table:
-        return worth_of_lookahead(args, output)
     listens, sends = osc_place(args.source, "--in"), osc_place(args.sink, "--out")
     if args.json and not sends:
         raise SettingError(
@@ -163,7 +155,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 
 def worth_of_lookahead(args: argparse.Namespace, output: Output) -> int:
-    """Print what look-aheads are worth to the robot of a shot, here and for `calmotion inspect --live`."""
+    """Print what look-aheads are worth to the robot of a shot, for `calmotion inspect --live`."""
     from dataclasses import asdict
 
     from calmotion.cli import console_on, print_table
@@ -173,7 +165,7 @@ def worth_of_lookahead(args: argparse.Namespace, output: Output) -> int:
     from ..opening import compiled
     from ..settings import LiveSettings
 
-    asked = LiveSettings(rate=getattr(args, "rate", 250.0), uncertainty=getattr(args, "uncertainty", None))
+    asked = LiveSettings()
     shot = opened_shot(args)
     with progress_display(args) as display:
         robot = compiled(shot, assignments(args), Hooks(progress=display, on_operator=display.done))

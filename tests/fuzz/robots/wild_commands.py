@@ -46,7 +46,7 @@ WORDS = (
     *(("export", "{shot}", "--to", to, "-o", "commands.out") for to in FORMATS),
     *(("inspect", "{shot}", more) for more in ("--strict", "--meshes", "--live")),
     *(("calibrate", "{shot}", *RECORDED, "-o", "out.usda"), ("refine", "{shot}", *RECORDED, "-o", "out.usda")),
-    *(("diagnose", "{shot}", *RECORDED), ("live", "{shot}", "--replay", "{shot}"), ("live", "{shot}", "--table")),
+    *(("diagnose", "{shot}", *RECORDED), ("live", "{shot}", "--replay", "{shot}")),
     *(("excite", "{shot}", "-o", "out.usda", "--tries", "20"), ("rig", "{shot}", "-o", "out.usda")),
 )  # fmt: skip
 

@@ -53,7 +53,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--live",
         action="store_true",
-        help="print the error of a streamed motion for each look-ahead, as calmotion live --table does",
+        help="print the error of a streamed motion for each look-ahead",
     )
     command.add_argument("--verbose", action="store_true", help="also print all simplifications and their reasons")
     simulation_options(command, "bdf2, newmark, generalized-alpha or rk4 (default: automatic)")
