@@ -13,10 +13,7 @@ OPTIONS = RunSettings(step=1 / 120)
 
 @pytest.mark.parametrize("where", ["with_accuracy", "_is_accurate"])
 def test_an_interrupt_after_the_search_keeps_its_curves(arm, animation, bodies, monkeypatch, where):
-    def interrupt(*args):
-        interrupts.request()
-
-    monkeypatch.setattr(to_tolerance, where, interrupt)
+    monkeypatch.setattr(to_tolerance, where, lambda *args: interrupts.request())
     found = optimize_to_tolerance(compile_shot(arm, animation, bodies), OPTIONS, ignore_progress)
     assert found.interrupted and found.search.stopped == "interrupted"
     assert found.objective_after < 0.1 * found.objective_before

@@ -57,10 +57,7 @@ def test_what_was_told_counts_where_no_run_tells_more():
             raise IntegrationError("diverges")
         return vibrating(step)
 
-    def of_frames(step):
-        return StepRun(1 / 480, vibrating(1 / 480).positions)
-
-    for run in (fragile, of_frames):
+    for run in (fragile, lambda step: StepRun(1 / 480, vibrating(1 / 480).positions)):
         assert confirmed_step(run, 1 / 480, 0.02, 1e-5, lambda run: 1e-9) == (1 / 480, 0.02)
 
 

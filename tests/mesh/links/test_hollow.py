@@ -11,10 +11,7 @@ from mesher_links import box, solid, surface
 
 @pytest.fixture
 def hollowed():
-    def make(mesh, wall, section="closed"):
-        return hollow.hollowed(solid(surface(mesh)), wall, section, "/Arm/link")
-
-    return make
+    return lambda mesh, wall, section="closed": hollow.hollowed(solid(surface(mesh)), wall, section, "/Arm/link")
 
 
 def test_a_box_has_a_cavity_with_walls_of_the_thickness(hollowed):

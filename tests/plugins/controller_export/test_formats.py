@@ -282,10 +282,7 @@ def example(make_plugin):
     """The format of the page of examples, with parts of its source replaced."""
     source = re.findall(r"```python\n(.*?)```", EXAMPLE.read_text(), re.DOTALL)[2]
 
-    def make(part="", by=""):
-        return make_plugin("xml_angles", source.replace(part, by))
-
-    return make
+    return lambda part="", by="": make_plugin("xml_angles", source.replace(part, by))
 
 
 def test_the_format_of_the_page_is_one_file(example, curves, tmp_path):

@@ -95,10 +95,7 @@ def test_a_root_that_does_not_compose_is_not_left_behind(tmp_path):
 
 @pytest.mark.parametrize("scale", [Scale(), Scale(0.01, 0.001)])
 def test_motion_length_and_settings_are_read_back(tmp_path, scale):
-    def edit(stage):
-        make_target(stage, HAND, positionWeight=1.0)
-
-    shot = str(write_arm(tmp_path / "arm.usda", edit, scale))
+    shot = str(write_arm(tmp_path / "arm.usda", lambda stage: make_target(stage, HAND, positionWeight=1.0), scale))
     character, _, provenance = read_shot(shot)
     times = np.arange(40) / 24.0
     values = np.stack([0.3 * times, 0.1 - 0.2 * times**2], axis=1)

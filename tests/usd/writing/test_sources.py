@@ -134,10 +134,7 @@ def test_a_skeleton_whose_first_frame_changes_counts_angles_from_where_it_was(tm
 
 
 def test_what_a_hinge_cannot_do_stays_in_the_skeleton(tmp_path):
-    def edit(stage):
-        skeletal(stage, off_axis=4.0)
-
-    _, result, _, root, (_, again, _) = written(tmp_path, edit, {1: 0.1})
+    _, result, _, root, (_, again, _) = written(tmp_path, lambda stage: skeletal(stage, off_axis=4.0), {1: 0.1})
     assert np.abs(again.current[1].values - result.curves[1].frame_values).max() < 3e-6
     # read as somebody else's animation, the written one is off the axis as the shot was
     flat = Usd.Stage.Open(root).Flatten()
@@ -148,18 +145,12 @@ def test_what_a_hinge_cannot_do_stays_in_the_skeleton(tmp_path):
 
 
 def test_a_sparse_animation_stays_sparse_unless_a_joint_is_missing(tmp_path):
-    def edit(stage):
-        skeletal(stage, sparse=True)
-
-    _, _, layer, _, _ = written(tmp_path, edit, {1: 0.1})
+    _, _, layer, _, _ = written(tmp_path, lambda stage: skeletal(stage, sparse=True), {1: 0.1})
     assert properties(layer) == [f"{ANIMATION}.rotations"]
 
 
 def test_a_joint_that_the_animation_lacks_is_added_at_rest(tmp_path):
-    def edit(stage):
-        skeletal(stage, sparse=True)
-
-    _, result, layer, root, (_, again, _) = written(tmp_path, edit, {0: 0.1})
+    _, result, layer, root, (_, again, _) = written(tmp_path, lambda stage: skeletal(stage, sparse=True), {0: 0.1})
     stage = Usd.Stage.Open(root)
     animation = UsdSkel.Animation(stage.GetPrimAtPath(ANIMATION))
     assert list(animation.GetJointsAttr().Get()) == [FOREARM, ARM]

@@ -312,10 +312,7 @@ def test_a_motor_fed_with_a_voltage_has_gain_limit_and_back_emf_of_its_winding(t
     assert elbow.max_torque == pytest.approx(0.4 / 4.0 * 7.4 * 0.9)
     assert (elbow.rotor.back_emf, elbow.rotor.viscous_friction) == pytest.approx((0.04, 1e-4 * per_degree))
 
-    def of_a_type(stage):
-        written(stage, {"type": "xl330-m288"}, voltage=5.0, dutyGain=0.03)
-
-    named = read(tmp_path, of_a_type)[1].rotor
+    named = read(tmp_path, lambda stage: written(stage, {"type": "xl330-m288"}, voltage=5.0, dutyGain=0.03))[1].rotor
     kind = motor_types()["xl330-m288"].values
     assert named.back_emf == pytest.approx(kind["torque_constant"] ** 2 / kind["resistance"])
     assert named.back_emf + named.viscous_friction == pytest.approx(kind["viscous_friction"])

@@ -219,10 +219,7 @@ def test_one_poissons_ratio_is_used_and_told(tmp_path):
 
 
 def test_one_material_for_all_meshes_makes_no_parts(tmp_path):
-    def same(stage, scale):
-        box(stage, f"{FORE}/insert", scale)
-
-    assert fore_part(tmp_path, same)[0].parts == ()
+    assert fore_part(tmp_path, lambda stage, scale: box(stage, f"{FORE}/insert", scale))[0].parts == ()
 
 
 def test_a_print_with_parts_of_other_materials_is_refused(tmp_path):
