@@ -8,6 +8,7 @@ import ast
 import re
 import textwrap
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -35,6 +36,13 @@ def name_of(path: Path) -> str:
 MODULES = {name_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
 
 
+@cache
+def tree(path: Path) -> ast.Module:
+    """The parsed source of a module."""
+    return ast.parse(path.read_text())
+
+
+@cache
 def homes(package: str) -> dict[str, str]:
     """Public names of a package to the modules that define them, as its stub says."""
     stub = MODULES[package].with_suffix(".pyi")
@@ -48,7 +56,7 @@ def imports_of(module: str) -> Iterator[str]:
     """The modules of the package that a module imports, anywhere in its source; public names count as their homes."""
     path = MODULES[module]
     package = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in MODULES)
         elif isinstance(node, ast.ImportFrom):
@@ -63,7 +71,10 @@ def imports_of(module: str) -> Iterator[str]:
                     yield full if full in MODULES else source
 
 
-IMPORTS = {module: {name for name in imports_of(module) if name != module} for module in MODULES}
+@cache
+def imports() -> dict[str, set[str]]:
+    """The imports of every module of the package."""
+    return {module: {name for name in imports_of(module) if name != module} for module in MODULES}
 
 
 def room_of(module: str) -> str:
@@ -81,7 +92,7 @@ def test_every_room_stands_on_a_floor():
 def test_imports_never_go_up(room):
     up = [
         f"{module} imports {other}"
-        for module, others in IMPORTS.items()
+        for module, others in imports().items()
         for other in sorted(others)
         if room_of(module) == room and room_of(other) not in ("", room) and FLOOR[room_of(other)] >= FLOOR[room]
     ]
@@ -90,7 +101,7 @@ def test_imports_never_go_up(room):
 
 def test_no_circle_of_modules():
     try:
-        TopologicalSorter(IMPORTS).prepare()
+        TopologicalSorter(imports()).prepare()
     except CycleError as circle:
         pytest.fail(" -> ".join(circle.args[1]))
 
@@ -100,7 +111,7 @@ def test_the_engine_imports_neither_usd_nor_rerun():
         f"{module} imports {name}"
         for module, path in MODULES.items()
         if room_of(module) != "usd"
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in ast.walk(tree(path))
         for name in ([a.name for a in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", None)])
         if isinstance(node, ast.Import | ast.ImportFrom) and name and name.split(".")[0] in ("pxr", "rerun")
     ]
@@ -112,7 +123,7 @@ def test_plugins_import_public_packages_alone():
     deep = [
         f"{path.relative_to(PLUGINS)}:{node.lineno}: {name}"
         for path in sorted(PLUGINS.rglob("*.py"))
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in ast.walk(tree(path))
         for name in names_of_import(node)
         if name.startswith("calmotion.") and (name.count(".") > 1 or name not in MODULES)
     ]
@@ -137,7 +148,9 @@ def plugins_of(path: Path) -> set[str]:
     is skipped where the plugin is deleted.
     """
     package = ["calmotion_plugins", *path.relative_to(PLUGINS).parts[:-1]] if path.is_relative_to(PLUGINS) else []
-    nodes = list(ast.walk(ast.parse(path.read_text())))
+    if not package and not re.search(rf"\bcalmotion_plugins\b|\b({'|'.join(HELPERS)})\b", path.read_text()):
+        return set()
+    nodes = list(ast.walk(tree(path)))
     calls = [node for node in nodes if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "importorskip"]
     skipped = {argument for call in calls for argument in call.args}
     imported, texts = [], []
@@ -163,12 +176,17 @@ def is_part(path: Path, plugin: str) -> bool:
 
 OPTIONAL = optional_plugins(PLUGINS)
 HELPERS = {path.stem: name for name in OPTIONAL for path in (TESTS / "helpers" / name).glob("*.py")}
-FILES = {path: plugins_of(path) for root in (PACKAGE, PLUGINS, TESTS) for path in sorted(root.rglob("*.py"))}
+
+
+@cache
+def files() -> dict[Path, set[str]]:
+    """The optional plugins that each file imports."""
+    return {path: plugins_of(path) for root in (PACKAGE, PLUGINS, TESTS) for path in sorted(root.rglob("*.py"))}
 
 
 @pytest.mark.parametrize("plugin", OPTIONAL)
 def test_only_an_optional_plugin_itself_and_its_tests_import_it(plugin):
-    users = [str(path) for path, plugins in FILES.items() if plugin in plugins and not is_part(path, plugin)]
+    users = [str(path) for path, plugins in files().items() if plugin in plugins and not is_part(path, plugin)]
     assert not users
 
 
