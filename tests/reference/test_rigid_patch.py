@@ -35,9 +35,9 @@ def link(request):
     return reduced, law.data, FullOrder(points, tets, 2e9, 0.35, 1200.0), center
 
 
-@pytest.mark.parametrize("force", [(0.0, 90.0, 120.0), (300.0, 0.0, 200.0), (-200.0, 60.0, 80.0)])
+@pytest.mark.parametrize("force", [(300.0, 0.0, 200.0), (-200.0, 60.0, 80.0)])
 def test_a_reduced_link_deflects_like_its_mesh(link, force):
-    """Across, under tension and under compression: by 22 to 34 mm of 300 mm."""
+    """Under tension and under compression: by 22 to 34 mm of 300 mm."""
     reduced, data, full, center = link
     moved, turn = pull(full, *ends(full.nodes), center, force)
     motion = reduced.patch_motion[0]
@@ -49,36 +49,36 @@ def test_a_reduced_link_deflects_like_its_mesh(link, force):
     assert np.allclose(motion[3:] @ u, np.sin(angle) / angle * turn, rtol=0, atol=2e-3 * angle)
 
 
-def check(points, tets, model, root, patch, center, force):
+def check(points, tets, model, root, patch, center, forces):
     """The reduction moves a patch as the mesh does, by more than three degrees."""
     basis = reduced_basis(model, root, [patch], [center], FlexibleSettings(MATERIAL))
-    support = Support(root, [patch], [center])
+    support, full = Support(root, [patch], [center]), FullOrder(points, tets, 2e9, 0.35, 1200.0)
     reduced, law = large_deflection(model, support, basis, MATERIAL, "stvk", tolerance=1e-6)
-    moved, turn = pull(FullOrder(points, tets, 2e9, 0.35, 1200.0), root, patch, center, force)
     motion = reduced.patch_motion[0]
     r = motion.shape[1]
-    u = equilibrium(law.data.reshape(r + r * (r + 1) // 2, -1), np.asarray(force) @ motion[:3], np.zeros(r), steps=6)
-    distance, angle = np.linalg.norm(moved), np.linalg.norm(turn)
-    assert angle > 0.05
-    assert np.allclose(motion[:3] @ u, moved, rtol=0, atol=1e-4 * distance)
-    assert np.allclose(motion[3:] @ u, np.sin(angle) / angle * turn, rtol=0, atol=1e-4 * angle)
+    for force in np.array(forces):
+        moved, turn = pull(full, root, patch, center, force)
+        u = equilibrium(law.data.reshape(r + r * (r + 1) // 2, -1), force @ motion[:3], np.zeros(r), steps=6)
+        distance, angle = np.linalg.norm(moved), np.linalg.norm(turn)
+        assert angle > 0.05
+        assert np.allclose(motion[:3] @ u, moved, rtol=0, atol=1e-4 * distance)
+        assert np.allclose(motion[3:] @ u, np.sin(angle) / angle * turn, rtol=0, atol=1e-4 * angle)
 
 
-@pytest.mark.parametrize("force", [(200.0, 0.0, 100.0), (300.0, -300.0, -200.0)])
-def test_a_shaft_in_a_ring_deflects_like_its_mesh(force):
-    """By 5 and 10 degrees: what it twists and bends within the ring would be a thousandth of that."""
+def test_a_shaft_in_a_ring_deflects_like_its_mesh():
+    """By 10 degrees: what it twists and bends within the ring would be a thousandth of that."""
     points, tets = hollow_shaft(0.01, 0.1, (1, 8, 10))
     model = assemble(points, tets, MATERIAL)
     nodes, surface = model.mesh.nodes, model.mesh.surface
     held = (np.hypot(*nodes[:, :2].T) > 0.9e-2) & (nodes[:, 2] > 0.09 - 1e-9)
     root, patch = np.flatnonzero(nodes[:, 2] < 1e-9), np.unique(surface[held[surface[:, :3]].all(axis=1)])
     center = np.array([0.0, 0.02, 0.095])
-    check(points, tets, model, root, patch, center, force)
+    check(points, tets, model, root, patch, center, [(300.0, -300.0, -200.0)])
 
 
-@pytest.mark.parametrize("thin", [1.0, 0.1, 0.02, 0.01])
+@pytest.mark.parametrize("thin", [0.1, 0.01])
 def test_a_strip_deflects_like_its_mesh(thin):
-    """By a twentieth of its length, held at an end face whose thickness over its width is from one to a hundredth.
+    """By a twentieth of its length, held at an end face whose thickness over its width is a tenth or a hundredth.
 
     A face below a thirtieth had no coordinate for its thickness, which turns with it: its link hardly bent.
     """
@@ -106,4 +106,4 @@ def test_a_link_with_a_rounded_end_deflects_like_its_mesh():
     nodes, corners = model.mesh.nodes, model.mesh.surface[:, :3]
     root = np.flatnonzero(nodes[:, 0] < 1e-9)
     patch = np.unique(model.mesh.surface[np.isin(corners, np.flatnonzero(end)).all(axis=1)])
-    check(points, tets, model, root, patch, nodes[patch].mean(axis=0), (-300.0, 300.0, 400.0))
+    check(points, tets, model, root, patch, nodes[patch].mean(axis=0), [(-300.0, 300.0, 400.0)])

@@ -7,7 +7,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
 
-def pull(full: FullOrder, held, patch, center, force, steps=6):
+def pull(full: FullOrder, held, patch, center, force, steps=2):
     """Displacement of a patch's center [m] and rotation vector of the patch, in balance with a force [N] there.
 
     Args:
