@@ -11,10 +11,13 @@ from calmotion_plugins.robot_import import import_robot
 from calmotion_plugins.robot_import.converters import VARIABLE, environment_folder
 
 mujoco = pytest.importorskip("mujoco")
-pytestmark = pytest.mark.skipif(
-    not os.environ.get(VARIABLE) and not (environment_folder() / "ready").is_file(),
-    reason="the converters are not here",
-)
+pytestmark = [
+    pytest.mark.skipif(
+        not os.environ.get(VARIABLE) and not (environment_folder() / "ready").is_file(),
+        reason="the converters are not here",
+    ),
+    pytest.mark.usefixtures("warm_converters"),
+]
 
 ROBOT = """<mujoco model="m">{head}<worldbody><body name="post"><geom type="box" size="0.05 0.05 0.1" mass="2"/>
 <body name="arm" pos="0 0 0.1"><joint name="lift" axis="0 -1 0" {joint}/>{arm}

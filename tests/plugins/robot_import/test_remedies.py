@@ -13,10 +13,13 @@ from calmotion.host import SettingError
 from calmotion_plugins.robot_import import import_robot
 from calmotion_plugins.robot_import.converters import VARIABLE, environment_folder
 
-pytestmark = pytest.mark.skipif(
-    not os.environ.get(VARIABLE) and not (environment_folder() / "ready").is_file(),
-    reason="the converters are not here",
-)
+pytestmark = [
+    pytest.mark.skipif(
+        not os.environ.get(VARIABLE) and not (environment_folder() / "ready").is_file(),
+        reason="the converters are not here",
+    ),
+    pytest.mark.usefixtures("warm_converters"),
+]
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>'
 BOX = '<visual><geometry><box size="0.4 0.02 0.02"/></geometry></visual>'
