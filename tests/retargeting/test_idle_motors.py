@@ -18,7 +18,7 @@ from calmotion.tolerance.simplification.analysis import analyse
 from posed import ignore_progress
 from simplification_shots import arm_with_head
 
-FAST = RunSettings(step=1 / 120)
+FAST = RunSettings(step=1 / 60)
 
 
 @pytest.fixture(scope="module")

@@ -99,8 +99,7 @@ def weak_arm(share):
     return compile_shot(with_limits(arm, max_torque=share * largest), animation)
 
 
-@pytest.mark.parametrize("tolerance", [None, 1e-3, 1e-4])
-@pytest.mark.parametrize("share", [0.9, 0.75])
+@pytest.mark.parametrize(("share", "tolerance"), [(0.9, None), (0.9, 1e-3), (0.75, 1e-4)])
 def test_robots_without_error_keep_limits_that_cost_a_hundred_times_their_tolerance(share, tolerance):
     """Rounding decides how long the longest takes: 22 iterations, or 35 with another order of operations."""
     options = RunSettings(step=0.01, tolerance=tolerance, max_iterations=60)
