@@ -42,3 +42,9 @@ def smooth(times, size=0.7, w=4.0):
 def pitch(states):
     """Angle about y of the first component, counted on over turns."""
     return np.unwrap(2.0 * np.arctan2(states.q[:, 0, 2], states.q[:, 0, 0]))
+
+
+def transmitted(system, found):
+    """What each joint's gear transmits along its axis [N m or N], shape [T, J]; a servo also turns its rotor."""
+    loads = np.where((system.sliding == 1)[:, None], found.forces, found.moments)
+    return np.einsum("tji,tji->tj", found.axes[..., 2], loads)

@@ -9,14 +9,14 @@ from arms import chain, compiled
 from calmotion import ShotError
 from calmotion.cli.main import main
 from calmotion.model.motor import Follows, Rotor, TurnsWith
-from calmotion.multibody.analysis.reactions import reactions, transmitted
+from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.model.model import rigid_model
 from calmotion.multibody.motors.inverse import inverse_commands
 from calmotion.multibody.runs import linearize, simulate
 from calmotion.simulation.simulator import Simulator
 from calmotion.tolerance.motors.motor_effects import with_gains_used
 from calmotion.usd.reading import read_shot
-from motor_runs import G, smooth
+from motor_runs import G, smooth, transmitted
 from pxr import Usd
 from scipy.integrate import solve_ivp
 

@@ -9,13 +9,13 @@ from calmotion.errors import ShotError
 from calmotion.model import Body, Character, Joint, MassProperties, Motor
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.modes import system_modes
-from calmotion.multibody.analysis.reactions import reactions, transmitted
+from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import rigid_model
 from calmotion.multibody.motors.drives import GivingMotor, add_motors, giving_motors
 from calmotion.multibody.runs import simulate
 from calmotion.multibody.statics.equilibrium import equilibrium
-from motor_runs import pitch, run, smooth
+from motor_runs import pitch, run, smooth, transmitted
 from particles import particle_system
 from scipy.integrate import solve_ivp
 

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from calmotion.multibody.analysis.reactions import reactions, transmitted
+from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.sensitivity.adjoint import adjoint
 from calmotion.multibody.sensitivity.linearization import linearize
 from calmotion.multibody.sensitivity.linearized_steps import bytes_of_an_instant
 from calmotion.multibody.sensitivity.tangent import tangent
+from motor_runs import transmitted
 from sweep_cases import CASES, TIMES, Case, curves
 
 
