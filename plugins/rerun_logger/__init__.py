@@ -44,7 +44,6 @@ class LogRecording(Operator):
             result,
             samples_per_plot=context.properties.samples_per_plot,
             progress=context.progress,
-            operators=context.results,
             system=context.get(SystemModes),
         )
         return (Recording(path),)

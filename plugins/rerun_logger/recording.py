@@ -6,7 +6,7 @@ Only rerun's viewer binds sockets or reports on its use. It is never started her
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +14,6 @@ import numpy as np
 import rerun as rr
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-from calmotion.host import OperatorResult
 from calmotion.model import Animation, Character, Motion, Result, Simulation, SystemModes, measure_of
 from calmotion.support import distinct_names, replaced
 from calmotion.views import error_spectrum, highest_frequency, pace_of, sample_motion
@@ -40,7 +39,6 @@ def write_recording(
     *,
     samples_per_plot: int = 2000,
     progress: Progress = lambda fraction, message: None,
-    operators: Sequence[OperatorResult] = (),
     system: SystemModes | None = None,
 ) -> None:
     """Write a .rrd file atomically.
@@ -55,7 +53,6 @@ def write_recording(
         result: Of `simulate` (then nothing is logged as optimised) or of `optimize`.
         samples_per_plot: Largest number of samples of a curve.
         progress: Called with a fraction in 0..1 and a message.
-        operators: What became of the operators of the run so far.
         system: Natural modes of the whole character.
 
     Raises:
@@ -75,7 +72,7 @@ def write_recording(
                 # active: also where the viewer remembers the layout of an earlier recording of this shot
                 blueprint = make_blueprint(character, animation, result, scale)
                 recording.send_blueprint(blueprint, make_active=True, make_default=True)
-                summary = rr.TextDocument(describe(character, result, operators, system), media_type="text/markdown")
+                summary = rr.TextDocument(describe(character, result, system), media_type="text/markdown")
                 recording.log("summary", summary, static=True)
                 log_all(recording, character, at_frames, result, scale, samples_per_plot, progress)
             _refuse_cut(temporary)

@@ -1,38 +1,27 @@
-"""The text of a recording: errors before and after, sizes, simplifications, and the progress of the optimiser."""
+"""The text of a recording: errors before and after, sizes, and simplifications."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.host import OperatorResult
 from calmotion.model import Character, Result, Simulation, SystemModes, verdict_on
 from calmotion.support import distinct_names
 
 SHOWN_MODES = 6
 
 
-def describe(
-    character: Character,
-    result: Result,
-    operators: Sequence[OperatorResult] = (),
-    system: SystemModes | None = None,
-) -> str:
+def describe(character: Character, result: Result, system: SystemModes | None = None) -> str:
     """The summary as Markdown; positions in mm, rotations in degrees.
 
     Args:
-        operators: What became of the operators of the run so far.
         system: Natural modes of the whole character.
     """
     parts = [f"# {character.path}", errors_table(character, result), sizes(character, result, system)]
     parts += [budget(result), left_out(result)]
     if character.notes:
         parts.append("## Notes on the shot\n" + "\n".join(f"- {note}" for note in character.notes))
-    if result.search.steps:
-        parts.append(progress_table(result))
-    if operators:
-        parts.append(operators_table(operators))
     return "\n\n".join(parts) + "\n"
 
 
@@ -109,21 +98,3 @@ def left_out(result: Result) -> str:
         cost = "none" if row.estimated_error_m is None else f"{1e3 * row.estimated_error_m:.3g} mm"
         rows.append(f"| {row.what} | {row.why} | {cost} |")
     return "## Simplifications\n" + "\n".join(rows)
-
-
-def operators_table(operators: Sequence[OperatorResult]) -> str:
-    """What ran, what did not and why, and how long each took."""
-    rows = ["| operator | plugin | outcome | time | why |", "|---|---|---|---:|---|"]
-    for step in operators:
-        time = f"{step.duration:.2f} s" if step.duration else ""
-        rows.append(f"| `{step.idname}` | {step.plugin} | {step.outcome} | {time} | {step.reason} |")
-    return "## Run\n" + "\n".join(rows)
-
-
-def progress_table(result: Result) -> str:
-    """The optimiser's iterations."""
-    rows = ["| iteration | objective | gradient | simulations | linearised sweeps |", "|---:|---:|---:|---:|---:|"]
-    for k, step in enumerate(result.search.steps):
-        numbers = f"{step.objective:.4g} | {step.gradient_norm:.3g}"
-        rows.append(f"| {k} | {numbers} | {step.forward_simulations} | {step.linearized_sweeps} |")
-    return "## Optimiser\n" + "\n".join(rows)

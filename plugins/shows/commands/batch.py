@@ -82,9 +82,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
         )  # fmt: skip
     report = result.report()
     if host is not None:
-        from ..batch.drawing import plots_of
-
-        report["html"] = page_of_report(host, args.html, report, SECTIONS, inputs, plots_of(report["jobs"]))
+        report["html"] = page_of_report(host, args.html, report, SECTIONS, inputs)
     conclude(report, [], output, None if args.quiet else _print)
     if result.interrupted:
         return INTERRUPTED

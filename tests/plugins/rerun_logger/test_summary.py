@@ -34,25 +34,3 @@ def test_the_summary_names_the_characters_frequencies_where_they_are_known(tmp_p
     run_operator(host_with(PLUGIN), "rerun.log", [*given, OutputPaths(rrd=str(tmp_path / "out.rrd"))])
     text = read_recording(tmp_path / "out.rrd")["/summary", "TextDocument:text"][1][0][0]
     assert "in its first pose: 3.2, 12.5 Hz" in text
-
-
-def test_the_summary_lists_operators_that_ran_and_that_were_skipped(tmp_path):
-    from calmotion.host import OperatorResult, Outcome
-
-    steps = (
-        OperatorResult("usd.read", "Read the shot", "usd_reader", Outcome.DONE, duration=1.25, progress=1.0),
-        OperatorResult("fe.mesh", "Mesh", "fe_mesher", Outcome.LEFT_OUT, reason="no body is flexible"),
-    )
-    module = host_with(PLUGIN).plugin("rerun_logger").module
-    recording = __import__(f"{module.__name__}.recording", fromlist=["write_recording"])
-    path = str(tmp_path / "run.rrd")
-    recording.write_recording(path, synthetic.character(), synthetic.animation(), synthetic.result(), operators=steps)
-    text = str(
-        next(
-            value
-            for (entity, _), (_, value) in read_recording(path).items()
-            if entity == "/summary" and "## Run" in str(value)
-        )
-    )
-    assert "| `usd.read` | usd_reader | done | 1.25 s |  |" in text
-    assert "| `fe.mesh` | fe_mesher | left out |  | no body is flexible |" in text
