@@ -47,8 +47,7 @@ def test_legs_with_closed_chains_walk(calmotion, shared_data, tmp_path):
     assert report["newton_iterations"] < 4 * report["steps"]
 
 
-@pytest.mark.parametrize("angle", [4.0, -10.0, 25.0])
-@pytest.mark.parametrize("joints", [["j8_l_i"], ["j3_r_o"], ["j4_l_i", "j9_r_i"]])
+@pytest.mark.parametrize(("joints", "angle"), [(["j8_l_i"], 4.0), (["j3_r_o"], -10.0), (["j4_l_i", "j9_r_i"], 25.0)])
 def test_legs_with_more_motors_than_their_chains_can_follow_are_refused(
     calmotion, shared_data, tmp_path, joints, angle
 ):

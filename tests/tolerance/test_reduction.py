@@ -1,6 +1,7 @@
 """A reduction that is fine enough for the simulation: against one far finer, and no finer than it must be."""
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
@@ -40,9 +41,15 @@ def fine(arm, animation, meshes):
     return shot, simulate_at(shot, BY, STEP).positions
 
 
+@pytest.fixture(scope="module")
+def converged_for(arm, animation, meshes):
+    """What a tolerance needs, found once."""
+    return cache(lambda tolerance: refined(arm, animation, meshes, tolerance))
+
+
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, pytest.param(1e-4, marks=pytest.mark.long)])
-def test_the_motion_keeps_the_tolerance_against_a_far_finer_reduction(arm, animation, meshes, fine, tolerance):
-    converged = refined(arm, animation, meshes, tolerance)
+def test_the_motion_keeps_the_tolerance_against_a_far_finer_reduction(converged_for, fine, tolerance):
+    converged = converged_for(tolerance)
     found = simulate_at(converged.shot, BY, STEP).positions
     assert np.linalg.norm(found - fine[1], axis=2).max() < tolerance and converged.error_m <= 0.4 * tolerance
     np.testing.assert_allclose(converged.known.run.positions, found, rtol=0.0, atol=1e-10)  # but for rounding
@@ -75,15 +82,14 @@ def test_directions_are_those_of_loads_on_the_flexible_robot(turned, monkeypatch
     assert count(converged.shot) <= (0.7 if turned == 0.0 else 1.0) * count(refined(*shot, 1e-3).shot)
 
 
-def test_a_tighter_tolerance_keeps_more(arm, animation, meshes):
-    loose, tight = (count(refined(arm, animation, meshes, tolerance).shot) for tolerance in (1e-2, 1e-3))
+def test_a_tighter_tolerance_keeps_more(converged_for):
+    loose, tight = (count(converged_for(tolerance).shot) for tolerance in (1e-2, 1e-3))
     assert loose < tight
 
 
-def test_a_shake_that_will_be_removed_needs_less_accuracy(arm, animation, meshes):
+def test_a_shake_that_will_be_removed_needs_less_accuracy(arm, animation, meshes, converged_for):
     loose = count(refined(arm, animation, meshes, 3e-4, retargeted=True).shot)
-    assert count(refined(arm, animation, meshes, 1e-2).shot) <= loose
-    assert loose < count(refined(arm, animation, meshes, 3e-4).shot)
+    assert count(converged_for(1e-2).shot) <= loose < count(converged_for(3e-4).shot)
 
 
 def test_a_reduction_is_not_refined_far_below_the_error_of_the_meshes(arm, animation, meshes, monkeypatch):

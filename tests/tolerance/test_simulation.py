@@ -21,40 +21,45 @@ from calmotion.tolerance.step_choice import WHOLE
 from calmotion.tolerance.step_error import CLOSED_GAP, distance, frames_of_result, simulate_at
 from made_shots import reduced_shot
 
-FINE = 1 / 7680
+FINE = 1 / 3840
 
 
 def quiet(fraction, message):
     pass
 
 
-def off_by(result, character, animation, bodies):
+@pytest.fixture(scope="module")
+def fine(arm, animation, bodies):
+    """The animation by a far finer step."""
+    return simulate_at(compile_shot(arm, animation, bodies), RunSettings(), FINE)
+
+
+def off_by(result, character, animation, bodies, fine=None):
     """Largest distance of a target at a frame to where a far finer step has it."""
     simulation = result.after or result.before
     if result.after is not None:
         animation = replace(animation, current=found_tracks(result, animation))
-    fine = simulate_at(compile_shot(character, animation, bodies), RunSettings(), FINE)
+    fine = fine or simulate_at(compile_shot(character, animation, bodies), RunSettings(), FINE)
     frames = np.searchsorted(simulation.motion.times, animation.frame_times - 1e-9)
     return np.linalg.norm(simulation.motion.target_positions[frames] - fine.positions, axis=2).max()
 
 
-def test_a_simulation_keeps_its_tolerance_by_a_step_no_smaller_than_it_must(arm, animation, bodies):
+def test_a_simulation_keeps_its_tolerance_by_a_step_no_smaller_than_it_must(arm, animation, bodies, fine):
     steps = []
     for tolerance in (1e-2, 1e-3, 1e-4):
         result = simulate_to_tolerance(compile_shot(arm, animation, bodies), RunSettings(tolerance=tolerance), quiet)
-        off = off_by(result, arm, animation, bodies)
+        off = off_by(result, arm, animation, bodies, fine)
         assert off < tolerance and off < 1.5 * result.accuracy.step_m
         steps.append(result.step_s)
         coarser = simulate_at(compile_shot(arm, animation, bodies), RunSettings(), 4.0 * result.step_s)
-        fine = simulate_at(compile_shot(arm, animation, bodies), RunSettings(), FINE)
         assert np.linalg.norm(coarser.positions - fine.positions, axis=2).max() > 0.5 * tolerance
     assert steps[0] > steps[1] > steps[2]
 
 
 @pytest.mark.parametrize("options", [RunSettings(tolerance=1e-2), RunSettings(step=1 / 120)])
-def test_efforts_are_stated_with_their_error(arm, animation, bodies, options):
+def test_efforts_are_stated_with_their_error(arm, animation, bodies, fine, options):
     shot = compile_shot(arm, animation, bodies)
-    result, fine = simulate_to_tolerance(shot, options, quiet), simulate_at(shot, RunSettings(), FINE)
+    result = simulate_to_tolerance(shot, options, quiet)
     efforts = frames_of_result(result, animation.frame_times).efforts
     off, largest = np.abs(efforts - fine.efforts).max(axis=0), np.abs(efforts).max(axis=0)
     assert np.all(off < 1.5 * result.accuracy.efforts)
@@ -125,23 +130,23 @@ def test_the_step_that_is_planned_is_the_one_that_is_taken(arm, animation, bodie
         assert row.why.endswith("BDF2") == gives_way
 
 
-def test_a_given_step_is_taken_and_its_error_estimated(arm, animation, bodies):
+def test_a_given_step_is_taken_and_its_error_estimated(arm, animation, bodies, fine):
     result = simulate_to_tolerance(
         compile_shot(arm, animation, bodies), RunSettings(step=1 / 240, tolerance=1e-5), quiet
     )
     assert result.step_s == pytest.approx(1 / 240)
-    assert off_by(result, arm, animation, bodies) == pytest.approx(result.accuracy.step_m, rel=0.5)
+    assert off_by(result, arm, animation, bodies, fine) == pytest.approx(result.accuracy.step_m, rel=0.5)
     slow = replace(arm, retarget=replace(arm.retarget, time_step=1 / 120))
     result = simulate_to_tolerance(compile_shot(slow, animation, bodies), RunSettings(tolerance=1e-5), quiet)
     assert result.step_s == pytest.approx(1 / 120)
 
 
-def test_without_a_requested_tolerance_that_of_the_shot_is_kept(arm, animation, bodies):
+def test_without_a_requested_tolerance_that_of_the_shot_is_kept(arm, animation, bodies, fine):
     steps = []
     for tolerance in (None, 1e-2, 1e-4):
         shot = replace(arm, retarget=replace(arm.retarget, tolerance=tolerance))
         result = simulate_to_tolerance(compile_shot(shot, animation, bodies), RunSettings(), quiet)
-        assert off_by(result, arm, animation, bodies) < tolerance_of(shot)
+        assert off_by(result, arm, animation, bodies, fine) < tolerance_of(shot)
         steps.append(result.step_s)
     assert steps[1] > steps[0] > steps[2]
 
