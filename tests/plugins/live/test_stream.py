@@ -104,11 +104,11 @@ def test_a_clock_that_begins_anew_is_followed():
     np.testing.assert_allclose(stream.position, 0.3)
 
 
-@pytest.mark.parametrize("drift", [-2e-4, 2e-4])
+@pytest.mark.parametrize("drift", [-4e-4, 4e-4])
 def test_a_clock_that_drifts_is_followed(drift):
-    """Two minutes, in which the clocks part by six ticks."""
+    """A minute, in which the clocks part by six ticks."""
     stream, found = begun(), []
-    for k in range(30_000):
+    for k in range(15_000):
         stamp = k * TICK * (1.0 + drift)
         stream.give(stamp, np.array([smooth(stamp)]))
         found.append(stream.advance()[0] - smooth(stamp))
