@@ -104,7 +104,7 @@ def test_a_slit_that_narrows_to_nothing_is_filled_where_it_is_thin():
     assert boundary_walks(np.asarray(made.faces)) == [] and repairs[0].startswith("filled 1 slit of up to 0.")
 
 
-@pytest.mark.parametrize("gap", [0.0, 1e-12, 2e-5, 1e-4])
+@pytest.mark.parametrize("gap", [1e-12, 1e-4])
 def test_a_pin_in_a_hole_is_one_solid_with_it(gap):
     hole = trimesh.creation.cylinder(0.02, 0.05, sections=64)
     ring = box((0.06, 0.06, 0.05)).difference(hole)

@@ -26,7 +26,7 @@ def bracket_surface(mirrored=False):
 
 def test_the_mirror_image_of_a_link_is_meshed_once(host, monkeypatch):
     accuracy = accurate_mesh
-    monkeypatch.setattr(accuracy, "MAX_NODES", 3_000)  # the meshes are refined as usual, and less far
+    monkeypatch.setattr(accuracy, "MAX_NODES", 1_500)  # the meshes are refined as usual, and less far
     fill, count = accuracy.filled, []
 
     def counted(*arguments):

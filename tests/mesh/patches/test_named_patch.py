@@ -71,7 +71,7 @@ def test_too_small_and_overlapping_ones_are_refused(plate):
 
 
 @pytest.mark.parametrize("named", [True, False])
-@pytest.mark.parametrize("ratio", [1.0, 0.3, 0.19, 0.1, 0.03, 0.01])
+@pytest.mark.parametrize("ratio", [1.0, 0.19, 0.01])
 def test_a_strip_is_clamped_on_the_whole_of_its_end_however_thin(named, ratio):
     """The first bending frequencies both ways are within 1% of Timoshenko's beam, by a named end face and by itself.
 
