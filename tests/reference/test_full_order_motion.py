@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from boxes import box_tets
 from full_order import FullOrder
-from swung_arm import kuhn_box
 
 E, NU, RHO = 1e6, 0.3, 1000.0
 SIZE = np.array([0.4, 0.1, 0.1])
 
 
 def block(law="stvk", **options):
-    points, tets = kuhn_box(*(np.linspace(-s / 2, s / 2, n + 1) for s, n in zip(SIZE, (4, 1, 1), strict=True)))
+    points, tets = box_tets((4, 1, 1), SIZE, -SIZE / 2)
     return FullOrder(points, tets, options.pop("modulus", E), NU, options.pop("density", RHO), law, **options)
 
 
@@ -52,7 +52,7 @@ def test_only_what_deforms_is_damped():
 
 def test_a_stretching_bar_is_damped_as_an_oscillator():
     """The lowest stretching of a slender bar that is held: half the retardation times omega, of critical."""
-    points, tets = kuhn_box(np.linspace(0.0, 1.0, 9), [-0.02, 0.02], [-0.02, 0.02])
+    points, tets = box_tets((8, 1, 1), (1.0, 0.04, 0.04), (0.0, -0.02, -0.02))
     bar = FullOrder(points, tets, E, 0.0, RHO, retardation=4e-3)
     held = np.flatnonzero(bar.nodes[:, 0] < 1e-9)
     omega = 0.5 * np.pi * np.sqrt(E / RHO)

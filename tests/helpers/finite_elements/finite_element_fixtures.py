@@ -19,7 +19,7 @@ def steel():
 
 @pytest.fixture(scope="session")
 def plastic():
-    """Of the swung arm of `tests/reference/test_swung_arm.py`."""
+    """Of arms that are swung."""
     return ElasticMaterial("/Looks/Plastic", 1.8e9, 0.35, 1200.0)
 
 
