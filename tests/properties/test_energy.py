@@ -17,10 +17,9 @@ from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.preparation import prepare
-from energies import energy, work
+from energies import energy, reach, work
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from likenesses import reach
 from random_shots import beams, lumps, shots
 
 H = 1.0 / 960.0

@@ -5,6 +5,7 @@ Both follow from inertia integrals, elastic laws and multipliers, none from the 
 
 import numpy as np
 from calmotion.arrays import Array, IntArray
+from calmotion.model import Character
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.kernels import inertia
 from calmotion.multibody.kernels.components import component_of
@@ -69,3 +70,9 @@ def _strain_energy(system: System, b: int, u: Array) -> float:
     w = u if p == r else system.data[start + size * size :][: p * r].reshape(p, r) @ u
     z = np.concatenate([u, np.outer(w, w)[np.triu_indices(p)]])
     return 0.5 * float(z @ A @ z)
+
+
+def reach(character: Character) -> float:
+    """What lengths of a character are measured by [m]: all arms of its joints together."""
+    frames = [frame for joint in character.joints for frame in (joint.frame0, joint.frame1)]
+    return max(sum(float(np.linalg.norm(frame.position)) for frame in frames), 0.1)

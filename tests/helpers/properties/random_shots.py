@@ -1,8 +1,4 @@
-"""Random robots and their motions for hypothesis: trees of rigid and flexible bodies on joints of every kind.
-
-Everything is drawn in SI. What a property needs in another form is made from the finished shot, not drawn again: see
-`likenesses`.
-"""
+"""Random robots and their motions for hypothesis: trees of rigid and flexible bodies on joints of every kind, in SI."""
 
 from dataclasses import dataclass, replace
 from unittest.mock import patch
@@ -23,25 +19,17 @@ from calmotion.model import (
     MassProperties,
     MeshQuality,
     Motor,
-    Result,
     Target,
     Track,
 )
-from calmotion.model.run import RunSettings
-from calmotion.multibody.model.topology import span_tree
-from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.simulation.simulate import simulate_shot
 from calmotion.testing import beam_mesh, quintic
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 RATE = 24.0  # frames a second
 FRAMES = 12
-STEP = 1.0 / 240.0
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 DRIVEN = ("revolute motor", "prismatic motor")
-PASSIVE = ("hinge", "ball", "slider")
 KINDS = {
     "fixed": "fixed", "revolute motor": "revolute", "prismatic motor": "prismatic", "hinge": "revolute",
     "ball": "spherical", "slider": "prismatic",
@@ -236,18 +224,6 @@ def build(links: tuple[Link, ...], gravity: tuple[float, float, float]) -> Shot:
 def shots(**options) -> st.SearchStrategy[Shot]:
     """Random shots; options as of `trees`."""
     return st.builds(build, trees(**options), directions())
-
-
-def simulated(shot: Shot, step: float = STEP, pre_roll: float | None = None) -> Result:
-    """What `calmotion simulate` computes.
-
-    Raises:
-        ShotError: The shot is refused.
-    """
-    character = shot.character
-    bodies = reduce_bodies(character, span_tree(character), shot.meshes)
-    options = RunSettings(step=step, pre_roll=pre_roll)
-    return simulate_shot(compile_shot(character, shot.animation, bodies), options, lambda fraction, message: None)
 
 
 @st.composite
