@@ -16,6 +16,8 @@ import numpy as np
 from calmotion import ShotError
 from calmotion.cli import json_option, length
 
+from .shots import load
+
 UNITS = {"_s": "s", "_ms": "ms", "_mm": "mm", "_hz": "Hz", "_deg": "°", "_gb": "GB", "_percent": "%"}
 UNITS |= {"_kg": "kg", "_cm3": "cm^3"}
 
@@ -81,6 +83,26 @@ def numbered(options: argparse.Namespace, kind: type[Any], number: str, measure:
             say(", ".join(f"{head} {cell}" for head, cell in zip(heads_of(kind), cells_of(row), strict=True) if cell))
         keep(options, kind, rows)
     return rows
+
+
+def on_shots(
+    options: argparse.Namespace, title: str, kind: type[Any], compare: Callable[[str, Any], Iterable[Any]]
+) -> int:
+    """Measure all shots of a command by their names and print what was found; the exit status.
+
+    Args:
+        options: Of `bench_parser`.
+        title: Of the table.
+        kind: Dataclass of the rows.
+        compare: Gives the rows of a shot that can be optimised.
+    """
+    rows: list[Any] = []
+    for path in options.shots:
+        rows += compare(Path(path).stem, load(path))
+        say(f"{path} is done")
+        keep(options, kind, rows)
+    finish(options, title, rows)
+    return 0
 
 
 def keep(options: argparse.Namespace, kind: type[Any], rows: Iterable[Any]) -> None:

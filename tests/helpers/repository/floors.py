@@ -25,7 +25,7 @@ REQUIRED_PLUGINS = (
 )  # fmt: skip
 
 # A benchmark of what another plugin does is told to need it, where that one is deleted.
-MEASURED = {"benchmarks": {"calibration", "live", "robot_import"}}
+MEASURED = {"benchmarks": {"calibration", "diagnosis", "live", "robot_import"}}
 
 
 def optional_plugins(folder):

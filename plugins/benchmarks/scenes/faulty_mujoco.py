@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.recordings import ACCELEROMETER, ANGLE, Channel, SensorRecording
-from faulty_arm import DENSITY, FaultyArm, played
+
+from .faulty_arm import DENSITY, FaultyArm, played
 
 SEGMENTS, STIFFER = 6, 3  # of a fore link, and of one whose own frequencies are too high for the step with so many
 STEP = 2.5e-4  # [s]

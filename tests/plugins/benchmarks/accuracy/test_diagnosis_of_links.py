@@ -12,8 +12,8 @@ from calmotion.multibody import Workspace, joint_values, span_tree
 from calmotion.recordings import ACCELEROMETER, ANGLE, MARKER, Channel, SensorRecording
 from calmotion.simulation import compile_shot, prepare, reduce_bodies, run_forward
 from calmotion.testing import beam_mesh
+from calmotion_plugins.benchmarks.scenes.faulty_arm import faulty_arm
 from calmotion_plugins.diagnosis import diagnosis_of, situation_of
-from faulty_arm import faulty_arm
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 

@@ -10,9 +10,10 @@ from calmotion.multibody import Workspace, joint_values
 from calmotion.recordings import SensorRecording
 from calmotion.simulation import CompiledShot, compile_shot, prepare, run_forward
 from calmotion.support import rotation_from_quaternion
-from faulty_arm import FaultyArm, played
-from faulty_mujoco import sampled
 from scipy.interpolate import make_interp_spline
+
+from .faulty_arm import FaultyArm, played
+from .faulty_mujoco import sampled
 
 STEP, CELLS, ACROSS = 1e-3, 18, 3
 POSSIBLE = ("links", "servo_gains", "friction", "stream", "delay", "ripple")  # faults that the simulator has

@@ -1,0 +1,1 @@
+"""Gradients, Gauss-Newton against L-BFGS, and input shapers as baselines."""
