@@ -15,7 +15,8 @@ from .explanations.loops import Delay, Friction, ServoGains
 from .explanations.stream import Stream
 from .explanations.structure import Base, Links
 from .fitting import Fit, fit, scores
-from .ringing import ringing
+from .formats import read_spectrum
+from .ringing import peaks, ringing
 from .situation import CLOSED, Situation
 
 NONE, UNKNOWN = "none", "unknown"
@@ -54,19 +55,19 @@ class Diagnosis:
         tells: What further measurement would tell the first two apart.
         channels: `name`, `unit`, `error_rms`, `noise`, `unexplained_rms` of each.
         fit: The explanations as they were fitted; None where there is nothing to explain.
-        situation: What was commanded and recorded.
+        situation: What was commanded and recorded; None of a spectrum.
     """
 
     causes: tuple[Cause, ...]
     tells: str
     channels: tuple[Mapping[str, Any], ...]
     fit: Fit | None
-    situation: Situation
+    situation: Situation | None
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What was noticed."""
-        return self.situation.notes
+        return () if self.situation is None else self.situation.notes
 
 
 class Comparison:
@@ -236,6 +237,17 @@ class Comparison:
                 {"name": sensor.name, "unit": unit, "error_rms": error, "noise": noise, "unexplained_rms": left}
             )
         return tuple(rows)
+
+
+def of_spectrum(file: str) -> Diagnosis:
+    """What a table of resonances alone says: where it rings.
+
+    Raises:
+        ShotError: It cannot be read.
+    """
+    rows = tuple(peaks(*read_spectrum(file), path=""))
+    told = "record encoders and an accelerometer during a motion, and name the robot's shot: a spectrum has no cause"
+    return Diagnosis((Cause(UNKNOWN, 1.0, 1.0, told, rows),), "", (), None, None)
 
 
 def diagnosis_of(situation: Situation, progress: Callable[[float], None] | None = None) -> Diagnosis:

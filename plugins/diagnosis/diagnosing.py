@@ -26,8 +26,8 @@ from calmotion.workflow import (
     with_shot,
 )
 
-from .comparison import Diagnosis, diagnosis_of
-from .formats import is_dataset, read_dataset
+from .comparison import Diagnosis, diagnosis_of, of_spectrum
+from .formats import is_dataset, is_spectrum, read_dataset
 from .opening import refuse_incomparable, situation_of
 
 
@@ -65,7 +65,7 @@ class DiagnosedShot:
                 "causes": [vars(cause) for cause in found.causes],
                 "tells": found.tells,
                 "channels": found.channels,
-                "model": found.situation.known,
+                "model": found.situation is not None and found.situation.known,
                 "notes": found.notes,
                 "figures": self.figures,
                 "html": None,  # a page has words of this report, and is written after it
@@ -107,6 +107,8 @@ def diagnose(
         shot = shot.unread() if isinstance(shot, Shot) else Shot(with_shot(os.fspath(shot)))
     host = open_host([]) if shot is None else shot.host
     names = [os.fspath(file) for file in files]
+    if len(names) == 1 and is_spectrum(names[0]):
+        return DiagnosedShot(of_spectrum(names[0]), (), time.perf_counter() - begin)
     sent = None if commands is None else read_recordings(host, [os.fspath(commands)], chosen)[0]
     if len(names) == 1 and is_dataset(names[0]):
         moved, asked = read_dataset(names[0])

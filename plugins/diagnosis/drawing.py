@@ -13,6 +13,7 @@ from calmotion.views import AFTER, BEFORE, INTENDED, LIMIT, SMALL, new_figure, s
 from matplotlib.figure import Figure
 
 from .comparison import Diagnosis
+from .situation import Situation
 
 ROWS = 6  # channels that are drawn
 
@@ -34,15 +35,16 @@ def draw_diagnosis(folder: str, diagnosis: Diagnosis, dpi: int = 150) -> list[st
 
 
 def plots_of(diagnosis: Diagnosis) -> Iterator[tuple[str, str, Figure]]:
-    """For each figure the name of its file, a heading, and the figure."""
-    yield "motion", "Motion and error", plot_motion(diagnosis)
-    yield "spectra", "Spectra of the error", plot_spectra(diagnosis)
-    yield "speed_and_torque", "Error over speed and torque", plot_speed_and_torque(diagnosis)
+    """For each figure the name of its file, a heading, and the figure; none where a spectrum was measured."""
+    if diagnosis.situation is not None:
+        yield "motion", "Motion and error", plot_motion(diagnosis)
+        yield "spectra", "Spectra of the error", plot_spectra(diagnosis)
+        yield "speed_and_torque", "Error over speed and torque", plot_speed_and_torque(diagnosis)
 
 
 def plot_motion(diagnosis: Diagnosis) -> Figure:
     """Command and motion of each joint with an encoder, and the error with what the causes explain of it."""
-    s = diagnosis.situation
+    s = _situation(diagnosis)
     shown = list(range(len(s.sensors)))[:ROWS]
     figure = new_figure(9.0, 1.9 * len(shown) + 0.4)
     grid = figure.subplots(len(shown), 2, squeeze=False, sharex=True)
@@ -68,7 +70,7 @@ def plot_motion(diagnosis: Diagnosis) -> Figure:
 
 def plot_spectra(diagnosis: Diagnosis) -> Figure:
     """Amplitude spectrum of the error of each sensor, with the frequencies of the causes."""
-    s = diagnosis.situation
+    s = _situation(diagnosis)
     shown = list(range(len(s.sensors)))[:ROWS]
     figure = new_figure(7.0, 1.9 * len(shown) + 0.4)
     for axes, k in zip(figure.subplots(len(shown), 1, squeeze=False, sharex=True)[:, 0], shown, strict=True):
@@ -89,7 +91,7 @@ def plot_spectra(diagnosis: Diagnosis) -> Figure:
 
 def plot_speed_and_torque(diagnosis: Diagnosis) -> Figure:
     """The error of each joint over its speed, and about the reversals of its torque."""
-    s = diagnosis.situation
+    s = _situation(diagnosis)
     shown = list(s.encoders.items())[:ROWS] or [(-1, 0)]
     figure = new_figure(8.0, 2.0 * len(shown) + 0.4)
     for (left, right), (m, k) in zip(figure.subplots(len(shown), 2, squeeze=False), shown, strict=True):
@@ -114,12 +116,17 @@ def plot_speed_and_torque(diagnosis: Diagnosis) -> Figure:
 
 
 def _left(diagnosis: Diagnosis) -> Array:
-    return diagnosis.situation.error if diagnosis.fit is None else diagnosis.fit.left
+    return _situation(diagnosis).error if diagnosis.fit is None else diagnosis.fit.left
+
+
+def _situation(diagnosis: Diagnosis) -> Situation:
+    assert diagnosis.situation is not None, "a spectrum is a figure already"
+    return diagnosis.situation
 
 
 def _spectrum(diagnosis: Diagnosis, vector: Array, k: int) -> tuple[Array, Array]:
     """Frequencies [Hz] and amplitudes of a sensor's largest component."""
-    s = diagnosis.situation
+    s = _situation(diagnosis)
     own = max((vector[s.blocks[b]] for b in s.blocks_of[k]), key=lambda part: float(part @ part))
     window = np.hanning(len(own))
     size = 2.0 * np.abs(np.fft.rfft(own * window)) / max(window.sum(), 1e-12)

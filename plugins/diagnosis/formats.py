@@ -1,4 +1,4 @@
-"""Files with commands and motion together: datasets of LeRobot."""
+"""Files with commands and motion together, or with a spectrum: datasets of LeRobot, Klipper's tables of resonances."""
 
 from __future__ import annotations
 
@@ -6,15 +6,47 @@ import json
 from pathlib import Path
 
 import numpy as np
+from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.recordings import ANGLE, Channel, SensorRecording, hash_of
 
+SPECTRUM = "freq,psd_x,psd_y,psd_z"
 ACTION, STATE, TIME, EPISODE = "action", "observation.state", "timestamp", "episode_index"
 
 
 def is_dataset(file: str) -> bool:
     """Whether a file is one of a LeRobot dataset."""
     return file.lower().endswith(".parquet")
+
+
+def is_spectrum(file: str) -> bool:
+    """Whether a file is a table of resonances that Klipper wrote."""
+    if not file.lower().endswith(".csv") or not Path(file).is_file():
+        return False
+    with open(file, encoding="utf-8-sig", errors="replace") as stream:
+        return stream.read(200).replace(" ", "").lower().startswith(SPECTRUM)
+
+
+def read_spectrum(file: str) -> tuple[Array, Array]:
+    """Frequencies [Hz] and power of all directions.
+
+    Raises:
+        ShotError: It is no table of numbers.
+    """
+    try:
+        rows = np.loadtxt(file, delimiter=",", skiprows=1, usecols=(0, 1, 2, 3), ndmin=2)
+    except (OSError, ValueError) as error:
+        raise ShotError(
+            "the table of resonances cannot be read",
+            path=file,
+            found=error,
+            remedy="Write it with TEST_RESONANCES, columns freq, psd_x, psd_y, psd_z",
+        ) from error
+    if len(rows) < 8:
+        raise ShotError(
+            "the table of resonances is too short", path=file, found=f"{len(rows)} rows", remedy="Measure again"
+        )
+    return rows[:, 0], rows[:, 1:].sum(axis=1)
 
 
 def read_dataset(file: str) -> tuple[SensorRecording, SensorRecording]:

@@ -1,4 +1,4 @@
-"""Frequencies at which a signal rings, whatever the cause: of what is left."""
+"""Frequencies at which a signal rings, whatever the cause: of what is left, and of spectra that printers write."""
 
 from __future__ import annotations
 

@@ -181,6 +181,18 @@ def test_a_dataset_of_lerobot_has_commands_and_motion(calmotion, tmp_path, motio
     assert done.returncode != 0 and "has no such column" in done.stderr and "observation.state" in done.stderr
 
 
+def test_a_table_of_resonances_alone_tells_where_it_rings(calmotion, tmp_path):
+    f = np.arange(0.0, 200.0, 0.5)
+    psd = 1.0 / ((1.0 - (f / 52.0) ** 2) ** 2 + (0.1 * f / 52.0) ** 2) + 0.1
+    table = np.column_stack([f, psd, 0.1 * psd, 0.1 * psd, 1.2 * psd])
+    file = tmp_path / "resonances_x.csv"
+    np.savetxt(file, table, delimiter=",", header="freq,psd_x,psd_y,psd_z,psd_xyz", comments="")
+    found = json.loads(calmotion("diagnose", "--recording", file, "--json").stdout)["causes"][0]
+    values = {row["name"]: row["value"] for row in found["parameters"]}
+    assert found["cause"] == "unknown" and "encoders" in found["remedy"]
+    assert values["frequency"] == pytest.approx(52.0, abs=1.0) and values["damping"] == pytest.approx(0.05, rel=0.2)
+
+
 def test_an_accelerometer_alone_tells_where_it_rings(calmotion, tmp_path):
     times = np.arange(0.0, 6.0, 1.0 / 800.0)
     rings = 2e3 * np.exp(-2.0 * (times % 1.5)) * np.sin(2.0 * np.pi * 7.0 * (times % 1.5))
