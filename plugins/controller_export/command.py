@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Any
 from calmotion.cli import (
     FAILED,
     Output,
-    assignments,
     conclude,
     counted,
     length,
+    motion_option,
     opened_shot,
     print_table,
     progress_display,
     quantity,
+    run_arguments,
     say,
     shot_arguments,
+    tolerance_option,
     up_to,
 )
 
@@ -53,12 +55,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         default=0.0,
         help="how late the controller starts, in s or with a unit (5ms); it counts as loss",
     )
-    command.add_argument(
-        "--tolerance",
-        metavar="LENGTH",
-        type=quantity("m", needs_unit=True, positive=True),
-        help="accuracy of the simulation at the targets, with a unit (1mm; default: the tolerance of the shot)",
-    )
+    tolerance_option(command)
     command.add_argument(
         "--allowed-loss",
         metavar="LENGTH",
@@ -68,11 +65,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--no-search", action="store_true", help="do not look for the lowest rate that keeps the allowed loss"
     )
-    command.add_argument(
-        "--motion",
-        metavar="FILE",
-        help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
-    )
+    motion_option(command)
     command.add_argument(
         "--strict", action="store_true", help="exit with status 1 if the commands lose more than is allowed"
     )
@@ -97,8 +90,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
     with progress_display(args) as display:
         made = export(
             shot, args.output, to=args.to, rate=args.rate, start_delay=args.start_delay, tolerance=args.tolerance,
-            allowed_loss=args.allowed_loss, search=not args.no_search, operators=args.run, settings=assignments(args),
-            progress=display, on_operator=display.done,
+            allowed_loss=args.allowed_loss, search=not args.no_search, **run_arguments(args, display),
         )  # fmt: skip
     conclude(made.report(), (), output, None if args.quiet else _print)
     return FAILED if args.strict and not made.loss_kept else 0

@@ -4,6 +4,7 @@ from calmotion.cli.options import assignments as assignments
 from calmotion.cli.options import count_of as count_of
 from calmotion.cli.options import html_option as html_option
 from calmotion.cli.options import json_option as json_option
+from calmotion.cli.options import motion_option as motion_option
 from calmotion.cli.options import opened_shot as opened_shot
 from calmotion.cli.options import plugin_option as plugin_option
 from calmotion.cli.options import progress_display as progress_display
@@ -14,6 +15,7 @@ from calmotion.cli.options import run_options as run_options
 from calmotion.cli.options import shot_arguments as shot_arguments
 from calmotion.cli.options import simulation_arguments as simulation_arguments
 from calmotion.cli.options import simulation_options as simulation_options
+from calmotion.cli.options import tolerance_option as tolerance_option
 from calmotion.cli.output import FAILED as FAILED
 from calmotion.cli.output import INTERRUPTED as INTERRUPTED
 from calmotion.cli.output import Output as Output

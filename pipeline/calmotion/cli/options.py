@@ -78,6 +78,25 @@ def html_option(command: argparse.ArgumentParser | argparse._ArgumentGroup) -> N
     )
 
 
+def motion_option(command: argparse.ArgumentParser) -> None:
+    """Add `--motion`."""
+    command.add_argument(
+        "--motion",
+        metavar="FILE",
+        help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
+    )
+
+
+def tolerance_option(command: argparse.ArgumentParser) -> None:
+    """Add `--tolerance`, of a command that simulates to the tolerance of the shot."""
+    command.add_argument(
+        "--tolerance",
+        metavar="LENGTH",
+        type=quantity("m", needs_unit=True, positive=True),
+        help="accuracy of the simulation at the targets, with a unit (1mm; default: the tolerance of the shot)",
+    )
+
+
 def plugin_option(command: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     """Add `--plugins`."""
     command.add_argument(
@@ -121,11 +140,7 @@ def run_options(command: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write a manifest (JSON): inputs and outputs with hashes, versions, settings, verdict",
     )
-    command.add_argument(
-        "--motion",
-        metavar="FILE",
-        help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
-    )
+    motion_option(command)
     command.add_argument(
         "--verbose", action="store_true", help="also print the search, the steps, the error budget and all notes"
     )

@@ -7,19 +7,21 @@ from typing import TYPE_CHECKING, Any
 
 from calmotion.cli import (
     Output,
-    assignments,
     conclude,
     counted,
     html_option,
     measured,
+    motion_option,
     opened_shot,
     page_of_report,
     print_table,
     progress_display,
     quantity,
     quantity_in,
+    run_arguments,
     say,
     shot_arguments,
+    tolerance_option,
 )
 
 if TYPE_CHECKING:
@@ -65,8 +67,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         metavar="FILE",
         action=_Named,
         required=True,
-        help="what was recorded: a table with columns named after prims or with a TOML map beside it, or an "
-        "accelerometer log of a 3D printer as FILE@/PRIM; may be repeated",
+        help="what was recorded: a table with columns named after prims or with a TOML map beside it, a C3D file, or a "
+        "bag of ROS (of a single sensor as FILE@/PRIM); may be repeated",
     )
     command.add_argument("-o", "--output", metavar="LAYER", help="USD layer to write")
     command.add_argument(
@@ -88,20 +90,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         type=quantity("s", positive=True),
         help="first time step, in s or with a unit (2ms); it is halved until the estimates do not depend on it",
     )
-    command.add_argument(
-        "--tolerance",
-        metavar="LENGTH",
-        type=quantity("m", needs_unit=True, positive=True),
-        help="accuracy of the simulation at the targets, with a unit (1mm; default: the tolerance of the shot)",
-    )
+    tolerance_option(command)
     command.add_argument("--integrator", metavar="NAME", help="bdf2, newmark or generalized-alpha (the default)")
     command.add_argument("--figures", metavar="DIR", help="draw measured and simulated signals into this folder")
     html_option(command)
-    command.add_argument(
-        "--motion",
-        metavar="FILE",
-        help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
-    )
+    motion_option(command)
 
 
 def prior_option(command: argparse.ArgumentParser) -> None:
@@ -159,8 +152,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
         made = calibrate(
             shot, files, others=others, layer=args.output,
             **parameter_arguments(args), validate=not args.no_validation, tolerance=args.tolerance, step=args.step,
-            integrator=args.integrator, figures=args.figures, operators=args.run, settings=assignments(args),
-            progress=display, on_operator=display.done,
+            integrator=args.integrator, figures=args.figures, **run_arguments(args, display),
         )  # fmt: skip
     report = made.report()
     plots = [(heading, figure) for _, heading, figure in plots_of(made.calibration)] if args.html else []

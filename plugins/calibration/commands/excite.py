@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from calmotion.cli import (
     Output,
-    assignments,
     conclude,
     count_of,
     counted,
@@ -17,6 +16,7 @@ from calmotion.cli import (
     progress_display,
     quantity,
     quantity_in,
+    run_arguments,
     say,
     shot_arguments,
 )
@@ -88,8 +88,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
         made = excite(
             shot, layer=args.output, sensors=args.sensor or SENSORS, **parameter_arguments(args),
             duration=args.duration, amplitude=args.amplitude or "10deg",
-            tries=args.tries, step=args.step, operators=args.run, settings=assignments(args), progress=display,
-            on_operator=display.done,
+            tries=args.tries, step=args.step, **run_arguments(args, display),
         )  # fmt: skip
     conclude(made.report(), (), output, None if args.quiet else _print)
     return 0

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from calmotion.cli import (
     Output,
-    assignments,
     conclude,
     length,
     measured,
@@ -16,8 +15,10 @@ from calmotion.cli import (
     progress_display,
     quantity,
     quantity_in,
+    run_arguments,
     say,
     shot_arguments,
+    tolerance_option,
 )
 
 from .calibrate import parameter_arguments, prior_option
@@ -50,12 +51,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--parameters", metavar="KIND", nargs="+", help="what is estimated, as of calmotion calibrate")
     prior_option(command)
-    command.add_argument(
-        "--tolerance",
-        metavar="LENGTH",
-        type=quantity("m", needs_unit=True, positive=True),
-        help="accuracy of the simulation at the targets, with a unit (1mm; default: the tolerance of the shot)",
-    )
+    tolerance_option(command)
     command.add_argument(
         "--step", metavar="TIME", type=quantity("s", positive=True), help="first time step of the calibration"
     )
@@ -71,8 +67,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
     with progress_display(args) as display:
         made = refine(
             shot, args.recording, layer=args.output, **parameter_arguments(args),
-            tolerance=args.tolerance, step=args.step, operators=args.run,
-            settings=assignments(args), progress=display, on_operator=display.done,
+            tolerance=args.tolerance, step=args.step, **run_arguments(args, display),
         )  # fmt: skip
     conclude(made.report(), (), output, None if args.quiet else _print)
     return 0
