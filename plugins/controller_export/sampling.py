@@ -40,15 +40,9 @@ def held_commands(curves: MotorCurves, rate: float) -> Commands:
     return Commands(HOLD, times, curves.at(times + early), start=curves.at(np.zeros(1))[0])
 
 
-def bezier_commands(curves: MotorCurves, rate: float, times: Array | None = None) -> Commands:
-    """Keyframes with the slopes of the curves, control points at thirds of the time between them.
-
-    Args:
-        curves: The curves.
-        rate: Keyframes a second [Hz].
-        times: Of the keyframes [s], shape [n], instead of a rate.
-    """
-    times = instants(curves, rate) if times is None else times
+def bezier_commands(curves: MotorCurves, rate: float) -> Commands:
+    """Keyframes with the slopes of the curves, control points at thirds of the time between them."""
+    times = instants(curves, rate)
     positions, thirds = curves.sample(times, 0), np.diff(times)[:, None] / 3.0
     slopes = curves.sample(times, 1)
     over = np.broadcast_to(thirds, (len(times) - 1, positions.shape[1]))
