@@ -85,7 +85,7 @@ def causes(model, sensors, rate, late=0.0):
 @pytest.mark.parametrize(
     "model, sensors, rate",
     [
-        ("prescribed", ("encoders", MARKER), 480.0),
+        ("prescribed", ("encoders", MARKER), 100.0),
         ("prescribed", ("encoders", ACCELEROMETER), 100.0),
         ("prescribed", (MARKER,), 100.0),
         (DRIVE, ("encoders", MARKER), 100.0),
