@@ -59,7 +59,7 @@ def test_limits_and_residuals_of_plugins_count_in_a_search(make_plugin, reposito
     assert [check_plugin(folder) for folder in folders] == [[], []]
     character, animation = small_shot()
     host = host_with(repository / "plugins/vibration_optimizer", *folders)
-    given = [character, animation, compile_shot(character, animation), Source("a", "optimize", RunSettings(step=0.01))]
+    given = [character, animation, compile_shot(character, animation), Source("a", "optimize", RunSettings(step=0.02))]
     ask = {"soft_start.limit": {"largest": 2.5}, "slow_target.residual": {"target": character.targets[0].path}}
 
     def optimized(idname):

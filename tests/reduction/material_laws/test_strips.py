@@ -140,7 +140,7 @@ def at_rest(found, force):
 @pytest.mark.parametrize(
     ("thin", "far", "law"),
     [
-        (1.0, 0.3, "stvk"),
+        pytest.param(1.0, 0.3, "stvk", marks=pytest.mark.long),
         pytest.param(0.1, 0.3, "stvk", marks=pytest.mark.long),
         pytest.param(1 / 30, 0.3, "stvk", marks=pytest.mark.long),
         (0.01, 0.2, "stvk"),
