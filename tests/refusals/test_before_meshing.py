@@ -181,6 +181,8 @@ CASES = {
         simulate, no_edit, {"settings": {"fe.mesh.element_size": "5m"}}, "fe.mesh.element_size"
     ),
     "a step that is longer than the shot": (simulate, no_edit, {"step": 5.0}, "--step"),
+    "a step of the shot that is longer than it": (simulate, shot_settings(timeStep=5.0), {}, "calm:retarget:timeStep"),
+    "a step of the shot of next to nothing": (simulate, shot_settings(timeStep=1e-30), {}, "calm:retarget:timeStep"),
     "knots farther apart than the shot is long": (
         optimize, no_edit, {"settings": {"retarget.optimize.knot_spacing": "10s"}}, "retarget.optimize.knot_spacing"
     ),

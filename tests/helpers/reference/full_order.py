@@ -4,13 +4,12 @@ Written from the equations, with nothing of `calmotion.fem` but the mesh: Total 
 positions of all nodes as unknowns, so that large rotations are in the Green strain and need no floating frame.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, diags, identity, kron
 from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
+_STEADY = 0.8  # of motion far too fast for a step, which it leaves; at 1 a long beam that spins up breaks down
 _BETTER = 0.3  # of the last correction: a kept tangent has to do better than that
 
 
@@ -19,17 +18,16 @@ class FullOrder:
 
     Args:
         points, tets: Linear mesh, [n, 3] and [m, 4].
-        youngs_modulus, poissons_ratio, density: SI; a number, or one for each element, [m].
+        youngs_modulus, poissons_ratio, density: SI.
         law: `stvk` or `neohookean` (W = mu/2 (tr C - 3) - mu ln J + lambda/2 ln^2 J).
         lumps: Extra masses [kg] by node of the linear mesh.
-        retardation: Kelvin-Voigt time [s]: stresses S of C:E + retardation C:dE/dt, for either law.
 
     Attributes:
         nodes: [m], shape [n', 3]: the points, then the midpoints of edges.
         mass: Consistent, with the lumps [kg], shape [3 n', 3 n'].
     """
 
-    def __init__(self, points, tets, youngs_modulus, poissons_ratio, density, law="stvk", lumps=None, retardation=0.0):
+    def __init__(self, points, tets, youngs_modulus, poissons_ratio, density, law="stvk", lumps=None):
         from skfem import Basis, ElementTetP2, MeshTet
 
         mesh = MeshTet(np.ascontiguousarray(points.T, dtype=float), np.ascontiguousarray(tets.T, dtype=np.int64))
@@ -41,12 +39,10 @@ class FullOrder:
         self._gradient = np.swapaxes(self.gradients, -1, -2).reshape(len(self.tets), -1, 10).copy()
         values = np.stack([np.asarray(f[0]) * np.ones(basis.dx.shape) for f in basis.basis])
         self.weights = basis.dx
-        constants = (youngs_modulus, poissons_ratio, density)
-        modulus, ratio, density = (np.broadcast_to(np.asarray(a, dtype=float), len(self.tets)) for a in constants)
-        self.mu = (0.5 * modulus / (1.0 + ratio))[:, None]  # [e, 1]
-        self.lame = (modulus * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio)))[:, None]
-        self.law, self.retardation = law, retardation
-        local = np.einsum("aeq,beq,eq,e->eab", values, values, self.weights, density, optimize=True)
+        self.mu = 0.5 * youngs_modulus / (1.0 + poissons_ratio)
+        self.lame = 2.0 * self.mu * poissons_ratio / (1.0 - 2.0 * poissons_ratio)
+        self.law = law
+        local = density * np.einsum("aeq,beq,eq->eab", values, values, self.weights, optimize=True)
         n = len(self.nodes)
         rows, columns = np.repeat(self.tets, 10, axis=1).ravel(), np.tile(self.tets, (1, 10)).ravel()
         scalar = coo_matrix((local.ravel(), (rows, columns)), shape=(n, n)).tocsr()
@@ -61,7 +57,7 @@ class FullOrder:
         self._rows, self._starts = keys % (3 * n), np.searchsorted(keys, 3 * n * np.arange(3 * n + 1))
 
     def deformation(self, x):
-        """F at every quadrature point, [e, q, 3, 3], of nodal positions [n, 3]; of velocities, its rate."""
+        """F at every quadrature point, [e, q, 3, 3], of nodal positions [n, 3]."""
         F = (self._gradient @ x[self.tets]).reshape(*self.weights.shape, 3, 3)
         return np.swapaxes(F, -1, -2)
 
@@ -76,16 +72,12 @@ class FullOrder:
             W = 0.5 * self.mu * (np.sum(F * F, axis=(-2, -1)) - 3.0) - self.mu * log + 0.5 * self.lame * log**2
         return float(np.sum(self.weights * W))
 
-    def forces(self, x, tangent=True, velocity=None):
-        """Internal force [3 n] and its derivative (sparse) at nodal positions [n, 3].
-
-        With a velocity [n, 3] and a retardation the force is also viscous; the derivative is of the elastic part.
-        """
-        F = self.deformation(x)
-        E3 = np.eye(3)
-        lame, mu = self.lame[:, :, None, None], self.mu[:, :, None, None]
+    def forces(self, x, tangent=True):
+        """Internal force [3 n] and its derivative (sparse) at nodal positions [n, 3]."""
+        F, lame, mu = self.deformation(x), self.lame, self.mu
         if self.law == "stvk":
-            S = self._stress(0.5 * (np.swapaxes(F, -1, -2) @ F - E3))
+            E = 0.5 * (np.swapaxes(F, -1, -2) @ F - np.eye(3))
+            S = lame * np.trace(E, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) + 2.0 * mu * E
             P = F @ S
         else:
             inverse = np.linalg.inv(F)
@@ -93,15 +85,12 @@ class FullOrder:
             transposed = np.swapaxes(inverse, -1, -2)
             P = mu * (F - transposed) + lame * log * transposed
         G, w = self.gradients, self.weights
-        if velocity is not None and self.retardation:
-            rate = np.swapaxes(F, -1, -2) @ self.deformation(velocity)
-            P = P + self.retardation * F @ self._stress(0.5 * (rate + np.swapaxes(rate, -1, -2)))
         weighted = (np.swapaxes(P, -1, -2) * w[:, :, None, None]).reshape(len(P), -1, 3)
         local = np.swapaxes(self._gradient, -1, -2) @ weighted
         f = np.bincount(self._dofs.ravel(), weights=local.ravel(), minlength=3 * len(self.nodes))
         if not tangent:
             return f, None
-        by_lame, by_mu = w * self.lame, w * self.mu
+        by_lame, by_mu = w * lame, w * mu
         if self.law == "stvk":
             # dP = dF S + F (lame tr(F^T dF) + mu (dF^T F + F^T dF)), dF = e_i (x) G_a
             FG = np.einsum("eqij,eqaj->eqai", F, G)
@@ -121,11 +110,6 @@ class FullOrder:
         data = np.bincount(self._place, weights=K.ravel(), minlength=len(self._rows))
         return f, csc_matrix((data, self._rows, self._starts), shape=(size, size))
 
-    def _stress(self, E):
-        """C : E [Pa] of strains, [e, q, 3, 3]."""
-        trace = np.trace(E, axis1=-2, axis2=-1)
-        return (self.lame * trace)[..., None, None] * np.eye(3) + 2.0 * self.mu[:, :, None, None] * E
-
     def statics(self, held, loads, steps=10):
         """Positions [n, 3] in balance with nodal forces [n, 3], nodes `held` staying where they are."""
         x = self.nodes.copy()
@@ -143,45 +127,33 @@ class FullOrder:
                 raise ArithmeticError(f"no balance at {part:.0%} of the load; take more steps")
         return x
 
-    def swing(self, held, angle, axis, step, duration, watched, gravity=(0.0, 0.0, 0.0), start=None):
-        """Root nodes turned about an axis through the origin by angle(t).
-
-        Starts at rest, undeformed or at positions `start` [n, 3]; the angle starts from zero.
+    def swing(self, held, angle, axis, step, duration, watched):
+        """Root nodes turned about an axis through the origin by angle(t), which starts from zero, from rest.
 
         Returns:
             Times, and positions of the watched nodes turned back by the angle, [t, k, 3].
         """
-        x = self.nodes if start is None else start
-        tips = [
-            s.turn.inv().apply(s.x[watched])
-            for s in self.march(x, np.zeros_like(x), step, round(duration / step), gravity, held, angle, axis)
-        ]
+        tips = [turn.inv().apply(x[watched]) for x, turn in self.march(step, round(duration / step), held, angle, axis)]
         return step * np.arange(len(tips)), np.array(tips)
 
-    def march(
-        self, x, v, step, count, gravity=(0.0, 0.0, 0.0), held=(), angle=None, axis=(0.0, 0.0, 1.0),
-        steady=0.8,
-    ):  # fmt: skip
-        """States from positions and velocities [n, 3], the first one included; generalised alpha, of second order.
+    def march(self, step, count, held, angle, axis):
+        """Positions [n, 3] and turns of the root, the first ones included; generalised alpha, of second order.
 
-        `steady` is what a step leaves of motion far too fast for it. At 1 (average acceleration) energy is kept
-        where all is linear, but a long beam that spins up breaks down: its stretching grows. A tangent is kept, and
-        turned with the root, as long as it does its work (modified Newton).
+        A tangent is kept, and turned with the root, as long as it does its work (modified Newton).
 
         Source: Chung and Hulbert 1993.
         """
-        by_a, by_f = (2.0 * steady - 1.0) / (steady + 1.0), steady / (steady + 1.0)  # weights of the last step
+        by_a, by_f = (2.0 * _STEADY - 1.0) / (_STEADY + 1.0), _STEADY / (_STEADY + 1.0)  # weights of the last step
         gamma, beta = 0.5 - by_a + by_f, 0.25 * (1.0 - by_a + by_f) ** 2
         held = np.asarray(held, dtype=np.int64)
         free, n = self._free(held), len(self.nodes)
         M, h = self.mass, step
-        weight = M @ np.tile(gravity, n)
-        led = _Lead(self.nodes[held], angle or (lambda t: 0.0), np.asarray(axis, dtype=float))
-        x, v, a = x.copy(), v.copy(), np.zeros((n, 3))
+        led = _Lead(self.nodes[held], angle, np.asarray(axis, dtype=float))
+        x, v, a = self.nodes.copy(), np.zeros((n, 3)), np.zeros((n, 3))
         turn, _, v[held], a[held] = led(0.0)
-        f_last = self.forces(x, False, v)[0]
-        a.reshape(-1)[free] = _factor(M[free][:, free]).solve((weight - f_last - M @ a.ravel())[free])
-        yield State(0.0, x, v, a, turn)
+        f_last = self.forces(x, False)[0]
+        a.reshape(-1)[free] = _factor(M[free][:, free]).solve((-f_last - M @ a.ravel())[free])
+        yield x, turn
         inside = np.ones(n, dtype=bool)
         inside[held] = False
         lu, factored = None, turn
@@ -197,14 +169,13 @@ class FullOrder:
                 a_new = (new - x - h * v - (0.5 - beta) * h**2 * a) / (beta * h**2)
                 v_new = v + h * ((1.0 - gamma) * a + gamma * a_new)
                 a_new[held], v_new[held] = acceleration, rate
-                f, K = self.forces(new, renew, v_new)
+                f, K = self.forces(new, renew)
                 if renew:
                     own, renew = True, False
-                    viscous = 1.0 + self.retardation * gamma / (beta * h)
-                    matrix = (1.0 - by_f) * viscous * K + (1.0 - by_a) / (beta * h**2) * M
+                    matrix = (1.0 - by_f) * K + (1.0 - by_a) / (beta * h**2) * M
                     lu, factored = _factor(matrix[free][:, free]), turn
                 inertia = M @ ((1.0 - by_a) * a_new + by_a * a).ravel()
-                residual = (weight - (1.0 - by_f) * f - by_f * f_last - inertia).reshape(-1, 3)[inside]
+                residual = (-(1.0 - by_f) * f - by_f * f_last - inertia).reshape(-1, 3)[inside]
                 since = turn * factored.inv()
                 dx = since.apply(lu.solve(since.inv().apply(residual).ravel()).reshape(-1, 3))
                 new[inside] += dx
@@ -218,23 +189,12 @@ class FullOrder:
             else:
                 raise ArithmeticError(f"no balance at {k * h:.4g} s; take a smaller step")
             x, v, a, f_last = new, v_new, a_new, f
-            yield State(k * h, x, v, a, turn)
+            yield x, turn
 
     def _free(self, held):
         free = np.ones(len(self.nodes), dtype=bool)
         free[held] = False
         return np.flatnonzero(np.repeat(free, 3))
-
-
-@dataclass(frozen=True)
-class State:
-    """Time [s], positions [m], velocities and accelerations, [n, 3], and how far the root is turned."""
-
-    time: float
-    x: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    turn: Rotation
 
 
 class _Lead:

@@ -1,38 +1,10 @@
 """Settings and motions that no simulation supports."""
 
-import dataclasses
-
 import numpy as np
 import pytest
-from calmotion.errors import IntegrationError, ShotError
-from calmotion.model import RetargetSettings
-from calmotion.model.run import RunSettings
-from calmotion.simulation.inputs.supported import refuse_fast_motors, refuse_half_turns, refuse_unsupported
+from calmotion.errors import IntegrationError
+from calmotion.simulation.inputs.supported import refuse_fast_motors, refuse_half_turns
 from calmotion.simulation.inputs.time_grid import make_grid
-
-
-def test_the_arm_is_supported_by_any_integrator_and_only_by_known_ones(arm, animation):
-    refuse_unsupported(arm, animation, RunSettings(integrator="rk4"))
-    with pytest.raises(ShotError, match="no such integrator"):
-        refuse_unsupported(arm, animation, RunSettings(integrator="rk5"))
-
-
-def test_a_cyclic_shot_has_no_pre_roll(arm, animation):
-    ends = [dataclasses.replace(track, values=0.0 * track.values) for track in animation.tracks]
-    still = dataclasses.replace(animation, tracks=tuple(ends), current=tuple(ends))
-    cyclic = dataclasses.replace(arm, retarget=RetargetSettings(cyclic=True))
-    refuse_unsupported(cyclic, still, RunSettings())
-    with pytest.raises(ShotError) as error:
-        refuse_unsupported(cyclic, still, RunSettings(pre_roll=1.0))
-    assert error.value.attribute == "--pre-roll"
-
-
-def test_a_step_of_the_shot_is_in_range_as_well(arm, animation):
-    short = dataclasses.replace(arm, retarget=RetargetSettings(time_step=1e-30))
-    with pytest.raises(ShotError) as error:
-        refuse_unsupported(short, animation, RunSettings())
-    assert error.value.attribute == "calm:retarget:timeStep"
-    refuse_unsupported(short, animation, RunSettings(step=1e-3))
 
 
 def test_half_a_turn_within_a_step_is_refused_where_it_begins(arm):
