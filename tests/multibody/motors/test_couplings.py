@@ -17,8 +17,8 @@ from calmotion.simulation.simulator import Simulator
 from calmotion.tolerance.motors.motor_effects import with_gains_used
 from calmotion.usd.reading import read_shot
 from motor_runs import G, smooth, transmitted
-from pxr import Usd
 from scipy.integrate import solve_ivp
+from servo_shots import edited, written
 
 MASS, LENGTH, RATIO = 0.8, 0.5, 0.7
 GAIN, DAMPING = 300.0, 6.0
@@ -221,17 +221,7 @@ def test_a_coupling_without_a_place_is_refused(changes, words):
         compiled(replace(character, motors=tuple(motors)))
 
 
-SHOT = """#usda 1.0
-(
-    defaultPrim = "Robot"
-    metersPerUnit = 1
-    kilogramsPerUnit = 1
-    upAxis = "Z"
-    timeCodesPerSecond = 24
-    startTimeCode = 0
-    endTimeCode = 24
-)
-def Xform "Robot" (prepend apiSchemas = ["PhysicsArticulationRootAPI"])
+ROBOT = """def Xform "Robot" (prepend apiSchemas = ["PhysicsArticulationRootAPI"])
 {
     def Xform "Upper" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"])
     {
@@ -282,15 +272,7 @@ def Xform "Robot" (prepend apiSchemas = ["PhysicsArticulationRootAPI"])
 
 @pytest.fixture
 def shot(tmp_path):
-    (tmp_path / "shot.usda").write_text(SHOT)
-    return tmp_path / "shot.usda"
-
-
-def edited(shot, edit):
-    stage = Usd.Stage.Open(str(shot))
-    edit(stage.GetPrimAtPath("/Robot/Flange"))
-    stage.Save()
-    return shot
+    return written(tmp_path, ROBOT)
 
 
 def test_a_shot_couples_a_motor_and_is_optimised_with_it(shot, capsys):
@@ -325,6 +307,6 @@ def test_gains_of_coupled_ideal_motors_are_used_for_both_or_none(changes, model)
 )
 def test_a_coupling_to_no_joint_is_refused(shot, edit, found):
     with pytest.raises(ShotError, match="coupled to one other driven joint") as refused:
-        read_shot(str(edited(shot, edit)))
+        read_shot(str(edited(shot, "/Robot/Flange", edit)))
     assert refused.value.attribute == "calm:motor:coupledTo" and refused.value.found == found
     assert found is None or "/Robot/Wrist" in str(refused.value.remedy)

@@ -18,8 +18,8 @@ from calmotion.multibody.model.moving_markers import pack
 from calmotion.simulation.simulator import Simulator
 from calmotion.usd.reading import read_shot
 from motor_runs import INERTIA, LENGTH, MASS, G, pendulum, pitch, servo, smooth
-from pxr import Usd
 from scipy.integrate import solve_ivp
+from servo_shots import edited, written
 
 SWITCHED = Schedule(np.array([0.0, 0.32, 0.56]), np.array([True, False, True]))
 OFF, ON, END = 0.32, 0.56, 0.8
@@ -117,17 +117,7 @@ def test_derivatives_over_switches_match_differences_and_are_transposes():
     assert np.all(by_value[while_off, 0] == 0.0) and np.any(by_value[while_off, 1] != 0.0)
 
 
-SHOT = """#usda 1.0
-(
-    defaultPrim = "Robot"
-    metersPerUnit = 1
-    kilogramsPerUnit = 1
-    upAxis = "Z"
-    timeCodesPerSecond = 24
-    startTimeCode = 0
-    endTimeCode = 24
-)
-def Xform "Robot" (prepend apiSchemas = ["PhysicsArticulationRootAPI"])
+ROBOT = """def Xform "Robot" (prepend apiSchemas = ["PhysicsArticulationRootAPI"])
 {
     def Xform "Arm" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"])
     {
@@ -157,15 +147,7 @@ def Xform "Robot" (prepend apiSchemas = ["PhysicsArticulationRootAPI"])
 
 @pytest.fixture
 def shot(tmp_path):
-    (tmp_path / "shot.usda").write_text(SHOT)
-    return tmp_path / "shot.usda"
-
-
-def edited(shot, edit):
-    stage = Usd.Stage.Open(str(shot))
-    edit(stage.GetPrimAtPath("/Robot/Hinge"))
-    stage.Save()
-    return shot
+    return written(tmp_path, ROBOT)
 
 
 def test_a_shot_switches_its_motor_off(shot):
@@ -202,12 +184,14 @@ def never_on(prim):
 )
 def test_what_cannot_be_switched_is_refused(shot, edit, message):
     with pytest.raises(ShotError, match=message) as refused:
-        read_shot(str(edited(shot, edit)))
+        read_shot(str(edited(shot, "/Robot/Hinge", edit)))
     assert refused.value.path == "/Robot/Hinge" and refused.value.attribute == "calm:motor:powered"
 
 
 def test_a_motor_that_stays_on_has_no_switch(shot):
-    character, _, _ = read_shot(str(edited(shot, lambda prim: prim.GetAttribute("calm:motor:powered").Set(True, 12.0))))
+    character, _, _ = read_shot(
+        str(edited(shot, "/Robot/Hinge", lambda prim: prim.GetAttribute("calm:motor:powered").Set(True, 12.0)))
+    )
     assert character.motors[0].powered is None
 
 
@@ -219,4 +203,4 @@ def test_a_loop_is_refused(shot):
         prim.GetAttribute("drive:angular:physics:targetPosition").Set(0.0, 24.0)
 
     with pytest.raises(ShotError, match="motors that are switched cannot loop"):
-        cm.simulate(cm.open_shot(edited(shot, loop)))
+        cm.simulate(cm.open_shot(edited(shot, "/Robot/Hinge", loop)))
