@@ -116,6 +116,7 @@ def test_a_robot_is_imported_as_the_page_says(tmp_path):
     assert (tmp_path / "work" / "from_python.usda").is_file()
 
 
+@pytest.mark.long
 def test_commands_of_a_controller_are_written_as_the_page_says(tmp_path):
     printed = follow("./exporting", tmp_path)
     loss = re.search(r"Playing the commands costs up to ([\d.]+) mm", printed)
@@ -123,6 +124,7 @@ def test_commands_of_a_controller_are_written_as_the_page_says(tmp_path):
     assert "joint_names" in (tmp_path / "work" / "calmotion_demo" / "trajectory.yaml").read_text()
 
 
+@pytest.mark.long
 def test_trouble_is_found_as_the_page_says(tmp_path):
     pytest.importorskip("calmotion_plugins.calibration")
     begun("calibration", "calmotion calibrate", tmp_path)

@@ -8,6 +8,7 @@ import pytest
 from calmotion.host import PluginError
 from calmotion.host.template import write_template
 from calmotion.testing import check_plugin
+from one_hinge import ONE_HINGE
 
 
 def test_a_new_plugin_keeps_to_the_rules(tmp_path):
@@ -27,9 +28,10 @@ def test_its_test_passes_with_the_fixtures_that_come_with_calmotion(calmotion, r
     assert "2 passed" in ran.stdout
 
 
-def test_it_runs_by_its_name_and_reports_its_results(calmotion, repository, tmp_path):
+def test_it_runs_by_its_name_and_reports_its_results(calmotion, tmp_path):
     calmotion("plugins", "new", "speed_watch", "--folder", tmp_path)
-    shot = repository / "samples" / "bartender" / "bartender.usda"
+    shot = tmp_path / "shot.usda"
+    shot.write_text(ONE_HINGE)
     done = calmotion(
         "inspect", shot, "--plugins", tmp_path / "speed_watch", "--run", "speed_watch.report",
         "--set", "speed_watch.report.share=0.5",
