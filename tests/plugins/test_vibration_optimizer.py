@@ -96,15 +96,6 @@ def test_a_result_is_verified_on_request(host, with_mesher):
     assert poll({Source: asked}) is None
 
 
-def test_locked_motors_only_are_refused(host):
-    character, animation = small_shot()
-    motors = tuple(dataclasses.replace(motor, optimize=False) for motor in character.motors)
-    with pytest.raises(ShotError) as error:
-        shot = compile_shot(dataclasses.replace(character, motors=motors), animation)
-        run_operator(host, "retarget.optimize", [shot, source("optimize")])
-    assert error.value.attribute == "calm:motor:optimize"
-
-
 def test_shaped_tracks_are_simulated_on_request(host):
     character, animation = small_shot()
     (plain,) = run_operator(host, "retarget.simulate", [compile_shot(character, animation), source("simulate")])

@@ -176,15 +176,3 @@ def test_kept_ends_keep_the_first_and_last_pose(arm, animation, bodies):
         assert curve.frame_values[0] == track.values[0] and curve.frame_values[-1] == track.values[-1]
     # the sag of the first pose cannot be removed then
     assert judged(result.after)[1] >= 0.999 * result.before.position_errors[0, 1]
-
-
-def test_a_rigid_character_needs_no_change(arm, animation):
-    from calmotion.model import MassProperties
-
-    mass = MassProperties(0.17, np.array([0.16, 0.0, 0.0]), 1e-3 * np.eye(3))
-    rigid = dataclasses.replace(
-        arm, bodies=tuple(dataclasses.replace(b, flexible=None, mass=b.mass or mass) for b in arm.bodies)
-    )
-    result = simulate_shot(compile_shot(rigid, animation, None), OPTIONS, checked)
-    assert judged(result.before).max() < 1e-4
-    assert any(row.what.endswith(": rigid") for row in result.left_out)

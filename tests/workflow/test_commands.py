@@ -82,11 +82,6 @@ def test_a_range_without_two_frames_is_refused_with_what_to_author(shot_file, fi
     assert refused.value.attribute == "endTimeCode" and "startTimeCode" in refused.value.remedy
 
 
-def test_a_shaped_motion_is_also_compared_with_its_delay(shot_file, simulated, calmotion):
-    assert "shaper" not in simulated.report()
-    assert calmotion("simulate", shot_file, "--shaper", "zvd").returncode != 0, "a rigid robot has no frequency"
-
-
 def test_the_report_is_the_object_of_the_command_line(shot_file, simulated, calmotion):
     printed = json.loads(calmotion("simulate", shot_file, "--step", "4ms", "--json").stdout)
     report = simulated.report()
@@ -174,15 +169,6 @@ def test_a_table_of_joint_angles_moves_the_robot(calmotion, shot_file, tmp_path)
     assert done.returncode == 0, done.stderr
     rows = np.genfromtxt(tmp_path / "out.csv", delimiter=",", names=True, deletechars="")
     assert np.interp(0.5, rows["time_s"], rows[f"{HINGE}.output"]) == pytest.approx(0.4, abs=1e-6)
-
-
-@pytest.mark.parametrize("content", [None, "", "HIERARCHY\nROOT", "not a motion"])
-def test_a_damaged_motion_is_refused_by_its_name(calmotion, shot_file, tmp_path, content):
-    motion = tmp_path / "walk.bvh"
-    if content is not None:
-        motion.write_text(content)
-    done = calmotion("simulate", shot_file, "--motion", motion, "--set", "bvh.read.map=A.Zrotation=Hinge")
-    assert done.returncode in (1, 2) and "walk.bvh" in done.stderr and "Traceback" not in done.stderr
 
 
 def test_a_cancelled_run_raises(shot_file):

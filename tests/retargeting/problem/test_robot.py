@@ -60,20 +60,6 @@ def test_every_robot_keeps_the_limits_of_effort(points):
     assert excess[2] == max(excess[:2])
 
 
-def test_jvp_and_vjp_are_transposes(points):
-    both = points[2]
-    random = np.random.default_rng(2)
-    linear = both.with_limits(dataclasses.replace(both.problem.limits, on=True)).linearized()
-    direction = random.normal(size=len(both.x))
-    residuals, values = linear.jvp(direction)
-    pulls = random.normal(size=residuals.shape)
-    efforts = {name: 1e-3 * random.normal(size=v.shape) for name, v in values.items() if name.startswith("effort")}
-    assert len(efforts) == 2
-    forward = float(np.sum(residuals * pulls)) + sum(float(np.sum(values[n] * e)) for n, e in efforts.items())
-    backward = float(direction @ linear.vjp(pulls, efforts))
-    assert forward == pytest.approx(backward, rel=1e-9)
-
-
 def test_derivatives_that_were_given_up_are_not_used_by_mistake(points):
     at = points[0]
     linear = at.linearized()
