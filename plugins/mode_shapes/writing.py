@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from calmotion.arrays import box_diagonal
 from calmotion.errors import ShotError
 from calmotion.model import Body
 from calmotion.reduction import inertia_integrals, modal_damping
@@ -96,7 +97,7 @@ def _file_name(path: str, used: set[str]) -> str:
 def scaled_modes(linear: LinearModes) -> np.ndarray:
     """Modes scaled to a largest displacement of a tenth of the size of the body [m], shape [n, 3, r]."""
     modes = linear.basis.modes
-    size = float(np.linalg.norm(np.ptp(linear.model.mesh.nodes, axis=0)))
+    size = box_diagonal(linear.model.mesh.nodes)
     largest = np.linalg.norm(modes, axis=1).max(axis=0, initial=0.0)
     return modes * (SHOWN * size / np.where(largest > 0.0, largest, 1.0))
 

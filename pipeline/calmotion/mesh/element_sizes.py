@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.arrays import Array, Indices
+from calmotion.arrays import Array, Indices, box_diagonal
 from calmotion.mesh.surfaces.distances import ray_length
 from calmotion.mesh.tetrahedra import surface_area, surface_volume
 from calmotion.mesh.tetrahedralize.tetwild import SIMPLE
@@ -72,7 +72,7 @@ def wall_thickness(points: Array, triangles: Indices, rays: int = _RAYS) -> Arra
     x = points[triangles]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
     doubled = np.linalg.norm(normal, axis=1)
-    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    size = box_diagonal(points)
     # evenly along the surface laid out triangle by triangle: the same places every time, large faces often
     upto = np.cumsum(doubled)
     chosen = np.minimum(np.searchsorted(upto, upto[-1] * (np.arange(rays) + 0.5) / rays), len(x) - 1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.arrays import Array, Indices, IntArray
+from calmotion.arrays import Array, Indices, IntArray, box_diagonal
 from calmotion.mesh.surfaces.closed_surfaces import winding_numbers
 from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles
 from calmotion.mesh.tetrahedra import boundary_triangles, surface_volume
@@ -84,7 +84,7 @@ def holders(places: Array, parts: Sequence[Part]) -> Indices:
         if len(near):
             wound = np.abs(winding_numbers(places[near], part.points, part.triangles)) > 0.5
             found[near[wound]] = index
-    size = float(np.linalg.norm(np.ptp(np.vstack([part.points[part.triangles.ravel()] for part in parts]), axis=0)))
+    size = box_diagonal(np.vstack([part.points[part.triangles.ravel()] for part in parts]))
     left = np.flatnonzero(found < 0)
     if len(left):
         found[left] = _nearest(places[left], parts, _REACH * size)

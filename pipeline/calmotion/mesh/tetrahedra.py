@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from calmotion.arrays import Array, BoolArray, Indices, IntArray
+from calmotion.arrays import Array, BoolArray, Indices, IntArray, box_diagonal
 from calmotion.errors import ShotError
 from calmotion.model.meshes import MeshQuality
 
@@ -196,7 +196,7 @@ def welded_tets(points: Array, tets: IntArray, tolerance: float) -> tuple[Array,
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    distance = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
+    distance = tolerance * box_diagonal(points)
     pairs = cKDTree(points).query_pairs(distance, output_type="ndarray")
     n = len(points)
     graph = coo_matrix((np.ones(len(pairs)), pairs.T.reshape(2, -1)), shape=(n, n))

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calmotion.arrays import Array, Indices
+from calmotion.arrays import Array, Indices, box_diagonal
 from calmotion.errors import ShotError
 from calmotion.linear_algebra.multifrontal import FactorsTooLarge
 from calmotion.mesh.bisection import bisected
@@ -234,7 +234,7 @@ def _moved_by_loads(
     p = len(full.moving)
     if not p:
         return np.zeros((len(nodes), 3, 0)), np.zeros(0)
-    size = float(np.linalg.norm(np.ptp(nodes, axis=0)))
+    size = box_diagonal(nodes)
     wrenches = levers = np.tile([1.0, 1.0, 1.0, size, size, size], p)
     if loads is not None:
         positions = np.array([attachment.frame.position for attachment in attachments]).reshape(-1, 3)

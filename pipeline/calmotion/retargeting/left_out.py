@@ -1,4 +1,4 @@
-"""What a search leaves out: motors that do nothing, offsets that change nothing, and how a report tells it."""
+"""What a search leaves out: motors that do nothing, and how a report tells it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from calmotion.arrays import Array, BoolArray, IntArray
+from calmotion.arrays import BoolArray, IntArray
 from calmotion.model import Character, MotorCurve, Simplification
 from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import tolerance_of
@@ -75,48 +75,7 @@ def idle_gain(at: Evaluation, linear: LinearProblem, character: Character) -> fl
     return at.gain(decrease)
 
 
-BLOCK = 8  # neighbouring coefficients of a motor that vanish together; four already make a curve vanish
-
-
-def negligible_coefficients(x: Array, motors: int, energy: Array, budget: float) -> BoolArray:
-    """Which coefficients can be fixed at zero within a budget.
-
-    Args:
-        x: Coefficients, ordered by basis function, then motor, shape [P * m].
-        motors: m.
-        energy: x_b^T H_b x_b / 2 of each block, shape [blocks, m]: increase of the objective if the block is zero.
-        budget: Largest increase of the objective, of all blocks together.
-
-    Returns:
-        Shape [P * m].
-    """
-    count = len(x) // motors
-    order = np.argsort(energy, axis=None)
-    affordable = np.cumsum(energy.ravel()[order]) <= budget
-    chosen = np.zeros(energy.size, bool)
-    chosen[order[affordable]] = True
-    by_function = np.repeat(chosen.reshape(energy.shape), BLOCK, axis=0)[:count]
-    return by_function.ravel()
-
-
-def block_energies(x: Array, motors: int, product: Array) -> Array:
-    """|x_b^T (M x)_b| / 2 of each block, shape [blocks, m]: their energies if M couples blocks weakly.
-
-    Args:
-        x: Coefficients, ordered by basis function, then motor, shape [P * m].
-        motors: m.
-        product: M x.
-    """
-    count = len(x) // motors
-    blocks = -(-count // BLOCK)
-    padded = np.zeros((blocks * BLOCK, motors))
-    padded[:count] = np.abs(x * product).reshape(count, motors)
-    energies: Array = 0.5 * padded.reshape(blocks, BLOCK, motors).sum(axis=1)
-    return energies
-
-
 FINER = 0.1  # share of the least gain of a search that finer knots must gain
-PRUNED = 0.2  # share of it that the removed offsets may cost together
 
 
 def search_rows(
@@ -132,8 +91,6 @@ def search_rows(
         problem: On the final knots.
         idle_gain_m: Gain that idle motors would bring [m]; None where there are none.
     """
-    tolerance = tolerance_of(character, options.tolerance)
-    pruned = PRUNED * options.least_gain
     idle = idle_motors(character)
     rows = [_knots_row(problem, character, options)]
     rows += [
@@ -145,8 +102,7 @@ def search_rows(
     rows += [
         Simplification(
             character.motors[curve.motor].path + ": curve unchanged",
-            f"a change would gain less than {100.0 * pruned:.3g}% of the tolerance",
-            pruned * tolerance,
+            "no offset of it above a hundredth of a milliradian reduces the errors",
         )
         for curve in curves
         if not curve.changed and curve.motor in problem.space.motors

@@ -1,4 +1,4 @@
-"""The search for offsets: Gauss-Newton on adaptive knots, with pruning of small offsets."""
+"""The search for offsets: Gauss-Newton on adaptive knots."""
 
 from __future__ import annotations
 
@@ -13,15 +13,7 @@ from calmotion.model.run import RunSettings
 from calmotion.model.tolerance import goal_of
 from calmotion.retargeting.checkpoint import Checkpoint, StoredPoint
 from calmotion.retargeting.feasible_start import on_sufficient_knots, onto_limits, with_moving_end, with_possible_limits
-from calmotion.retargeting.left_out import (
-    FINER,
-    PRUNED,
-    block_energies,
-    first_change,
-    idle_gain,
-    idle_motors,
-    negligible_coefficients,
-)
+from calmotion.retargeting.left_out import FINER, first_change, idle_gain, idle_motors
 from calmotion.retargeting.problem.adaptive_knots import converted, refined_breaks
 from calmotion.retargeting.problem.linear_problem import LinearProblem
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
@@ -112,9 +104,7 @@ class RetargetSearch:
             self._descend(fixed)
             if len(idle_motors(self.character)):
                 self._estimate_idle_gain()
-            fixed = self.hold()
-            self.progress(0.9, "removing negligible offsets")
-            self._prune(fixed)
+                self.hold()
         except KeyboardInterrupt:
             interrupts.answer()
             self.interrupted = True
@@ -258,27 +248,6 @@ class RetargetSearch:
         at = self.problem.at(self.search.x, self.search.at)
         self.search = replace(self.search, evaluations=evaluations, gradients=gradients, at=at)
         return at, at.linearized()
-
-    def _prune(self, fixed: BoolArray) -> None:
-        """Set negligible offsets to zero; keep all if that costs too much."""
-        problem, search, motors = self.problem, self.search, len(self.problem.space.motors)
-        at = problem.at(search.x, search.at)
-        budget = at.merit_of_gain(PRUNED * self._least)
-        energy = block_energies(search.x, motors, at.linearized().product(search.x))
-        dropped = negligible_coefficients(search.x, motors, energy, budget) & ~fixed
-        if not np.any(search.x[dropped]):
-            return
-        fixed = fixed | dropped
-        begin = replace(search, x=np.where(fixed, 0.0, search.x), reason="", radius=np.inf)
-        pruned = minimize(problem, begin, fixed, Ends(self._least, self.options.max_iterations + 3))
-        limits = pruned.at.problem.limits
-        kept = (limits is None or limits.kept(pruned.at.limited)) and self._reached(at) <= self._reached(pruned.at)
-        if kept and pruned.at.merit <= at.merit + 2.0 * budget:
-            self.search, self.problem = replace(pruned, reason=search.reason), pruned.at.problem
-        else:
-            self.search = replace(
-                search, evaluations=pruned.evaluations, gradients=pruned.gradients, products=pruned.products
-            )
 
 
 def _restarted(search: Search, x: Array) -> Search:

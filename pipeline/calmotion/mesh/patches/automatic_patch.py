@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from calmotion.arrays import Array, Indices, IntArray
+from calmotion.arrays import Array, Indices, IntArray, box_diagonal
 from calmotion.mesh.patches.sphere_cut import just_reached
 from calmotion.mesh.quadratic import QuadraticMesh
 from calmotion.mesh.surfaces.distances import closest_on_triangles, meets_plane, ray_length, triangle_parts
@@ -53,7 +53,7 @@ def end_face(mesh: Skin, center: Array, triangles: Array, closest: Array, gaps: 
         room: Distance to the next attachment frame [m].
     """
     none = np.zeros(0, dtype=np.int32)
-    size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    size = box_diagonal(mesh.nodes)
     nearest = int(gaps.argmin())
     if gaps[nearest] > _FLAT_OFFSET * size:
         return _end_ring(mesh, center, triangles, size, room)
@@ -110,7 +110,7 @@ def automatic_radius(center: Array, triangles: Array, closest: Array, gaps: Arra
         room: Distance to the next attachment frame [m].
     """
     gap = float(gaps.min())
-    size = float(np.linalg.norm(np.ptp(triangles.reshape(-1, 3), axis=0)))
+    size = box_diagonal(triangles)
     # A ray may just hit or just miss an edge: the median of several places does not depend on one ray.
     widths = [_width_at(closest, gaps, triangles, size)]
     for step in _ASIDE * size * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0):
@@ -131,7 +131,7 @@ def least_radius(triangles: Array) -> float:
     Args:
         triangles: Surface [m], shape [k, 3, 3], outward.
     """
-    size = float(np.linalg.norm(np.ptp(triangles.reshape(-1, 3), axis=0)))
+    size = box_diagonal(triangles)
     return min(_LEAST_RADIUS * radius_alike(triangles), _LEAST_PART * size)
 
 

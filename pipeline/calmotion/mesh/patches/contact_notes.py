@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from calmotion.arrays import Array
+from calmotion.arrays import Array, box_diagonal
 from calmotion.mesh.patches.contact_place import contact_place
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, at_one_place
 from calmotion.mesh.patches.joint_places import SAME, nearest_apart
@@ -54,7 +54,7 @@ def contact_notes(character: Character, meshes: FEMeshes) -> Iterator[str]:
 def _shared(body: Body, frames: list[AttachmentFrame], triangles: Array) -> Iterator[str]:
     """Messages about joints that hold one part of the surface, though their frames have different positions."""
     assert body.flexible is not None
-    same = SAME * float(np.linalg.norm(np.ptp(triangles.reshape(-1, 3), axis=0)))
+    same = SAME * box_diagonal(triangles)
     for group in at_one_place(frames, nearest_apart(triangles, body.flexible.interface_radius)):
         at = [frames[k].frame.position for k in group]
         far = max(float(np.linalg.norm(position - at[0])) for position in at)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.arrays import Array, BoolArray
+from calmotion.arrays import Array, BoolArray, box_diagonal
 from calmotion.mesh.surfaces.distances import closest_on_triangles, triangle_parts
 
 LARGEST_GAP = 0.5  # of the size of a body, between its surface and a frame inside its convex hull that touches it
@@ -47,7 +47,7 @@ def contact_place(center: Array, axis: Array, triangles: Array, points: Array) -
         triangles: Surface [m], shape [k, 3, 3], outward.
         points: Whose convex hull is that of the body [m], shape [n, 3].
     """
-    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    size = box_diagonal(points)
     closest = closest_on_triangles(center, triangles)
     gaps = np.linalg.norm(closest - center, axis=1)
     gap = float(gaps.min())

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calmotion.arrays import Array, IntArray
+from calmotion.arrays import Array, IntArray, box_diagonal
 from calmotion.errors import ShotError
 from calmotion.mesh.patches.automatic_patch import (
     ROOM,
@@ -101,7 +101,7 @@ def interface_patches(
         ShotError: A patch carries no moment, two named patches overlap, or patches of a given radius hold all of the
             surface.
     """
-    size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    size = box_diagonal(mesh.nodes)
     if radius >= size:
         raise _nothing_left(body, radius, size)
     skin = meshed or mesh
@@ -271,7 +271,7 @@ def _patch(
     mesh: QuadraticMesh, candidates: IntArray, free: IntArray, place: Place, path: str, group: list[int],
     radius: float, body: str,
 ) -> InterfacePatch:  # fmt: skip
-    size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    size = box_diagonal(mesh.nodes)
     center, triangles = place.center, mesh.nodes[mesh.surface[:, :3]]
     closest = closest_on_triangles(center, triangles)
     gaps = np.linalg.norm(closest - center, axis=1)

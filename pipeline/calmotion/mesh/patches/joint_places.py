@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calmotion.arrays import Array, BoolArray
+from calmotion.arrays import Array, BoolArray, box_diagonal
 from calmotion.mesh.patches.automatic_patch import ROOM, least_radius
 from calmotion.model.meshes import CutPatch
 
@@ -27,7 +27,7 @@ def nearest_apart(triangles: Array, radius: float) -> float:
         triangles: Surface [m], shape [k, 3, 3], outward.
         radius: Of the patches [m]; one that is given (not negative) is meant for each of the frames.
     """
-    same = SAME * float(np.linalg.norm(np.ptp(triangles.reshape(-1, 3), axis=0)))
+    same = SAME * box_diagonal(triangles)
     return same if radius >= 0.0 else max(same, least_radius(triangles) / ROOM)
 
 

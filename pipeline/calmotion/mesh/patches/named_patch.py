@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.arrays import Array, IntArray
+from calmotion.arrays import Array, IntArray, box_diagonal
 from calmotion.mesh.quadratic import QuadraticMesh
 from calmotion.mesh.surfaces.distances import closest_on_triangles
 from calmotion.mesh.surfaces.nearby_triangles import unit_normals
@@ -22,7 +22,7 @@ def named_patch(mesh: QuadraticMesh, triangles: Array) -> IntArray:
     Args:
         triangles: Corners [m], shape [k, 3, 3], body frame, outward.
     """
-    distance = _DISTANCE * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    distance = _DISTANCE * box_diagonal(mesh.nodes)
     normals, _ = unit_normals(triangles)
     of_mesh, _ = unit_normals(mesh.nodes[mesh.surface[:, :3]])
     low, high = triangles.min(axis=(0, 1)) - distance, triangles.max(axis=(0, 1)) + distance

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.arrays import Array
+from calmotion.arrays import Array, box_diagonal
 from calmotion.mesh.patches.automatic_patch import Skin
 from calmotion.mesh.surfaces.distances import ray_length, triangle_parts
 from calmotion.mesh.tetrahedra import part_of_each
@@ -35,7 +35,7 @@ def seat_radius(center: Array, axis: Array, triangles: Array) -> float | None:
         axis: Of the joint, unit vector, shape [3].
         triangles: Surface [m], shape [k, 3, 3], outward.
     """
-    size = float(np.linalg.norm(np.ptp(triangles.reshape(-1, 3), axis=0)))
+    size = box_diagonal(triangles)
     away = triangles - center
     level = np.abs(away @ axis).max(axis=1) <= _LEVEL * size
     flat = away[level & (np.linalg.norm(away, axis=2).min(axis=1) <= 2.0 * _LARGEST * size)]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.arrays import box_diagonal
 from calmotion.errors import ShotError
 from calmotion.mesh.repair.closing import REMEDY, Part, closed_parts, concatenated, connected_pieces
 from calmotion.mesh.repair.uniting import NotManifold, united, without_detail
@@ -64,10 +65,7 @@ def closed_solid(surfaces: Sequence[SurfaceMesh], body: str, any_hole: bool = Fa
         raise ShotError("its surfaces enclose no volume", path=body, found="no triangles", remedy=REMEDY)
     # centered and scaled to size one: tolerances do not depend on the unit or the position
     all_points = np.vstack([surface.points[surface.triangles.ravel()] for surface in kept])
-    center, scale = (
-        0.5 * (all_points.min(axis=0) + all_points.max(axis=0)),
-        float(np.linalg.norm(np.ptp(all_points, axis=0))),
-    )
+    center, scale = 0.5 * (all_points.min(axis=0) + all_points.max(axis=0)), box_diagonal(all_points)
     if not scale > 0.0:
         raise ShotError("its surfaces enclose no volume", path=body, found="all points coincide", remedy=REMEDY)
     # links of one shape have one mesh, in whatever order a file has their parts and with whatever rounding it has them

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from calmotion.arrays import box_diagonal
 from calmotion.errors import ShotError
 from calmotion.mesh.repair.junctions import split_at_junctions
 from calmotion.mesh.sources.caps import capped
@@ -132,7 +133,7 @@ def _is_flat(part: Part) -> bool:
 
 def _best_welded(points: np.ndarray, triangles: np.ndarray, path: str, repairs: list[str]) -> _Welded:
     """Welded with the least tolerance that closes the surface, or else with the fewest open edges."""
-    diagonal = float(np.linalg.norm(np.ptp(points[triangles.ravel()], axis=0)))
+    diagonal = box_diagonal(points[triangles.ravel()])
     best, fewest = None, np.inf
     for tolerance in _WELDS:
         welded = _welded(points, triangles, tolerance * diagonal)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.arrays import box_diagonal
 from calmotion.mesh.repair.closing import Part, connected_pieces
 from calmotion.mesh.repair.uniting import manifold_of, part_of
 from calmotion.mesh.sources.sampling import sampled
@@ -78,7 +79,7 @@ def strutted(solids: Sequence[Part]) -> tuple[Part, float]:
         i = int(gaps.argmin())
         widest = max(widest, float(gaps[i]))
         ends = [i]
-        far = np.linalg.norm(places[k] - places[k][i], axis=1) > _APART * _extent(places[k])
+        far = np.linalg.norm(places[k] - places[k][i], axis=1) > _APART * box_diagonal(places[k])
         if far.any() and gaps[far].min() < _REACH:
             ends.append(int(np.flatnonzero(far)[gaps[far].argmin()]))
         for end in ends:
@@ -105,10 +106,6 @@ def _strut(near: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], gap: float
         inside = np.linalg.norm(points - center, axis=1) <= radius
         corners += [points[inside], points[inside] - (_SINK * gap + 1e-4) * outward[inside]]
     return manifold3d.Manifold.hull_points(np.ascontiguousarray(np.vstack(corners)))
-
-
-def _extent(points: np.ndarray) -> float:
-    return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def _solids(part: Part) -> list[Part]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calmotion.arrays import Array, Indices
+from calmotion.arrays import Array, Indices, box_diagonal
 from calmotion.mesh.surfaces.congruence import Isometry, isometries
 from calmotion.model import Body, FEMesh, FlexibleSettings, Frame
 from calmotion.model.meshes import CutPatch
@@ -51,7 +51,7 @@ def twin_of(link: Link | None, others: Sequence[Link | None]) -> tuple[int, Isom
             continue
         if _settings(link) != _settings(other) or len(link.frames) != len(other.frames):
             continue
-        size = float(np.linalg.norm(np.ptp(link.points, axis=0)))
+        size = box_diagonal(link.points)
         for isometry in isometries(other.points, other.triangles, link.points, link.triangles):
             if _joints_match(isometry, other, link, size):
                 return index, isometry

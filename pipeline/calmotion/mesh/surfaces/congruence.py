@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from calmotion.arrays import Array, Indices
+from calmotion.arrays import Array, Indices, box_diagonal
 from calmotion.mesh.tetrahedra import surface_area, surface_volume
 
 # Surfaces that are alike, whatever their triangles: largest relative difference of areas, volumes and moments; and
@@ -54,7 +54,7 @@ def isometries(points: Array, triangles: Indices, other: Array, others: Indices)
         triangles: Shape [m, 3].
         other, others: The other surface; it may have other points and triangles.
     """
-    size = _size(points)
+    size = box_diagonal(points)
     for isometry in _candidates(points, triangles, other, others):
         moved, most = isometry(points), _FAR * size
         apart = [
@@ -81,13 +81,9 @@ def _distances(places: Array, points: Array, triangles: Indices, reach: float) -
     return np.where(np.isnan(far), np.inf, far)
 
 
-def _size(points: Array) -> float:
-    return float(np.linalg.norm(np.ptp(points, axis=0)))
-
-
 def _candidates(points: Array, triangles: Indices, other: Array, others: Indices) -> list[Isometry]:
     """What may be isometries by areas, volumes and principal moments."""
-    size = _size(points)
+    size = box_diagonal(points)
     if not np.isclose(surface_area(points, triangles), surface_area(other, others), rtol=_ALIKE, atol=0.0):
         return []
     (center, moments, axes), (end, last, ends) = _principal(points, triangles), _principal(other, others)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.arrays import box_diagonal
 from calmotion.errors import ShotError
 from calmotion.mesh.element_sizes import Shape, envelope, expected_nodes, smallest_size
 from calmotion.mesh.repair.closed_solid import Solid, simplified
@@ -129,7 +130,7 @@ def _attempt(solid: Solid, shape: Shape, size: float, factors: tuple[float, floa
         solid, shape, size, factors: As of `_in_time`.
         coarser: Factor of the size and the distance, and of one over the number of triangles.
     """
-    diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    diagonal = box_diagonal(solid.points)
     closer, longer = factors
     narrow = coarser * closer * envelope(size, diagonal, shape, len(solid.triangles) if coarser == 1.0 else DENSE)
     points, triangles = simplified(solid, _DETAIL * narrow)
@@ -168,7 +169,7 @@ def _meshed(
     """Tetrahedra that take no more than a share of what is left of the time."""
     part = time.part(share)
     # fTetWild measures distances by the diagonal of what it is given
-    diagonal = float(np.linalg.norm(np.ptp(attempt.points, axis=0)))
+    diagonal = box_diagonal(attempt.points)
     try:
         made, tets = tetrahedralize(
             attempt.points, attempt.triangles, attempt.size, attempt.distance / diagonal, path, part, use_cache

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.arrays import Array, BoolArray, IntArray
+from calmotion.arrays import Array, BoolArray, IntArray, box_diagonal
 from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.model.character import FlexibleSettings
 from calmotion.reduction.basis.fixed_interface import FixedInterface, frequency_limit, mode_signs, ritz_modes
@@ -167,7 +167,7 @@ def _chosen(fixed: FixedInterface, outputs: _Outputs, settings: FlexibleSettings
     columns, U, units = _candidates(fixed, outputs, limit)
     static = outputs.at_peaks(units)
     if not outputs.load_envelope.directed:
-        used, size = _used(outputs), float(np.linalg.norm(np.ptp(fixed.model.mesh.nodes, axis=0)))
+        used, size = _used(outputs), box_diagonal(fixed.model.mesh.nodes)
         angle = largest_displacement(static.response) / size
         outputs = replace(outputs, load_envelope=load_direction_envelope(outputs.load_envelope, angle, size))
         if not np.array_equal(used, _used(outputs)):  # else the same vectors, whatever the sizes of their loads

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.arrays import Array
+from calmotion.arrays import Array, box_diagonal
 from calmotion.errors import ShotError
 from calmotion.model.character import ElasticMaterial
 from calmotion.reduction.basis.craig_bampton import Basis
@@ -50,7 +50,7 @@ def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial)
     lame, mu = lame_constants(material.youngs_modulus, material.poissons_ratio)
     rule = GradientRule(model.mesh, LAW_ORDER)
     gram = strain_gram(rule, basis.modes, lame, mu)
-    poses = equilibrium_poses(gram, basis, POSES, float(np.linalg.norm(np.ptp(model.mesh.nodes, axis=0))))
+    poses = equilibrium_poses(gram, basis, POSES, box_diagonal(model.mesh.nodes))
     candidates, columns, target = _training(rule, basis, poses, lame, mu)
     chosen, weights, error = greedy_cubature(columns, target, ERROR, _MOST)
     if error > 10.0 * ERROR:

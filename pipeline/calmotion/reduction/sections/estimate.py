@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.arrays import Array, Indices
+from calmotion.arrays import Array, Indices, box_diagonal
 from calmotion.errors import ShotError
 from calmotion.mesh.mass import joined_surfaces
 from calmotion.mesh.mesh_file import read_mesh_file
@@ -115,7 +115,7 @@ def _surfaces(body: Body) -> list[tuple[Array, Indices]]:
 
 def _welded(points: Array, triangles: Indices) -> tuple[Array, Indices]:
     """A surface whose triangles share their corners, which tells what is one part."""
-    size = float(np.linalg.norm(np.ptp(points[triangles.ravel()], axis=0)))
+    size = box_diagonal(points[triangles.ravel()])
     if not size > 0.0:
         return points, triangles
     places = np.round((points - points[triangles.ravel()].min(axis=0)) / (_WELD * size)).astype(np.int64)

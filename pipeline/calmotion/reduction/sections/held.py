@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.arrays import Array, BoolArray, Indices
+from calmotion.arrays import Array, BoolArray, Indices, box_diagonal
 from calmotion.mesh.patches.automatic_patch import least_radius
 from calmotion.mesh.patches.contact_place import contact_place
 from calmotion.mesh.patches.interface_patches import LEAST, AttachmentFrame, Place, carries
@@ -46,7 +46,7 @@ def held_cells(
         found = cells.outside & np.isfinite(near.closest(cells.places)[:, 0])
         if found.any():
             return np.asarray(found)
-    size = float(np.linalg.norm(np.ptp(measured.reshape(-1, 3), axis=0)))
+    size = box_diagonal(measured)
     if radius >= 0.0:
         return _within(cells, frame.position, radius)
     place = contact_place(frame.position, frame.axis, measured, measured.reshape(-1, 3))

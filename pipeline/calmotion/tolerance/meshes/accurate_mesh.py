@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import box_diagonal
 from calmotion.errors import ShotError
 from calmotion.mesh.element_sizes import envelope
 from calmotion.mesh.mass import balance_note, density_note, mass_of_tets
@@ -76,7 +77,7 @@ def shaped_to(
     from calmotion.mesh.mesh_shaping import Surface, shaped
 
     solid, shape = volume.solid, volume.shape
-    diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    diagonal = box_diagonal(solid.points)
     limit = _FIT * envelope(size, diagonal, shape, len(solid.triangles))
     return shaped(mesh, body, Surface(solid.points, solid.triangles, solid.volume, limit), attachments)
 

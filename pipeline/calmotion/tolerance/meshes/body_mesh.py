@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.arrays import box_diagonal
 from calmotion.errors import ShotError
 from calmotion.mesh.element_sizes import MAX_NODES, element_size, shape_of
 from calmotion.mesh.mass import mass_of_solid
@@ -140,12 +141,12 @@ def _refuse_far(mesh: FEMesh, body: Body, frames: Sequence[Frame]) -> None:
     Raises:
         ShotError: It does.
     """
-    extent = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    size = box_diagonal(mesh.points)
     away = min((float(np.linalg.norm(mesh.points - f.position, axis=1).min()) for f in frames), default=0.0)
-    if away > FAR * extent:
+    if away > FAR * size:
         raise ShotError(
             "the mesh of this body lies far from all of its joints", path=body.path,
-            found=f"{away:.3g} m from the nearest one, {away / extent:.3g} times its size",
+            found=f"{away:.3g} m from the nearest one, {away / size:.3g} times its size",
             remedy="Correct the transform, the unit or the points of the mesh, or the positions of the joints.",
         )  # fmt: skip
 
