@@ -11,7 +11,6 @@ from calmotion.views.playback import sample_motion as sample_motion
 from calmotion.views.raster import rasterize as rasterize
 from calmotion.views.raster import split_at_creases as split_at_creases
 from calmotion.views.rendering import Camera as Camera
-from calmotion.views.rendering import Mask as Mask
 from calmotion.views.rendering import Model as Model
 from calmotion.views.rendering import Seen as Seen
 from calmotion.views.rendering import View as View

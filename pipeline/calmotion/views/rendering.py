@@ -18,7 +18,6 @@ from calmotion.views.raster import Hits, rasterize, split_at_creases
 from calmotion.views.viewpoint import Viewpoint
 
 Pixels = NDArray[np.uint8]  # sRGB, shape [height, width, 3]
-Mask = NDArray[np.bool_]
 DEFAULT_COLOR = (0.55, 0.55, 0.57)
 
 

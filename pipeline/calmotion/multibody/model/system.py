@@ -261,15 +261,12 @@ def allocate_state(system: System) -> State:
     )
 
 
-def allocate_blocks(system: System, instants: int | None = None) -> Blocks:
-    """Zeroed blocks, for one instant or with a leading axis of that many instants."""
-    count, size = len(system.parent), system.size
-    lead = () if instants is None else (instants,)
-
-    joints = len(system.rows)
+def allocate_blocks(system: System) -> Blocks:
+    """Zeroed blocks."""
+    count, size, joints = len(system.parent), system.size, len(system.rows)
 
     def zeros(*shape: int) -> Array:
-        return np.zeros(lead + shape)
+        return np.zeros(shape)
 
     square, wide, tall = (count, size, size), (joints, JOINT_ROWS, size), (joints, size, JOINT_ROWS)
     row = (joints, JOINT_ROWS)
