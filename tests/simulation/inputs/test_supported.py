@@ -2,9 +2,15 @@
 
 import numpy as np
 import pytest
-from calmotion.errors import IntegrationError
-from calmotion.simulation.inputs.supported import refuse_fast_motors, refuse_half_turns
+from calmotion.errors import IntegrationError, ShotError
+from calmotion.model.run import RunSettings
+from calmotion.simulation.inputs.supported import refuse_fast_motors, refuse_half_turns, refuse_unsupported
 from calmotion.simulation.inputs.time_grid import make_grid
+
+
+def test_an_integrator_that_is_not_there_is_refused(arm, animation):
+    with pytest.raises(ShotError, match="no such integrator"):
+        refuse_unsupported(arm, animation, RunSettings(integrator="rk5"))
 
 
 def test_half_a_turn_within_a_step_is_refused_where_it_begins(arm):
