@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calmotion.arrays import Array
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.analysis.kinematics import (
     of_components,
     of_targets,
@@ -84,6 +84,7 @@ def simulate(model: Model, values: Array, rates: Array, step: float, integrator:
 def from_rest(
     model: Model, joint_values: Array, joint_rates: Array, step: float, workspace: Workspace, integrator: str = "bdf2",
     world: Array | None = None, progress: Callable[[float], None] | None = None, divides: bool = True,
+    divided: IntArray | None = None,
 ) -> Trajectory:  # fmt: skip
     """The states of a model from its static equilibrium.
 
@@ -95,11 +96,12 @@ def from_rest(
         world: Moving roots, shape [T, W, 18], or None.
         progress: Called with the fraction that is done.
         divides: Whether a step that Newton's method cannot solve is divided into smaller ones.
+        divided: Into how many parts each step is divided: see `integrators.simulation.simulate`.
     """
     start = rigid_state(model, start_angles(model, joint_values[0]), None if world is None else world[0])
     return integrate(
         model.system, start, joint_values, joint_rates, step, workspace, progress, integrator=integrator, world=world,
-        divides=divides,
+        divides=divides, divided=divided,
     )  # fmt: skip
 
 

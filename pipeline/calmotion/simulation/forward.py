@@ -44,8 +44,8 @@ def reactions_at(model: Model, run: ForwardRun, instants: IntArray | slice) -> R
 def run_forward(
     model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, world: Array | None = None,
     progress: Callable[[float], None] | None = None, integrator: str = "bdf2", steady: SteadyState | None = None,
-    divides: bool = True,
-) -> ForwardRun:  # fmt: skip
+    divides: bool = True, divided: IntArray | None = None,
+) -> ForwardRun:  # fmt: skip  # parameters: a model, its inputs, how it is stepped
     """Simulate motor curves, from rest or in a loop.
 
     Args:
@@ -55,12 +55,15 @@ def run_forward(
         integrator: One of `calmotion.model.run.INTEGRATORS`.
         steady: Finds the motions of a shot that loops.
         divides: Whether a step that cannot be solved is divided into smaller ones, where the shot does not loop.
+        divided: Into how many parts each step is, shape [T], 0: as the friction of servos needs it; None: into none.
     """
     joint_angles, joint_rates = followed(model, angles, rates, h, steady is not None)
     if steady is not None:
         trajectory = steady.find(joint_angles, joint_rates)
     else:
-        trajectory = from_rest(model, joint_angles, joint_rates, h, workspace, integrator, world, progress, divides)
+        trajectory = from_rest(
+            model, joint_angles, joint_rates, h, workspace, integrator, world, progress, divides, divided
+        )
     frames, multiplier = frames_in(model, trajectory), 0.0 if steady is None else steady.floquet_multiplier
     return ForwardRun(trajectory, joint_angles, joint_rates, *frames, angles, multiplier)
 

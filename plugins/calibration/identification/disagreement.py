@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 PIECES = 4  # of each shot
 MISSED, TOGETHER = 1.5, 3.0  # residuals over the noise, and samples that count as one: the model misses something
 DISAGREES = 1.5  # times as wide as noise makes it: pieces of the recordings tell other values
-TURNS, SETTLED = 4, 0.1  # of variances and estimates, and the change of these at which they end, in priors
+TURNS, SETTLED = 8, 0.05  # of variances and estimates, and the change of these at which they end, in priors
 
 
 def misses(sensor: Sensor, rms: float) -> float:

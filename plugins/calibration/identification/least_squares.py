@@ -16,14 +16,16 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from calmotion.arrays import Array
+from calmotion.arrays import Array, BoolArray
 from calmotion.support import answer
 
 HUBER = 3.0  # standard deviations: few residuals of a normal distribution are larger
 ENOUGH = 1e-2  # change of z, in standard deviations of its posterior, at which a search ends
 MOST = 30  # iterations
 RISEN = 1.0  # loss that a step by another minimum's derivatives may add: less than a standard deviation or two
-FIRST, LARGEST = 1e-3, 1e8  # damping, relative to the diagonal of the Gauss-Newton matrix
+FIRST = 1e-3  # damping, relative to the diagonal of the Gauss-Newton matrix
+STALLED = 0.1  # of the change at which a search ends: a damped step that is shorter tells that no step lowers the loss
+NEARLY = 0.1  # change that is left, in standard deviations, with which such a search has converged all the same
 
 
 class Problem(Protocol):
@@ -112,16 +114,17 @@ def _minimized(
         H = J.T @ (w[:, None] * J) + np.eye(len(z))
         gradient = J.T @ (w * r) + z
         free = ~((z <= lower) & (gradient > 0.0))
-        small = not np.any(free)
-        while not small:
-            step = np.zeros_like(z)
-            own = H[np.ix_(free, free)]
-            step[free] = -np.linalg.solve(own + damping * np.diag(np.diag(own)), gradient[free])
-            then = np.maximum(z + step, lower)
-            taken = then - z
-            small = float(np.sqrt(taken @ H @ taken)) < enough
-            if small:
-                break
+        own = H[np.ix_(free, free)]
+        left = _size(_step(own, gradient, free, z, lower, 0.0), H)  # to the minimum, by this derivative
+        known[:] = [replace(known[-1], converged=left < enough)]
+        if left < enough:
+            return known[-1]
+        while True:
+            taken = _step(own, gradient, free, z, lower, damping)
+            then = z + taken
+            if _size(taken, H) < STALLED * enough:
+                # shorter and shorter steps add to the loss: its derivative is another one close by
+                return replace(known[-1], converged=left < NEARLY)
             tried = problem.residuals(then)
             after = np.inf if tried is None else loss_of(tried, counts) + 0.5 * float(then @ then)
             if after <= cost:
@@ -131,12 +134,20 @@ def _minimized(
                 z = then
                 break
             damping *= 10.0  # not back to the first: along a narrow bent valley steps need little of it
-            if damping > LARGEST:
-                return known[-1]
-        if small:
-            return replace(known[-1], converged=True)
     r, J = problem.linearized(z)
     return Solution(z, r, J, loss_of(r, counts) + 0.5 * float(z @ z), most, False)
+
+
+def _step(H: Array, gradient: Array, free: BoolArray, z: Array, lower: Array, damping: float) -> Array:
+    """A step to the minimum from z, within the bounds, by the Gauss-Newton matrix of the free entries."""
+    step = np.zeros_like(z)
+    step[free] = -np.linalg.solve(H + damping * np.diag(np.diag(H)), gradient[free])
+    return np.maximum(z + step, lower) - z
+
+
+def _size(step: Array, H: Array) -> float:
+    """In standard deviations of the posterior."""
+    return float(np.sqrt(step @ H @ step))
 
 
 def chord(problem: Problem, known: Solution, most: int = 8) -> Solution | None:

@@ -150,13 +150,19 @@ class Calibrated:
 
     def _differences(self, x: Array, here: Motions) -> Differences:
         points = [x + unit for unit in DIFFERENCE * np.eye(len(self.parameters))]
-        return Differences(x.copy(), here, tuple(in_parallel(self._simulated, points)))
+        # with the same steps: else these jump a little, and the differences a lot
+        return Differences(x.copy(), here, tuple(in_parallel(lambda ahead: self._simulated(ahead, here), points)))
 
-    def _simulated(self, x: Array) -> Motions:
-        return self.simulated(x, [take.shot for take in self.takes])
+    def _simulated(self, x: Array, like: Motions | None = None) -> Motions:
+        return self.simulated(x, [take.shot for take in self.takes], like)
 
-    def simulated(self, x: Array, shots: Sequence[CompiledShot]) -> Motions:
+    def simulated(self, x: Array, shots: Sequence[CompiledShot], like: Motions | None = None) -> Motions:
         """Signals of the robot at x in shots that stand for those of the takes.
+
+        Args:
+            x: In standard deviations of the priors, shape [n].
+            shots: The shots.
+            like: Signals from which these hardly differ, whose steps they have.
 
         Raises:
             ShotError: It cannot be simulated.
@@ -170,7 +176,8 @@ class Calibrated:
                 continue
             self.simulations += 1
             self.tell()
-            found.append(signals_of(robot, self.options, take.after, take.start, take.begin))
+            divided = None if like is None else like[k].divided
+            found.append(signals_of(robot, self.options, take.after, take.start, take.begin, divided))
         return found
 
 

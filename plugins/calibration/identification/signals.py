@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from calmotion.arrays import Array
+from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
 from calmotion.model import PRESCRIBED, Animation, Character, Rotor, RunSettings, curve_of, rotor_angles
 from calmotion.multibody import (
@@ -52,6 +52,7 @@ class Signals:
         gravity: [m/s^2], world, shape [3].
         offsets: Of the motors' encoders [rad or m], shape [M].
         modes: Frequencies [Hz] and damping ratios of the lowest natural modes where it begins, shape [2, n].
+        divided: Parts into which steps of the simulation were divided, shape [T].
     """
 
     times: Array
@@ -63,6 +64,7 @@ class Signals:
     gravity: Array
     offsets: Array
     modes: Array = field(default_factory=lambda: np.zeros((2, 0)))
+    divided: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
     _splines: dict[object, CubicSpline] = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -151,9 +153,12 @@ def place_of(channel: Channel, character: Character) -> Place | None:
 
 
 def signals_of(
-    robot: Robot, options: RunSettings, after: float = 0.0, start: Array | None = None, begin: float = 0.0
-) -> Signals:
+    robot: Robot, options: RunSettings, after: float = 0.0, start: Array | None = None, begin: float = 0.0,
+    divided: IntArray | None = None,
+) -> Signals:  # fmt: skip
     """Simulate a robot in its shot, and for some time after its end [s], in which the motors hold.
+
+    Steps in which the friction of a servo turns are divided: without that, signals jump as parameters change.
 
     Args:
         robot: The robot.
@@ -161,6 +166,7 @@ def signals_of(
         after: [s].
         start: Where the joints of the motors stand up to a time [rad or m], shape [M], NaN where their commands say it.
         begin: That time [s].
+        divided: Parts into which steps are divided: those of signals that hardly differ; None: as needed.
 
     Raises:
         ShotError: The shot cannot be simulated.
@@ -172,7 +178,10 @@ def signals_of(
     workspace = Workspace.for_system(model.system)
     if start is not None:
         angles = _begun(robot, prepared, workspace, angles, start, begin)
-    run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, integrator=options.scheme)
+    divided = np.zeros(len(angles), np.int64) if divided is None else divided
+    run = run_forward(
+        model, workspace, angles, rates, grid.h, prepared.world, integrator=options.scheme, divided=divided
+    )
     return with_rotors(_measured(robot, prepared, run), robot)
 
 
@@ -190,7 +199,7 @@ def _measured(robot: Robot, prepared: Prepared, run: ForwardRun) -> Signals:
     return Signals(
         prepared.grid.times, run.target_positions, rotation_from_quaternion(rotations),
         model.motor_values(values), loads, loads, np.asarray(character.gravity, float),
-        robot.offsets, _modes(model, run.commands[0]),
+        robot.offsets, _modes(model, run.commands[0]), run.trajectory.divided,
     )  # fmt: skip
 
 

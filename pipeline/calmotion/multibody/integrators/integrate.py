@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from calmotion.arrays import Array
+from calmotion.arrays import Array, IntArray
 from calmotion.errors import IntegrationError
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators import runge_kutta
@@ -36,7 +36,7 @@ def follows_roots(integrator: str) -> bool:
 def integrate(
     system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace,
     progress: Callable[[float], None] | None = None, from_equilibrium: bool = True, integrator: str = "bdf2",
-    world: Array | None = None, divides: bool = True,
+    world: Array | None = None, divides: bool = True, divided: IntArray | None = None,
 ) -> Trajectory:  # fmt: skip  # parameters: those of `simulate`
     """`simulation.simulate` by any integrator of `INTEGRATORS`; same arguments, results and errors.
 
@@ -64,8 +64,9 @@ def integrate(
     if integrator in IMPLICIT:
         try:
             return simulate(
-                system, start, angles, rates, h, workspace, progress, from_equilibrium, integrator, world, divides
-            )
+                system, start, angles, rates, h, workspace, progress, from_equilibrium, integrator, world, divides,
+                divided,
+            )  # fmt: skip
         except ZeroDivisionError:  # of a kernel, whose numbers have left all bounds: it does not tell where
             raise SimulationFailure(float("nan"), 0, Reason.DIVERGED) from None
     if np.any(system.moving >= 0):

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from calmotion.arrays import Array
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.failure import NOWHERE, Reason, SimulationFailure
 from calmotion.multibody.integrators import bdf2, newton
 from calmotion.multibody.integrators.coefficients import IMPLICIT, MISSED, remember_missed
-from calmotion.multibody.integrators.refinement import refined_step
+from calmotion.multibody.integrators.refinement import TURNED, parts_of_turn, refined_step, resolved_step
 from calmotion.multibody.integrators.trajectory import (
     Inputs,
     Record,
@@ -61,10 +61,20 @@ def largest_gap(system: System, inputs: Inputs, states: State, work: Work) -> fl
 
 @kernel
 def _advance(
-    system: System, integrator: Integrator, first: int, last: int, inputs: Inputs, record: Record, ws: Workspace
-) -> tuple[int, int, int]:
-    """Steps first..last-1 of a trajectory, with their margins and costs; returns (code, instant, component)."""
+    system: System, integrator: Integrator, first: int, last: int, inputs: Inputs, record: Record, ws: Workspace,
+    divided: IntArray, kept: Array,
+) -> tuple[int, int, int]:  # fmt: skip
+    """Steps first..last-1 of a trajectory, with their margins and costs; returns (code, instant, component).
+
+    Args:
+        divided: As of `simulate`, and filled; shape [0] where no step is divided as friction turns.
+        kept: Becomes the memory before the last step, shape [4, B, N]. After a step that is to be divided, the code is
+            `TURNED`.
+    """
     for n in range(first, last):
+        if len(divided) > 0:
+            for row in range(len(kept)):
+                copy_rows(ws.scratch.memory[row], kept[row])
         angle, rate = inputs.angles[n], inputs.rates[n]
         instants = instants_of(record.earlier, record.states, n)
         copy_rows(inputs.world[n], ws.work.world)
@@ -75,6 +85,11 @@ def _advance(
             return code, n, component
         record.margins[n] = ws.scratch.border.margin[0]
         record.costs[n, 2] = _largest_gap(system, angle, rate, instants.now, ws.work)
+        if len(divided) > 0:
+            if divided[n] == 0:
+                divided[n] = parts_of_turn(system, instants.before, instants.now)
+            if divided[n] > 1:
+                return TURNED, n, -1
     return newton.CONVERGED, last, -1
 
 
@@ -92,7 +107,7 @@ def _recall(system: System, h: float, record: Record, n: int, scratch: Scratch) 
 def simulate(
     system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace,
     progress: Callable[[float], None] | None = None, from_equilibrium: bool = True, integrator: str = "bdf2",
-    world: Array | None = None, divides: bool = True,
+    world: Array | None = None, divides: bool = True, divided: IntArray | None = None,
 ) -> Trajectory:  # fmt: skip  # parameters: a system, its start, its drives, its scheme
     """Simulate the system from static equilibrium, or from a state that is given.
 
@@ -106,6 +121,8 @@ def simulate(
         integrator: A name of `coefficients.IMPLICIT`.
         world: Moving markers of the world, shape [T, W, 18]; needed where the system has any.
         divides: Whether a step that Newton's method cannot solve is divided into smaller ones (`refinement`).
+        divided: Into how many parts each step is divided, shape [T], 0: as the friction of servos needs it; None: into
+            none. A simulation with the parts of another one can be compared with it where they hardly differ.
 
     Returns:
         The trajectory, T instants.
@@ -134,7 +151,7 @@ def simulate(
     margins, costs = np.zeros(total), np.zeros((total, 3))
     costs[0, 0] = solved
     inputs, record = Inputs(angles, rates, world), Record(earlier, states, margins, costs)
-    return march(system, integrator, h, 1, inputs, record, ws, begin, progress, divides=divides)
+    return march(system, integrator, h, 1, inputs, record, ws, begin, progress, divides=divides, divided=divided)
 
 
 def simulate_on(
@@ -196,15 +213,17 @@ def simulate_from(
 def march(
     system: System, integrator: str, h: float, done: int, inputs: Inputs, record: Record, ws: Workspace, begin: float,
     progress: Callable[[float], None] | None = None, refined: Sequence[int] = (), divides: bool = True,
+    divided: IntArray | None = None,
 ) -> Trajectory:  # fmt: skip  # parameters: those of a simulation, and where it is
     """All steps from instant `done` on, into the record, with what the workspace remembers of those before.
 
     Args:
         begin: Time when the simulation was started [s].
         refined: Those before `done`.
-        divides: As of `simulate`.
+        divides, divided: As of `simulate`.
     """
     total, all_refined = len(inputs.angles), list(refined)
+    divided = np.zeros(0, np.int64) if divided is None else divided.copy()
     chunk = total if progress is None else max(1, total // 50)
     for phase in phases_of(system, inputs.world, done, total):
         for first in range(phase.first, phase.last, chunk):
@@ -212,19 +231,29 @@ def march(
             if phase.restarts:
                 _restart(phase._replace(first=first, last=last), h, inputs, record, ws)
             else:
-                _steps(phase._replace(first=first, last=last), integrator, h, inputs, record, ws, all_refined, divides)
+                _steps(
+                    phase._replace(first=first, last=last),
+                    integrator,
+                    h,
+                    inputs,
+                    record,
+                    ws,
+                    all_refined,
+                    divides,
+                    divided,
+                )
             if progress is not None:
                 progress(last / total)
     solved, factorisations = (int(cost) for cost in record.costs[:, :2].sum(axis=0))
     return Trajectory(
         h, record.states, inputs.world, solved, factorisations, float(record.costs[:, 2].max()),
-        time.perf_counter() - begin, integrator, tuple(all_refined), record.margins, record.costs,
+        time.perf_counter() - begin, integrator, tuple(all_refined), record.margins, record.costs, divided,
     )  # fmt: skip
 
 
 def _steps(
     phase: Phase, integrator: str, h: float, inputs: Inputs, record: Record, ws: Workspace, refined: list[int],
-    divides: bool,
+    divides: bool, divided: IntArray,
 ) -> None:  # fmt: skip
     """The steps of a phase, into the record; adds those that were refined.
 
@@ -232,14 +261,20 @@ def _steps(
         SimulationFailure: One that cannot be solved.
     """
     system, coefficients, done = phase.system, IMPLICIT[integrator](h), phase.first
+    kept = ws.scratch.memory.copy()
     while done < phase.last:
         try:
-            code, done, component = _advance(system, coefficients, done, phase.last, inputs, record, ws)
+            code, done, component = _advance(system, coefficients, done, phase.last, inputs, record, ws, divided, kept)
         except ZeroDivisionError:  # of a kernel, whose numbers have left all bounds
             # steps that are done have counted their solutions
             done += int(np.argmin(record.costs[done : phase.last, 0] > 0.0))
             code, component = newton.NOT_CONVERGED, NOWHERE
         if code == newton.CONVERGED:
+            continue
+        if code == TURNED:
+            if resolved_step(system, integrator, h, done, int(divided[done]), inputs, record, kept, ws):
+                refined.append(done)
+            done += 1
             continue
         reason = Reason.SINGULAR if code == newton.SINGULAR else Reason.DIVERGED
         try:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from calmotion.arrays import Array
+from calmotion.arrays import Array, IntArray
 from calmotion.multibody.model.system import Instants, State
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel
@@ -31,6 +31,7 @@ class Trajectory:
             `closed_chains.Border`; zeros where there are none.
         costs: Of each instant: linear systems solved, factorisations, largest position gap of a joint [m]; shape
             [T, 3], empty where they were not counted.
+        divided: Parts into which each step was divided as friction turns, shape [T]; empty where none was.
     """
 
     h: float
@@ -44,6 +45,7 @@ class Trajectory:
     refined: tuple[int, ...] = ()
     margins: Array = field(default_factory=lambda: np.zeros(0))
     costs: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    divided: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
 
 
 @by_reference

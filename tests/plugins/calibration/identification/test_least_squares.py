@@ -116,3 +116,14 @@ def test_a_chord_reaches_a_near_minimum_with_other_derivatives():
     assert chord(Exponential((0.4, 0.6)), known, most=1) is None
     nowhere = Solution(np.array([0.0, 1.0]), np.zeros(200), known.jacobian, 0.0, 1, True)
     assert chord(Exponential((0.3, 0.5), failing=True), nowhere) is nowhere
+
+
+def test_a_search_whose_steps_are_short_because_they_are_damped_has_not_converged():
+    """Derivatives that are wrong leave no step that lowers the loss, and the minimum is far."""
+
+    class Wrong(Linear):
+        def linearized(self, z):
+            return self.residuals(z), -self.A
+
+    found = minimize(Wrong(10.0 * np.eye(2), np.array([30.0, -20.0])), np.zeros(2), FREE)
+    assert not found.converged and np.array_equal(found.z, np.zeros(2))
