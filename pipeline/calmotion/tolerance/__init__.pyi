@@ -6,7 +6,6 @@ from calmotion.tolerance.error_budget import with_budget as with_budget
 from calmotion.tolerance.integrator_choice import by_fast_scheme as by_fast_scheme
 from calmotion.tolerance.meshes.accurate_mesh import frames_of as frames_of
 from calmotion.tolerance.meshes.body_mesh import geometry_of as geometry_of
-from calmotion.tolerance.meshes.body_mesh import mesh_body as mesh_body
 from calmotion.tolerance.meshes.body_mesh import mesh_of as mesh_of
 from calmotion.tolerance.meshes.body_mesh import twin_mesh as twin_mesh
 from calmotion.tolerance.meshes.mesh_budget import mesh_error as mesh_error

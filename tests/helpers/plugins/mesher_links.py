@@ -9,6 +9,7 @@ import trimesh
 from calmotion.mesh.repair import closed_solid
 from calmotion.model import Body, Character, ElasticMaterial, FEMeshes, FlexibleSettings, Frame, SurfaceMesh
 from calmotion.testing import run_operator
+from calmotion.tolerance.meshes import body_mesh
 from calmotion.tolerance.meshes.accurate_mesh import frames_of
 
 PLUGIN = Path(__file__).resolve().parents[3] / "plugins" / "fe_mesher"
@@ -98,3 +99,8 @@ def divided(points, triangles):
     at = len(points) + np.arange(len(triangles))
     parts = [np.column_stack([triangles[:, i], triangles[:, j], at]) for i, j in ((0, 1), (1, 2), (2, 0))]
     return np.vstack([points, middles]), np.vstack(parts)
+
+
+def mesh_body(body, options, frames=(), attachments=()):
+    """The tetrahedra of a flexible body."""
+    return body_mesh.mesh_of(0, body, body_mesh.geometry_of(0, body, options, frames), options, frames, attachments)

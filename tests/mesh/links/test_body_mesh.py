@@ -12,7 +12,7 @@ from calmotion.mesh.tetrahedralize import filling
 from calmotion.mesh.tetrahedralize import tetwild as tetwild_module
 from calmotion.model import Frame, MassProperties
 from calmotion.tolerance.meshes import body_mesh
-from mesher_links import box, link, run, solid, surface
+from mesher_links import box, link, mesh_body, run, solid, surface
 
 
 def without_lid():
@@ -113,22 +113,22 @@ def test_a_visual_surface_that_takes_too_long_gives_way_to_the_collision_surface
 
     monkeypatch.setattr(made, "filled", late)
     options, frames = made.MeshOptions(element_size=0.03), (Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])),)
-    mesh = made.mesh_body(0, link(shown, hull), options, frames)
+    mesh = mesh_body(link(shown, hull), options, frames)
     assert mesh.quality.source == "collision surface" and mesh.quality.volume == pytest.approx(1.2e-4, rel=1e-2)
     (note,) = [note for note in mesh.quality.repairs if "too long" in note]
     assert "1.5 of the volume of the visual surface" in note and "9 triangles" in note
     mass = MassProperties(0.1, np.array([0.1, 0.0, 0.0]), np.diag([1e-6, 1e-4, 1e-4]))
-    beam = made.mesh_body(0, replace(link(shown), mass=mass), options, frames)
+    beam = mesh_body(replace(link(shown), mass=mass), options, frames)
     assert beam.quality.source == "equivalent beam"
     at_its_end = (Frame(np.array([-0.1, 0.0, 0.0]), np.array([1.0, 0.0, 0.0, 0.0])),)
-    beam = made.mesh_body(0, link(shown), options, at_its_end)  # without a stated mass: that of the surface
+    beam = mesh_body(link(shown), options, at_its_end)  # without a stated mass: that of the surface
     assert beam.quality.source == "equivalent beam"
     assert beam.quality.volume == pytest.approx(box().volume, rel=1e-3)
     assert np.ptp(beam.points, axis=0) == pytest.approx([0.2, 0.02, 0.02], rel=1e-3)
     with pytest.raises(tetwild.OutOfTime):  # nothing else is there, or the shot asks for this surface
-        made.mesh_body(0, link(shown), options, frames)
+        mesh_body(link(shown), options, frames)
     with pytest.raises(tetwild.OutOfTime):
-        made.mesh_body(0, link(shown, hull, geometry="visual"), options, frames)
+        mesh_body(link(shown, hull, geometry="visual"), options, frames)
 
 
 def test_the_error_of_a_hull_in_place_of_the_visual_surface_is_that_of_its_stiffness(monkeypatch):
@@ -144,7 +144,7 @@ def test_the_error_of_a_hull_in_place_of_the_visual_surface_is_that_of_its_stiff
     body = link(surface(box(), "/shown"), surface(box((0.2, 0.03, 0.03)), "/hull", visible=False))
     frame = Frame(np.array([-0.1, 0.0, 0.0]), np.array([1.0, 0.0, 0.0, 0.0]))
     held = [AttachmentFrame("root", frame, "interface")]
-    mesh = made.mesh_body(0, body, made.MeshOptions(element_size=0.03), (frame,), held)
+    mesh = mesh_body(body, made.MeshOptions(element_size=0.03), (frame,), held)
     assert 0.4 < mesh.quality.frequency_error < 0.75
     assert any("about 1.5 times" in note for note in mesh.quality.repairs)
     assert made.judged(mesh, body, frame, held).quality.deflection_error > 1.0

@@ -9,9 +9,8 @@ from calmotion.mesh import quadratic as cells_module
 from calmotion.mesh.repair import closed_solid
 from calmotion.mesh.tetrahedra import boundary_triangles, oriented_tets, surface_area, tet_volumes
 from calmotion.model import Body, ElasticMaterial, FlexibleSettings, Frame, TetGeometry
-from calmotion.tolerance.meshes import body_mesh
 from calmotion.tolerance.meshes.options import MeshOptions
-from mesher_links import box, link, run
+from mesher_links import box, link, mesh_body, run
 
 MATERIAL = ElasticMaterial("/Looks/Plastic", 1.8e9, 0.35, 1200.0)
 
@@ -21,7 +20,7 @@ def mesh(file, scale=1.0):
     rest = Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
     body = Body("/Arm/link", rest, None, (), flexible=FlexibleSettings(MATERIAL, mesh_file=str(file), mesh_scale=scale))
     options = MeshOptions(cache=False)
-    return body_mesh.mesh_body(0, body, options)
+    return mesh_body(body, options)
 
 
 def bricks(counts=(3, 2, 2), size=(30.0, 20.0, 20.0), shuffle=0):

@@ -9,9 +9,8 @@ from calmotion.model import Frame
 from calmotion.model.meshes import core_of
 from calmotion.reduction.discretization_error import frequency_errors
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.tolerance.meshes import body_mesh
 from calmotion.tolerance.meshes.options import MeshOptions
-from mesher_links import FLEXIBLE, box, link, surface
+from mesher_links import FLEXIBLE, box, link, mesh_body, surface
 
 MATERIAL = FLEXIBLE.material
 E, NU, RHO = MATERIAL.youngs_modulus, MATERIAL.poissons_ratio, MATERIAL.density
@@ -27,7 +26,7 @@ def frequencies():
         body = replace(
             link(surface(mesh)), flexible=replace(FLEXIBLE, interface_radius=fields.pop("radius", -1.0), **fields)
         )
-        made = body_mesh.mesh_body(0, body, MeshOptions(), frames)
+        made = mesh_body(body, MeshOptions(), frames)
         model = assemble(made.points, made.tets, MATERIAL)
         held = np.flatnonzero(np.abs(model.mesh.nodes[:, 0]) < 1e-5) if frames else None
         found = frequency_errors(model, MATERIAL, count, held)[0]
@@ -81,7 +80,7 @@ def test_a_printed_bar(helpers):
     metal = replace(MATERIAL, core=core_of(0.2, 0.9e-3))
     bar = trimesh.creation.box(bounds=[(0.0, -width / 2, -width / 2), (length, width / 2, width / 2)])
     body = replace(link(surface(bar)), flexible=replace(FLEXIBLE, material=metal))
-    made = body_mesh.mesh_body(0, body, MeshOptions(), (ROOT,))
+    made = mesh_body(body, MeshOptions(), (ROOT,))
 
     def first(points, tets):
         model = assemble(points, tets, metal)

@@ -10,9 +10,8 @@ from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.sources import choice
 from calmotion.model import Frame
 from calmotion.reduction.mesh_refinement import response
-from calmotion.tolerance.meshes import body_mesh
 from calmotion.tolerance.meshes.options import MeshOptions
-from mesher_links import FLEXIBLE, box, link, run, solid, surface
+from mesher_links import FLEXIBLE, box, link, mesh_body, run, solid, surface
 
 LENGTH, WIDTH, HEIGHT = 0.16, 0.03, 0.014
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -86,7 +85,7 @@ def test_first_frequencies_of_wrapped_parts_are_within_five_percent_and_of_a_bea
         assert wrapped == pytest.approx(whole, rel=0.05), name
     made = solid(surface(arm(), "/a"), surface(boss(), "/b"))
     mass = mass_of_solid(made.points, made.triangles, FLEXIBLE.material.density)
-    beam = body_mesh.mesh_body(0, body := replace(link(element_size=0.009), mass=mass), MeshOptions(), (ROOT, TIP))
+    beam = mesh_body(body := replace(link(element_size=0.009), mass=mass), MeshOptions(), (ROOT, TIP))
     found = first(beam, body)
     print("beam", np.round(found / whole - 1.0, 4))
     assert beam.quality.source == "equivalent beam" and found[:2] == pytest.approx(whole[:2], rel=0.2)

@@ -51,14 +51,6 @@ _SIMPLE = ("collision surface", "wrapped collision surface", "equivalent beam")
 _WELD = 1e-6  # distance of coincident points, of the diagonal
 
 
-def mesh_body(
-    index: int, body: Body, options: MeshOptions, frames: Sequence[Frame] = (),
-    attachments: Sequence[AttachmentFrame] = (),
-) -> FEMesh:  # fmt: skip
-    """The tetrahedra of a flexible body; arguments and errors as of `geometry_of` and `mesh_of`."""
-    return mesh_of(index, body, geometry_of(index, body, options, frames), options, frames, attachments)
-
-
 def mesh_of(
     index: int, body: Body, geometry: FEMesh | Volume, options: MeshOptions, frames: Sequence[Frame] = (),
     attachments: Sequence[AttachmentFrame] = (),
