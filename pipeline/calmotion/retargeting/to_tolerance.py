@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from calmotion.errors import IntegrationError
 from calmotion.model import Character, Result, Track
 from calmotion.model.limits.use import is_kept
 from calmotion.model.model_choice import OFF
@@ -46,6 +47,7 @@ from calmotion.tolerance.step_choice import FIRST, LAST, allowed_step_error, cho
 from calmotion.tolerance.step_error import StepRun, distance, frames_of_result, largest_step, order_of, simulate_at
 
 STEP_SAFETY, SEARCHES = 0.8, 3  # safety factor of a new step, and most searches
+DIVIDED = 4  # most times that the step of a search is halved since only shorter ones can simulate where it begins
 FIRST_STEP = 0.2  # of the shake: the error that the step of the first search may have
 
 
@@ -87,9 +89,8 @@ def optimize_to_tolerance(
     result, tracks, searches, left = None, animation.current, SuccessiveSearches(progress), False
     for number in range(SEARCHES):
         reduced = projected.shot.with_tracks(tracks)
-        of_step = replace(options, step=step) if chooses else options
         try:
-            latest = _searched(reduced, of_step, searches, checkpoint, memory)
+            latest, step = _by_steps(step, chooses, partial(_searched, reduced, searches, checkpoint, memory), options)
             searches.ended()
             memory.searched = reduced
             result = with_modes(latest if result is None else continued(result, latest), shot.bodies)
@@ -115,10 +116,11 @@ def optimize_to_tolerance(
                     memory.taken += [SUBSPACES, *([TIME_STEP] if chooses and memory.step else [])]
                 memory.projected, memory.step = projected, result.step_s if fine else step
                 break
-        except KeyboardInterrupt:
+        except (IntegrationError, KeyboardInterrupt) as end:
             if result is None:
                 raise
-            result = best_so_far(result)
+            # what the last search found stays, with its error
+            result = best_so_far(result) if isinstance(end, KeyboardInterrupt) else result
             break
     assert result is not None
     if options.robust is not None and not result.interrupted:
@@ -203,8 +205,25 @@ def _is_accurate(projected: ProjectedShot, tracks: tuple[Track, ...], result: Re
     return projected.is_accurate_for(_complete_run(projected, tracks, result, options))
 
 
+def _by_steps(
+    step: float, chooses: bool, search: Callable[[RunSettings], Result], options: RunSettings
+) -> tuple[Result, float]:
+    """One search and its step [s]: with a shorter one where only that can simulate where it begins.
+
+    Simulations divide such steps, which have no derivatives then.
+    """
+    for divided in range(DIVIDED + 1):
+        try:
+            return search(replace(options, step=step) if chooses else options), step
+        except IntegrationError:
+            if not chooses or divided == DIVIDED:
+                raise
+            step *= 0.5
+    raise AssertionError("unreachable")
+
+
 def _searched(
-    shot: CompiledShot, options: RunSettings, progress: SuccessiveSearches, checkpoint: Path | None, memory: RunMemory
+    shot: CompiledShot, progress: SuccessiveSearches, checkpoint: Path | None, memory: RunMemory, options: RunSettings
 ) -> Result:
     """One search; it continues with the idle motors if these would gain too much."""
     character = shot.character
