@@ -13,6 +13,7 @@ from .identification.robots import robot_with as robot_with
 from .identification.signals import Signals as Signals
 from .identification.signals import place_of as place_of
 from .identification.signals import signals_of as signals_of
+from .layer_metadata import prediction_errors as prediction_errors
 from .layer_metadata import unexplained_share as unexplained_share
 from .model.estimates import HIGHER_MODES as HIGHER_MODES
 from .model.estimates import Calibration as Calibration

@@ -42,19 +42,25 @@ def metadata_of(character: Character, calibration: Calibration) -> dict[str, Any
 
 
 def _predictions(character: Character, calibration: Calibration) -> dict[str, float]:
-    """How far recordings were from their prediction: the share of what links and motors that give do that was not
-    explained, and, of markers and of encoders of ideal motors, root mean square and largest at the places that they
-    tell of [m]. Each is of the worst channel, if there is any."""
+    """How far recordings were from their prediction: at the targets, and the share of what links and motors that give
+    do that was not explained; each where it is known."""
+    rms, largest = prediction_errors(character, calibration)
+    told = {"prediction_rms_m": rms, "prediction_largest_m": largest} if rms > 0.0 else {}
+    share = unexplained_share(calibration)
+    return told | ({"prediction_share": share} if share else {})
+
+
+def prediction_errors(character: Character, calibration: Calibration) -> tuple[float, float]:
+    """Root mean square and largest difference of recordings from their prediction [m], in samples that were not fitted
+    if there are any, at the places that markers and encoders tell of; of the worst channel, 0 where none tells."""
     found = [(0.0, 0.0)]
     for fit in calibration.channels:
         kind, _, path = fit.name.partition(" ")
         held_out = np.isfinite(fit.validation_rms)
-        arm = 1.0 if kind == MARKER else _arm(character, path) if kind == ANGLE and np.isnan(fit.share) else 0.0
+        arm = 1.0 if kind == MARKER else _arm(character, path) if kind == ANGLE else 0.0
         found.append((arm * (fit.validation_rms if held_out else fit.rms), arm * fit.largest))
     rms, largest = np.max(found, axis=0)
-    told = {"prediction_rms_m": float(rms), "prediction_largest_m": float(largest)} if rms > 0.0 else {}
-    share = unexplained_share(calibration)
-    return told | ({"prediction_share": share} if share else {})
+    return float(rms), float(largest)
 
 
 def unexplained_share(calibration: Calibration) -> float:

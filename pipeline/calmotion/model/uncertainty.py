@@ -19,10 +19,13 @@ class KnownFactors:
     Attributes:
         names: Kind and path of each.
         covariance: Of the logarithms of the factors, by rows.
+        largest_error_m: Largest difference of recordings from what the calibrated robot predicts of them, at the
+            targets [m]; 0 where it is not known.
     """
 
     names: tuple[str, ...] = ()
     covariance: tuple[tuple[float, ...], ...] = field(default_factory=tuple)
+    largest_error_m: float = 0.0
 
 
 @dataclass(frozen=True)

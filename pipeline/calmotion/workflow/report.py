@@ -142,6 +142,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "error_shares": _error_shares(character, result),
         "lost_motion": lost_motion(character, result),
         "friction_band": _friction_band(character, result),
+        **_with_calibration(character, report[f"max_error{'_after' if result.after else ''}_m"]),
         "main_target": main_target(character, result),
         "still_targets": still_targets(character, result),
         "remaining_errors": remaining_errors(choices.character if choices else character, result),
@@ -213,6 +214,13 @@ def _friction_band(character: Character, result: Result) -> list[dict[str, Any]]
     if found is None:
         return []
     return [{"path": t.path, "max_error_m": float(size)} for t, size in zip(character.targets, found, strict=True)]
+
+
+def _with_calibration(character: Character, error: float) -> dict[str, float | None]:
+    """What the calibrated robot was off its recordings, and the largest error with it: as errors that have nothing to
+    do with each other, the root of the sum of squares; None where no calibration tells."""
+    off = character.retarget.uncertainty.calibrated.largest_error_m
+    return {"calibration_error_m": off or None, "max_error_with_calibration_m": math.hypot(error, off) if off else None}
 
 
 def lost_motion(character: Character, result: Result) -> dict[str, Any] | None:

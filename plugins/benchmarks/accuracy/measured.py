@@ -209,7 +209,7 @@ def replays(
             robot = machine.robot(name, fit.estimates).shot
             gain = machine.robot(name).shot.character.motors[0].position_gain
             error = partial(peer.largest_error_mm, gain / peer.bench.unit_gain) if peer else by[own].largest_error_mm
-            rows.append(replayed(", ".join(own), name, robot, unexplained_share(fit), error, STEP, sensors))
+            rows.append(replayed(", ".join(own), name, robot, fit, error, STEP, sensors))
             say(_sentence(rows[-1]))
     return rows
 

@@ -10,6 +10,7 @@ from calmotion.arrays import Array
 from calmotion.model import RunSettings
 from calmotion.retargeting import optimize_shot
 from calmotion.simulation import CompiledShot, compile_shot
+from calmotion_plugins.calibration import Calibration, prediction_errors, unexplained_share
 
 
 @dataclass(frozen=True)
@@ -20,9 +21,10 @@ class Replayed:
         fitted: The recordings of the fit.
         shot: Whose commands were optimised.
         before_mm, after_mm: Largest in the independent model, with the commands as animated and as optimised.
-        told_mm: What the report of the optimised commands tells: largest error of the simulation, and the share of the
-            error as animated that the fit left of its recordings' shake, as errors that have nothing to do with each
-            other (root of the sum of squares).
+        told_mm: What the report of the optimised commands tells: largest error of the simulation, and what the fit was
+            off its recordings at the target, as errors that have nothing to do with each other (root of the sum of
+            squares). Of a gauge, which does not tell of the target, it is the share of the error as animated that the
+            fit left of its recordings' shake.
     """
 
     fitted: str
@@ -33,7 +35,7 @@ class Replayed:
 
 
 def replayed(
-    fitted: str, name: str, robot: CompiledShot, share: float, largest: Callable[[Array, Array, Array], float],
+    fitted: str, name: str, robot: CompiledShot, fit: Calibration, largest: Callable[[Array, Array, Array], float],
     step: float, sensors: Collection[str],
 ) -> Replayed:  # fmt: skip
     """Optimise a shot for a calibrated robot of one motor, and replay both commands in the independent model.
@@ -41,7 +43,7 @@ def replayed(
     Args:
         fitted, name: As of `Replayed`.
         robot: The shot with the calibrated robot.
-        share: That the calibration left of the motion in its recordings that a rigid robot lacks.
+        fit: The calibration.
         largest: Largest error [mm] of the independent model by uniform times [s], commands and intended angles [rad],
             shape [n] each.
         step: Of the simulations [s].
@@ -59,7 +61,8 @@ def replayed(
     intended, calm = result.reference.motor_values[rows, 0], motion.motor_values[rows, 0]
     own = [k for k, target in enumerate(targets) if target.position_weight > 0.0]
     before, after = (1e3 * float(run.position_errors[rows][:, own].max()) for run in (result.before, result.after))
+    off = 1e3 * prediction_errors(robot.character, fit)[1] or unexplained_share(fit) * before
     return Replayed(
         fitted, name, largest(times, intended, intended), largest(times, calm, intended),
-        float(np.hypot(after, share * before)),
+        float(np.hypot(after, off)),
     )  # fmt: skip

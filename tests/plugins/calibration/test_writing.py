@@ -1,10 +1,12 @@
 """Layers of calibrations: values in stage units, read back as the robot that was estimated."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.cli.main import main
 from calmotion.usd import stages
 from calmotion.usd.reading import read_shot
 from calmotion_plugins.calibration.model.estimates import Calibration, ChannelFit, Estimate
@@ -176,6 +178,21 @@ def test_what_recordings_were_off_is_told_with_the_shot_of_the_layer(shot, tmp_p
     (note,) = [note for note in read_shot(root)[0].notes if "differed from its recordings" in note]
     found = [float(part.split()[-1]) for part in note.split(" mm")[:2]]
     assert found[1] / found[0] == pytest.approx(2.5, rel=0.02) and found[0] > 0.5 * 20.0 * arm
+    calibrated = read_shot(root)[0].retarget.uncertainty.calibrated
+    assert 1e3 * calibrated.largest_error_m == pytest.approx(found[1], rel=0.01)
+
+
+def test_reports_of_a_calibrated_shot_tell_the_error_with_what_its_recordings_were_off(shot, tmp_path, capsys):
+    own = read_shot(shot)
+    fits = (ChannelFit("a.csv", "marker /Arm/Hand", "m", 9, 3, 1e-3, 0.1, 0.001, 0.002, 0, 0.004),)
+    made = dataclasses.replace(calibration_of(estimate("modulus", PLASTIC, 2e9, 2.1e9)), channels=fits)
+    _, root = write_calibration(own[0], own[2], made, str(tmp_path / "robot.usda"))
+    assert main(["simulate", root, "--json", "--step", "0.01"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["calibration_error_m"] == pytest.approx(0.004)
+    assert report["max_error_with_calibration_m"] == pytest.approx(np.hypot(report["max_error_m"], 0.004))
+    assert main(["simulate", shot, "--json", "--step", "0.01"]) == 0
+    assert json.loads(capsys.readouterr().out)["calibration_error_m"] is None
 
 
 def test_the_largest_torque_is_that_of_the_duty_cycle_and_of_the_drive_where_these_limit_it(tmp_path):
@@ -236,5 +253,7 @@ def test_a_shot_tells_which_share_of_the_shake_its_calibration_left(shot, tmp_pa
         for kind, path, share in shares
     ]
     (note,), _ = told_of(shot, tmp_path, channels=tuple(fits))
-    assert "left 12% of the shake" in note
+    assert "left 12% of the shake in its recordings and differed from its recordings by" in note
+    (note,), _ = told_of(shot, tmp_path, channels=tuple(fits[1:]))
+    assert "left 12% of the shake in its recordings; expect" in note
     assert told_of(shot, tmp_path)[0] == []

@@ -78,6 +78,9 @@ def print_verdict(console: Console, report: dict[str, Any]) -> None:
     if is_optimized(report):
         print_reason(console, report)
         _print_goal(console, report)
+    if report.get("calibration_error_m") and rows and not is_still(report):
+        off, together = (length(report[name]) for name in ("calibration_error_m", "max_error_with_calibration_m"))
+        say(console, f"Recordings were off the calibrated robot by up to {off}: expect {together} on the machine.")
     _print_accuracy(console, report)
 
 
