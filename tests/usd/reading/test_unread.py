@@ -38,14 +38,6 @@ def test_what_is_read_without_its_schema_is_told_to_the_validator_alone(tmp_path
     assert [error.attribute for error in unread_attributes(stage, declared=True)] == ["calm:motor:maxTorque"]
 
 
-def test_a_shot_in_order_has_none(tmp_path):
-    def edit(stage):
-        make_flexible(stage)
-        make_target(stage)
-
-    assert notes(tmp_path, edit) == []
-
-
 @pytest.mark.parametrize("path", ["/Arm", f"{FORE}/skin"])
 def test_a_robot_that_stays_rigid_since_the_schema_is_on_another_prim_says_so(tmp_path, path):
     def edit(stage):

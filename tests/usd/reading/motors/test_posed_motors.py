@@ -27,12 +27,6 @@ def test_angles_follow_from_any_stack_of_transforms(tmp_path, edit):
     assert far < 1e-6 and turned < 1e-6
 
 
-def test_a_shot_in_centimetres_is_the_same(tmp_path):
-    path, character, animation = read(tmp_path, posed, Scale(0.01, 0.001))
-    assert np.abs(animation.tracks[1].values - np.radians(angles(FRAME)[1])).max() < 1e-7
-    assert max(worst_gap(path, character, animation)) < 1e-6
-
-
 def test_many_revolutions_are_unwrapped(tmp_path):
     def turn(frame):
         return 60.0 * frame, -45.0 * frame
