@@ -12,6 +12,7 @@ def test_centimetres_and_grams_give_si():
     assert units.mass(1000.0) == pytest.approx(1.0)
     assert units.density(1.0) == pytest.approx(1000.0)  # 1 g/cm^3
     assert units.torque(1e7) == pytest.approx(1.0)  # 1e7 dyn cm
+    assert units.force(1e5) == pytest.approx(1.0)  # 1e5 dyn
     assert units.pressure(10.0) == pytest.approx(1.0)  # 10 barye = 1 Pa
     assert units.inertia(1e7) == pytest.approx(1.0)
     assert units.acceleration(981.0) == pytest.approx(9.81)
