@@ -6,7 +6,6 @@ import subprocess
 import sys
 
 import pytest
-from calmotion.support.compilation import cache_place
 from one_hinge import HINGE, ONE_HINGE
 
 MOTION = f"time_s,{HINGE}\n0,0\n0.5,0.1\n1,0.2\n"
@@ -31,9 +30,6 @@ def test_tests_pass_where_nothing_of_posix_is_there(repository, tests):
     """Modules, functions and signals are taken away from Calmotion and links from all; processes are spawned."""
     path = [repository / "tests" / "helpers" / "deprived", repository / "pipeline", os.environ.get("PYTHONPATH", "")]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, path))}
-    if tests is CORE:
-        # names without capitals make another key of the same kernels, which would all be compiled again
-        environment |= {"NUMBA_CACHE_DIR": str(cache_place())}
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
     done = subprocess.run(command, cwd=repository, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-4000:]

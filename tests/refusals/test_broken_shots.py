@@ -85,7 +85,7 @@ def write_in_a_process(folder: Path, repository: Path, limit: int) -> subprocess
 
     environment = os.environ | {"PYTHONPATH": str(repository / "pipeline")}
     return subprocess.run(
-        [sys.executable, "-c", WRITING.format(limit=limit)],
+        [sys.executable, "-B", "-c", WRITING.format(limit=limit)],  # compiled modules would be cut off, and stay so
         cwd=folder, env=environment, capture_output=True, text=True, timeout=600,
     )  # fmt: skip
 

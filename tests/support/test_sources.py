@@ -22,6 +22,15 @@ def test_imports_are_followed_through_folders_and_functions(package):
     assert {str(path.relative_to(package)) for path in found} == {"a.py", "room/__init__.py", "room/b.py", "c.py"}
 
 
+def test_a_class_is_no_module_where_file_names_have_no_capitals(package, monkeypatch):
+    """Else the kernels of such a system have other keys than those that a wheel brings."""
+    exact = type(package).is_file
+    monkeypatch.setattr(type(package), "is_file", lambda path: exact(path.with_name(path.name.lower())))
+    (package / "x.py").write_text("X = 1\n")  # beside the class X of c
+    (package / "a.py").write_text("from calmotion import X\nfrom calmotion.c import X\n")
+    assert package / "X.py" not in with_imports([package / "a.py"], package.parent)
+
+
 def test_a_hash_changes_with_content_and_name(package):
     one = digest_of([package / "c.py"])
     assert one != digest_of([package / "d.py"])

@@ -27,7 +27,9 @@ from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
 
 AS_THEY_ARE = "converged"  # reason of the end where nothing is searched: another search has found the curves
-NEAR = 2.0  # where a largest error is beyond the goal, else the tolerance, but not by this factor, smaller gains count
+NEAR = 2.0  # where a largest error is beyond the goal, else the tolerance, but not by this factor, smaller gains count,
+# and however far it is under limits of feet, of which a step from one point says little
+_SPENT = "history", "evaluations", "gradients", "products", "reason"  # what a search has done, wherever it ends
 GAIN_NEAR = 0.2  # share of the least gain, which is one of a mean over time, that counts there
 
 
@@ -71,6 +73,7 @@ class RetargetSearch:
         self._goal = None if self.options.robust else goal_of(self.character, self.options.goal)
         # a smaller predicted gain ends the search [m]
         self._least = self.options.least_gain * min(self.tolerance, self._goal or np.inf)
+        self._best: tuple[tuple[float, float], RetargetProblem, Search] | None = None  # see `_remember`
         self._done = SearchProgress(self._least)
 
     def run(self, start: Array, last: SearchMemory | None = None) -> None:
@@ -98,6 +101,9 @@ class RetargetSearch:
         fixed = self.hold()
         if last is not None and not resumed:
             self._begin_within_limits(fixed)
+        if self.problem.limits is not None:
+            begin = self.problem.at(self.search.x, self.input) if np.any(self.search.x) else self.input
+            self._remember(replace(self.search, at=begin))
         try:
             if not resumed and (not np.any(start) or self.animation.current is self.animation.tracks):
                 self.search = damping_homotopy(self.problem.at(start, self.input), fixed, self.frequency)
@@ -109,6 +115,27 @@ class RetargetSearch:
             interrupts.answer()
             self.interrupted = True
             self.progress(0.95, "interrupted: writing the best so far")
+        self._fall_back()
+
+    def _remember(self, search: Search) -> None:
+        """Keep the point that exceeds limits least, of those that err no more than the first one does."""
+        rank = _excess(search.at), search.at.objective_value
+        if self._best is None:
+            self._first_value = rank[1]
+        elif rank[1] > self._first_value or rank >= self._best[0]:
+            return
+        self._best = rank, self.problem, search
+
+    def _fall_back(self) -> None:
+        """Take that point where the search ends with curves that err more and exceed limits no less: those of feet may
+        be so far from linear that a search does not come back to them."""
+        if self._best is None:
+            return
+        (excess, value), problem, best = self._best
+        found, over = self.search, _excess(self.search.at)
+        if over and excess <= over and value < found.at.objective_value:
+            spent = {name: getattr(found, name) for name in _SPENT}
+            self.problem, self.search = problem, replace(best, at=problem.at(best.x, best.at), **spent)
 
     def _begin_within_limits(self, fixed: BoolArray) -> None:
         """Begin with the limits that the start exceeds: another search has found that it is a minimum without them."""
@@ -190,7 +217,8 @@ class RetargetSearch:
 
     def _minimized(self, search: Search, fixed: BoolArray) -> Search:
         found, enough = self._to_gain(search, fixed, self._least), self._goal or self.tolerance
-        if found.reason == "converged" and 1.0 < self._largest_error(found.at) / enough < NEAR:
+        off = self._largest_error(found.at) / enough if found.reason == "converged" else 0.0
+        if 1.0 < off and (off < NEAR or found.at.is_stiff):
             found = self._to_gain(replace(found, reason=""), fixed, GAIN_NEAR * self._least)
         return found
 
@@ -198,7 +226,7 @@ class RetargetSearch:
         """Whether no target that counts is farther off than the goal, and all limits are kept."""
         if self._goal is None or self._largest_error(at) > self._goal:
             return False
-        return at.problem.limits is None or at.problem.limits.kept(at.limited)
+        return not _excess(at)
 
     def _to_gain(self, search: Search, fixed: BoolArray, gain: float) -> Search:
         """Minimise until less is to be gained [m]."""
@@ -216,6 +244,7 @@ class RetargetSearch:
     def _on_iterate(self, search: Search) -> None:
         self.search, self.problem = search, search.at.problem
         self._keep()
+        self._remember(search)
         done = self._done.fraction([iterate.gain for iterate in search.history])
         error = 1e3 * search.at.error
         self.progress(done, f"optimising: weighted error {error:.3f} mm, {search.evaluations} simulations")
@@ -248,6 +277,12 @@ class RetargetSearch:
         at = self.problem.at(self.search.x, self.search.at)
         self.search = replace(self.search, evaluations=evaluations, gradients=gradients, at=at)
         return at, at.linearized()
+
+
+def _excess(at: Evaluation) -> float:
+    """Of the limits; 0 where all are kept."""
+    limits = at.problem.limits
+    return 0.0 if limits is None or limits.kept(at.limited) else limits.excess(at.limited)
 
 
 def _restarted(search: Search, x: Array) -> Search:

@@ -59,7 +59,9 @@ def test_a_full_disk_is_reported_and_leaves_the_old_recording(tmp_path, size):
         "    print(error)\n"
     )
     folders = [str(PLUGIN.parents[1] / "pipeline"), str(Path(recordings.__file__).parent)]
-    done = subprocess.run([sys.executable, "-c", code, *folders, str(path), str(size)], capture_output=True, text=True)
+    # -B: compiled modules of rerun would be cut off as well, and stay so for all other tests
+    command = [sys.executable, "-B", "-c", code, *folders, str(path), str(size)]
+    done = subprocess.run(command, capture_output=True, text=True)
     assert "cannot be written" in done.stdout and "File too large" in done.stdout, done.stderr
     assert path.read_bytes() == b"old" and [p.name for p in tmp_path.iterdir()] == ["out.rrd"]
 

@@ -7,6 +7,7 @@ import pytest
 from calmotion.model.limits.bounds import motor_bounds
 from calmotion.model.limits.use import LimitUse, TermUse
 from calmotion.model.run import RunSettings
+from calmotion.retargeting import search
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem.limits import MARGIN, MOST, LimitTerms
 from calmotion.simulation.compiled_shot import compile_shot
@@ -200,3 +201,27 @@ def test_multipliers_grow_where_limits_are_exceeded_and_off_terms_are_nothing(te
         name: np.broadcast_to((1 - 0.5 * MARGIN) * limits.bounds[name].upper, v.shape) for name, v in values.items()
     }
     assert off.kept(edge)
+
+
+def test_a_search_that_strays_beyond_its_limits_goes_back_to_the_best_point_within_them(
+    arm, animation, bodies, free, monkeypatch
+):
+    """As one under limits of feet may: it ends at its limit of iterations, with curves that err more."""
+    minimize, uses = search.minimize, [use for use in free[0].limits if use.quantity == "velocity"]
+
+    def strays(problem, begun, fixed, ends, *hooks):
+        zigzag = 0.5 * (-1.0) ** (np.arange(len(begun.x)) // len(arm.motors))
+        far = dataclasses.replace(begun, x=np.where(fixed, 0.0, begun.x + zigzag), reason="iteration limit")
+        return dataclasses.replace(far, at=problem.at(far.x, begun.at))
+
+    character = with_limits(arm, max_velocity=[1.1 * max(abs(use.before), abs(use.after)) for use in uses])
+    shot = compile_shot(character, animation, bodies)
+    within = optimize_shot(shot, OPTIONS, ignore_progress)
+    assert within.objective_after < 0.2 * within.objective_before
+    monkeypatch.setattr(search, "minimize", strays)
+    strayed = optimize_shot(shot, OPTIONS, ignore_progress)
+    assert strayed.objective_after <= strayed.objective_before and strayed.search.stopped == "iteration limit"
+    assert all(use.excess <= 1e-6 for use in strayed.limits)
+    monkeypatch.setattr(search, "minimize", lambda *args: strays(args[0], minimize(*args), *args[2:]))
+    late = optimize_shot(shot, OPTIONS, ignore_progress)
+    assert late.objective_after == pytest.approx(within.objective_after, rel=1e-9)

@@ -222,6 +222,12 @@ class Evaluation:
         """Whether limits are part of the merit."""
         return self.acting is not None
 
+    @property
+    def is_stiff(self) -> bool:
+        """Whether limits act that are far stiffer than all else."""
+        kinds = (kind for run in self.runs for kind in run.robot.limited.values())
+        return self.limits_act and any(kind.is_stiff for kind in kinds)
+
     @cached_property
     def merit(self) -> float:
         """The objective and the terms of the limits that act."""

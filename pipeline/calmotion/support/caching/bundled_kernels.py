@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import pickle
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,7 @@ def with_imports(paths: Iterable[Path], root: Path = PACKAGE.parent) -> list[Pat
         root: The folder that holds the package.
     """
     found: set[Path] = set()
-    queue = list(paths)
+    queue, names_in = list(paths), cache(_names_in)
     while queue:
         path = queue.pop()
         if path in found:
@@ -55,13 +56,20 @@ def with_imports(paths: Iterable[Path], root: Path = PACKAGE.parent) -> list[Pat
         for source, names, plain in _IMPORT.findall(path.read_bytes()):
             module = (source or plain).decode()
             candidates = [module, *(f"{module}.{name.decode()}" for name in _NAME.findall(names))]
-            queue += [file for name in candidates for file in _files_of(root, name)]
+            queue += [file for name in candidates for file in _files_of(root, name, names_in)]
     return sorted(found)
 
 
-def _files_of(root: Path, module: str) -> list[Path]:
+def _files_of(root: Path, module: str, names_in: Callable[[Path], frozenset[str]]) -> list[Path]:
+    """As folders list them: a file system without capitals has `animation.py` for `Animation`, a class, as well."""
     place = root.joinpath(*module.split("."))
-    return [file for file in (place.with_suffix(".py"), place / "__init__.py") if file.is_file()]
+    names = names_in(place.parent)
+    found = [place.with_suffix(".py")] if f"{place.name}.py" in names else []
+    return [*found, place / "__init__.py"] if place.name in names and (place / "__init__.py").is_file() else found
+
+
+def _names_in(folder: Path) -> frozenset[str]:
+    return frozenset(os.listdir(folder)) if folder.is_dir() else frozenset()
 
 
 FOLDER = PACKAGE / "bundled" / "kernels"
