@@ -119,6 +119,8 @@ class RetargetSearch:
 
     def _remember(self, search: Search) -> None:
         """Keep the point that exceeds limits least, of those that err no more than the first one does."""
+        if search.at.problem.limits is None:
+            return
         rank = _excess(search.at), search.at.objective_value
         if self._best is None:
             self._first_value = rank[1]
