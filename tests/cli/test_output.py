@@ -59,6 +59,7 @@ LINE = (sys.executable, "-m", "calmotion")
 
 def ran(line, folder, repository):
     environment = os.environ | {"PYTHONPATH": str(repository / "pipeline")}
+    environment.pop("PYTHONUNBUFFERED", None)  # what is left for the end of the process counts as well
     return subprocess.run(["sh", "-c", line], cwd=folder, capture_output=True, text=True, timeout=600, env=environment)
 
 

@@ -80,7 +80,7 @@ def test_feet_come_and_go_at_the_tempo_of_the_performance(tmp_path):
                 shots.set_float(stage, str(prim.GetPath()), "calm:motor:maxVelocity", 20.0)
 
     result = cm.optimize(
-        write_stepper(tmp_path / "stepper.usda", slow_hips), step=1 / 48, tolerance="1mm", retime={"slowest": 3.0}
+        write_stepper(tmp_path / "stepper.usda", slow_hips), step=1 / 96, tolerance="1mm", retime={"slowest": 3.0}
     )
     report = result.report()
     assert 0.0 < report["retime"]["lower_bound_s"] < report["retime"]["added_s"] < 0.1

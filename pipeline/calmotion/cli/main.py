@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from calmotion.cli.commands.table import BUILT_IN, all_commands
 from calmotion.cli.parser import Parser, add_examples, overview
-from calmotion.cli.signals import as_interrupts, ignore, prepare_streams
+from calmotion.cli.signals import as_interrupts, flushed, ignore, prepare_streams
 from calmotion.errors import ShotError
 from calmotion.version import __version__
 
@@ -33,13 +33,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prepare_streams()
     with as_interrupts(ends=arguments is None):
         try:
-            return _run(given)
+            status = _run(given)
         except KeyboardInterrupt:
             ignore()
             from calmotion.cli.output import Output, print_error
 
             print_error(ShotError("interrupted"), Output(sys.stdout, "--json" in given))
-            return INTERRUPTED
+            status = INTERRUPTED
+    return status if arguments is not None or flushed(told=status != 0) else status or FAILED
 
 
 def _run(given: list[str]) -> int:

@@ -95,3 +95,22 @@ def prepare_streams() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
+
+
+def flushed(told: bool) -> bool:
+    """Write what is left for standard output, and tell whether it takes that; if not, it prints to nowhere from now on,
+    since Python would try again at its exit, and end with a message and a status of its own.
+
+    Args:
+        told: Whether the user knows already that something is wrong.
+    """
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        if not told and not isinstance(error, BrokenPipeError):
+            print(f"error: the output cannot be written: {error.strerror}", file=sys.stderr)
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        os.dup2(nowhere, 1)
+        os.close(nowhere)
+        return False
+    return True

@@ -162,6 +162,9 @@ def gains_at(pose: PoseModel, coupling: Array, weighting: Weighting) -> Gains:
     return Gains(pose, transition, by_change, by_impulse, targets, feedback, np.array(preview), robots, efforts)
 
 
+CONVERGED, SETTLED = 1e-11, 1e-8  # changes of the solution, relative
+
+
 def riccati(transition: Array, by_change: Array, least: Array, penalty: Array) -> Array:
     """The stabilising solution of the discrete algebraic Riccati equation, shape [X, X].
 
@@ -177,12 +180,16 @@ def riccati(transition: Array, by_change: Array, least: Array, penalty: Array) -
     Raises:
         ValueError: It does not converge.
     """
-    A, G, H = transition, by_change / penalty @ by_change.T, least
+    A, G, H, change = transition, by_change / penalty @ by_change.T, least, np.inf
     for _ in range(60):
         solved = np.linalg.solve(np.eye(len(A)) + G @ H, np.concatenate([A, G], axis=1))
         moved, gained = solved[:, : len(A)], solved[:, len(A) :]
         added = A.T @ H @ moved
+        before, last = H, change
         A, G, H = A @ moved, G + A @ gained @ A.T, H + 0.5 * (added + added.T)
-        if np.abs(added).max() <= 1e-11 * np.abs(H).max():
+        change = float(np.abs(added).max() / np.abs(H).max())
+        if change <= CONVERGED:
             return H
+        if last <= SETTLED and change > last:  # changes fell as squares, and are of rounding from here on
+            return before
     raise ValueError("the Riccati equation has no stabilising solution that doubling finds")

@@ -113,6 +113,9 @@ def test_motors_more_than_targets_need_do_not_wander_where_frequencies_are_uncer
         x = states(gains_at(pose, np.eye(4), weights), intended, window)
         deviations.append(np.abs(x[:, :4]).max())
         left.append(rms(played(gains_at(pose, np.eye(4), weights), intended, window)))
-    unshaped = rms(played(gains_at(pose, np.eye(4), weighting(1, 4, penalty=1e6)), intended, 1))
+    # with a penalty by which hardly anything is regulated, rounding decides how far doubling converges
+    free = [rms(played(gains_at(pose, np.eye(4), weighting(1, 4, penalty=p)), intended, 1)) for p in (1e2, 1e4, 1e6)]
+    unshaped = free[2]
+    np.testing.assert_allclose(free, unshaped, rtol=1e-4)
     assert deviations[1] < 0.25 < deviations[0], deviations
     assert left[0] <= left[1] < 0.1 * unshaped, (left, unshaped)
