@@ -40,7 +40,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             print_error(ShotError("interrupted"), Output(sys.stdout, "--json" in given))
             status = INTERRUPTED
-    return status if arguments is not None or flushed(told=status != 0) else status or FAILED
+    if arguments is None and not flushed(told=status != 0):
+        return status or FAILED
+    return status
 
 
 def _run(given: list[str]) -> int:

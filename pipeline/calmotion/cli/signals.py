@@ -70,11 +70,15 @@ def _without_interrupts(hook: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 def _leave_terminal() -> None:
     """Print to nowhere from now on: writing to a terminal that is closed fails, and would end the run."""
-    nowhere = os.open(os.devnull, os.O_RDWR)
     for descriptor in (1, 2):
         with suppress(OSError):
             if stat.S_ISCHR(os.fstat(descriptor).st_mode):  # a terminal; a closed one is no tty any more
-                os.dup2(nowhere, descriptor)
+                _to_nowhere(descriptor)
+
+
+def _to_nowhere(descriptor: int) -> None:
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nowhere, descriptor)
     os.close(nowhere)
 
 
@@ -109,8 +113,6 @@ def flushed(told: bool) -> bool:
     except OSError as error:
         if not told and not isinstance(error, BrokenPipeError):
             print(f"error: the output cannot be written: {error.strerror}", file=sys.stderr)
-        nowhere = os.open(os.devnull, os.O_RDWR)
-        os.dup2(nowhere, 1)
-        os.close(nowhere)
+        _to_nowhere(1)
         return False
     return True

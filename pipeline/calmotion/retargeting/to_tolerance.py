@@ -212,14 +212,14 @@ def _by_steps(
 
     Simulations divide such steps, which have no derivatives then.
     """
-    for divided in range(DIVIDED + 1):
+    least = step / 2**DIVIDED
+    while True:
         try:
             return search(replace(options, step=step) if chooses else options), step
         except IntegrationError:
-            if not chooses or divided == DIVIDED:
+            if not chooses or step <= least:
                 raise
             step *= 0.5
-    raise AssertionError("unreachable")
 
 
 def _searched(
