@@ -31,6 +31,12 @@ class Problem:
         self.calls += 1
         return Point(self, x.copy(), 0.5 * float(np.sum(self.residual(x) ** 2)))
 
+    def tried(self, x, near=None):
+        try:
+            return self.at(x, near)
+        except SimulationFailure:
+            return None
+
 
 @dataclass(frozen=True)
 class Point:
@@ -275,3 +281,40 @@ def test_steps_under_limits_that_bring_less_than_they_promise_end_a_search(monke
     brought = -np.diff([iterate.value for iterate in few.history])
     assert few.reason == "no further decrease"
     assert all(iterate.gain >= gain for iterate in few.history[-3:]) and brought[-2:].max() < gain <= brought[-4]
+
+
+@dataclass(frozen=True)
+class Bounded(Point):
+    """A point whose limits come to act at the minimum without them, and are then exceeded as far as it is from zero."""
+
+    limits_act: bool = False
+
+    def of(self, problem):
+        exceeded = self.problem.costs * float(self.x @ self.x)
+        return Bounded(problem, self.x, 0.5 * float(np.sum(problem.residual(self.x) ** 2)) + exceeded, True)
+
+    def tightened(self):
+        return None if self.limits_act else self.of(self.problem)
+
+
+class Exceeding(Problem):
+    """A problem under limits from which no step leads."""
+
+    def at(self, x, near=None):
+        return Bounded(self, x.copy(), 0.5 * float(np.sum(self.residual(x) ** 2)))
+
+
+@pytest.mark.parametrize("costs, goes_on_from", [(0.0, "the minimum"), (100.0, "the start")])
+def test_limits_come_to_act_where_the_merit_with_them_is_least(monkeypatch, costs, goes_on_from):
+    problem, seen = Exceeding(1), []
+
+    def step(linear, *rest):
+        seen.append(linear.x)
+        return LimitedStep(np.zeros(5), 0, lambda t: 0.0, 0.0, None)
+
+    problem.costs = costs
+    monkeypatch.setattr(gauss_newton, "limited_step", step)
+    monkeypatch.setattr(Bounded, "with_limits", lambda at, limits: at, raising=False)
+    start = np.full(5, 0.01)
+    minimize(problem, Search.start(start), FREE, Ends(1e-6), onto_limits=lambda at: (problem, at.x))
+    assert np.array_equal(seen[0], start) == (goes_on_from == "the start")

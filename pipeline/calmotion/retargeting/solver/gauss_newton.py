@@ -11,7 +11,6 @@ import numpy as np
 
 from calmotion.arrays import Array, BoolArray
 from calmotion.model.result import GOAL_REACHED
-from calmotion.multibody.failure import SimulationFailure
 from calmotion.retargeting.solver.limited_step import LimitedStep, LinearLimited, limited_step
 from calmotion.retargeting.solver.preconditioner import Sharpened
 from calmotion.retargeting.solver.recycling import Recycled
@@ -92,6 +91,9 @@ class LeastSquares(Protocol):
         Raises:
             SimulationFailure: It cannot be evaluated.
         """
+
+    def tried(self, x: Array, near: Any = None) -> Any:
+        """As `at`; None where the point cannot be evaluated or has no derivatives."""
 
 
 @dataclass(frozen=True)
@@ -195,7 +197,7 @@ class _GaussNewton:
     ):
         self._fixed, self._ends, self._onto_limits = fixed, ends, onto_limits
         self._evaluations, self._gradients, self._products = search.evaluations + 1, search.gradients, search.products
-        self._at = problem.at(search.x, search.at)
+        self._at = self._first = problem.at(search.x, search.at)
         self._radius, self._recycled, self._history = search.radius, search.recycled, list(search.history)
         self._sharpened, self._responses, self._share, self._stalled = search.sharpened, search.responses, 1.0, 0
         self._eager = self._sharpened is not None  # the first preconditioner has failed already
@@ -227,6 +229,8 @@ class _GaussNewton:
             return "converged" if expected < self._ends.gain else "no further decrease"
         if self._onto_limits is not None and not limited:
             tightened = self._moved(tightened, *self._onto_limits(tightened))
+            # a minimum without limits may be farther from one within them than the point where the search began
+            tightened = min(tightened, self._first.of(tightened.problem), key=lambda at: float(at.merit))
         self._at, self._radius, self._stalled = tightened, np.inf, 0
         return ""
 
@@ -242,12 +246,9 @@ class _GaussNewton:
         self._history.append(Iterate(self._at.merit, norm, gain, self._evaluations, self._products))
 
     def _evaluated(self, problem: LeastSquares, x: Array, near: Any) -> Any:
-        """The evaluation of a point; None where it cannot be evaluated."""
+        """The evaluation of a point; None where it is of no use."""
         self._evaluations += 1
-        try:
-            return problem.at(x, near)
-        except SimulationFailure:
-            return None
+        return problem.tried(x, near)
 
     def _moved(self, at: Any, problem: LeastSquares, x: Array) -> Any:
         """Another point of another problem; the same point of that problem where the other cannot be evaluated."""
