@@ -91,12 +91,12 @@ def test_the_file_on_disk_counts_not_what_was_opened_before(tmp_path):
 
 
 def test_inputs_are_listed_with_their_hashes_the_shot_first(tmp_path):
-    write_arm(tmp_path / "robot.usda")
+    write_arm(tmp_path / "[v2] robot.usda")  # brackets, as of a file within a package
     (tmp_path / "shots").mkdir()
     shot = tmp_path / "shots" / "a.usda"
-    shot.write_text("#usda 1.0\n(subLayers = [@../robot.usda@])\n")
+    shot.write_text("#usda 1.0\n(subLayers = [@../[v2] robot.usda@])\n")
     layers = stages.input_layers(stages.open_stage(str(shot)), str(shot))
-    assert [layer.path for layer in layers] == ["a.usda", "../robot.usda"]
+    assert [layer.path for layer in layers] == ["a.usda", "../[v2] robot.usda"]
     assert layers[0].sha256 == hashlib.sha256(shot.read_bytes()).hexdigest()
 
 

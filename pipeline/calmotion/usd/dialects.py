@@ -91,6 +91,7 @@ class GearSpelling:
         offset, ratio: Names of the attributes.
         enabled: Name of the attribute that switches the gear off, or empty.
         default_ratio: Ratio where none is authored.
+        angles, ratio_angles: Units of angles in the offset, and in a ratio between an angle and a length.
     """
 
     dialect: str
@@ -100,6 +101,7 @@ class GearSpelling:
     enabled: str = ""
     default_ratio: float = 1.0
     angles: str = USD
+    ratio_angles: str = SI
     sign: float = 1.0
 
 
@@ -113,6 +115,7 @@ GEARS = (
             f"physxMimicJoint:{axis}:referenceJoint",
             f"physxMimicJoint:{axis}:offset",
             f"physxMimicJoint:{axis}:gearing",
+            ratio_angles=USD,
             sign=-1.0,
         )
         for axis in MIMIC_AXES

@@ -299,9 +299,11 @@ def input_layers(stage: Usd.Stage, shot: str) -> tuple[InputLayer, ...]:
 
     Layers of earlier results are included unless they are muted.
     """
+    from pxr import Ar
+
     files = [os.path.realpath(shot)]
     for layer in stage.GetUsedLayers(True):
-        name = layer.realPath.split("[")[0]  # a layer inside a .usdz package counts as the package
+        name, _ = Ar.SplitPackageRelativePathOuter(layer.realPath)  # a layer inside a .usdz counts as the package
         if name and not layer.anonymous and os.path.realpath(name) not in files:
             files.append(os.path.realpath(name))
     first, rest = files[0], sorted(files[1:])

@@ -21,10 +21,11 @@ from .mjcf import (
     refuse_other_compilers,
     several_joints,
 )
-from .packages import MODEL, PACKAGE, in_package, mesh_file, package_folder
+from .packages import in_package, mesh_file, package_folder
 from .repairs import (
     JointFrame,
     faults,
+    has_volume,
     joint_frames,
     leader,
     parsed,
@@ -133,7 +134,7 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
     _refuse_missing_meshes(root, path, found)
     refuse_lfs_pointers((mesh_file(name, path, found) for _, name in _meshes(root)), path=path, attribute="mesh")
     links = root.findall("link")
-    shaped = {link for link in links if link.find("visual") is not None or link.find("collision") is not None}
+    shaped = {link for link in links if any(map(has_volume, link.iter("geometry")))}
     without = {link for link in links if link.find("inertial") is None}
     centred = {link for link in links if link.find("inertial") is not None and link.find("inertial/origin") is None}
     weightless = {link for link in links if _number(link.find("inertial/mass"), "value", 1.0) == 0.0}
@@ -294,19 +295,18 @@ def _packages(root: xml.Element, path: str, given: Mapping[str, str]) -> dict[st
     Raises:
         ShotError: One is given that is no folder, or one is not found.
     """
-    named = {in_package(name)[0] for _, name in _meshes(root) if name.startswith((PACKAGE, MODEL))}
+    named = {package for package, rest in (in_package(name) for _, name in _meshes(root)) if rest}
     problems, found = [], {}
     for name in sorted(named):
         folder = given.get(name) or package_folder(name, path)
         if folder is None or not os.path.isdir(folder):
-            near = nearest(name, given)
             problems.append(
                 ShotError(
                     "the folder of a ROS package is not known" if folder is None else "this is no folder",
                     path=path,
                     attribute=f"package://{name}",
                     found=folder,
-                    remedy=f"{near}Name it: --package {name}=FOLDER",
+                    remedy=f"{nearest(name, given)}Name it: --package {name}=FOLDER",
                 )
             )
         else:

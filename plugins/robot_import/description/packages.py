@@ -11,7 +11,9 @@ PACKAGE, MODEL = "package://", "model://"  # of ROS and of Gazebo
 
 
 def in_package(name: str) -> tuple[str, str]:
-    """The ROS package that the name of a mesh begins with, and the path in it."""
+    """The ROS package that the name of a mesh begins with, and the path in it; else the name, and nothing."""
+    if not name.startswith((PACKAGE, MODEL)):
+        return name, ""
     package, _, rest = name.removeprefix(PACKAGE).removeprefix(MODEL).lstrip("/").partition("/")
     return package, rest
 
@@ -47,7 +49,7 @@ def _package_name(manifest: Path) -> str | None:
 
 def mesh_file(name: str, path: str, packages: Mapping[str, str]) -> str:
     """The file that a mesh of a URDF names."""
-    if name.startswith((PACKAGE, MODEL)):
-        package, rest = in_package(name)
+    package, rest = in_package(name)
+    if rest:
         return os.path.join(packages[package], rest)
-    return os.path.join(os.path.dirname(os.path.abspath(path)), name.removeprefix("file://"))
+    return os.path.join(os.path.dirname(os.path.abspath(path)), package.removeprefix("file://"))

@@ -16,7 +16,7 @@ import xml.etree.ElementTree as xml
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from .packages import MODEL, PACKAGE
+from .packages import MODEL, PACKAGE, in_package
 
 JointFrame = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]  # [m], [rad], a direction
 _FOREIGN = "urn:undeclared:"
@@ -60,9 +60,12 @@ def faults(root: xml.Element, prefixes: Sequence[str]) -> tuple[str, ...]:
     lost = [joint.get("name", "") for joint in _followers_of_none(root)]
     if lost:
         found.append(f"joints that follow one that is not there move by themselves: {', '.join(lost)}")
-    if any(node.get("filename", "").startswith(f"{PACKAGE}/") for node in root.iter("mesh")):
+    meshes = [node.get("filename", "") for node in root.iter("mesh")]
+    if any(name.startswith(f"{PACKAGE}/") for name in meshes):
         found.append(f"meshes are named with {PACKAGE}/, a slash too many")
-    if any(node.get("filename", "").startswith(MODEL) for node in root.iter("mesh")):
+    if any(name.startswith(PACKAGE) and not in_package(name)[1] for name in meshes):
+        found.append(f"meshes that are named with {PACKAGE} and no package are those beside the robot")
+    if any(name.startswith(MODEL) for name in meshes):
         found.append(f"folders of meshes that are named with {MODEL} are looked for as those of packages")
     round_ended = [link.get("name", "") for link in root.findall("link") if any(_capsules(link))]
     if round_ended:
@@ -74,6 +77,12 @@ def faults(root: xml.Element, prefixes: Sequence[str]) -> tuple[str, ...]:
             "robot's first body"
         )
     return tuple(found)
+
+
+def has_volume(geometry: xml.Element) -> bool:
+    """Whether it is a mesh, or a shape none of whose sizes is 0: a box of no size marks a frame."""
+    sizes = " ".join(shape.get(name, "") for shape in geometry for name in ("size", *_OF_CAPSULES)).split()
+    return not any(re.fullmatch(r"-?0*\.?0*", size) for size in sizes)
 
 
 def root_joints(root: xml.Element) -> list[xml.Element]:

@@ -296,8 +296,13 @@ def test_of_coupled_joints_the_driven_one_leads(tmp_path, name):
     text = robot(
         arm=BOX.format('mass="0.17"') + toe, tail=f"<actuator>{actuators}</actuator>{FOLLOWS.format(*coupling)}"
     )
-    made, _ = imported(tmp_path, text)
+    made, model = imported(tmp_path, text)
     names = [motor.path.rsplit("/", 1)[-1] for motor in made.character.motors]
+    follows = [motor.follows for motor in made.character.motors]
+    values = {n: 0.1 if f is None else f.offset + 0.1 * f.ratio for n, f in zip(names, follows, strict=True)}
+    for k in np.flatnonzero(model.eq_active0):  # between a hinge and a slide too
+        one, two = (values[model.joint(of[k]).name] for of in (model.eq_obj1id, model.eq_obj2id))
+        assert one == pytest.approx(np.polyval(model.eq_data[k, 4::-1], two), rel=1e-6)
     groups = {name: [name] for name, motor in zip(names, made.character.motors, strict=True) if motor.follows is None}
     for name, motor in zip(names, made.character.motors, strict=True):
         if motor.follows is not None:

@@ -40,6 +40,7 @@ def test_efforts_and_links_without_inertia_are_found(read):
     assert read(urdf(joint=JOINT.replace('"7"', '"0"'))).efforts == {}
     assert read(urdf(inertial=MASS.replace('value="1"', 'value="0.0"'))).massless == ("a", "b")
     assert found.massless == ("a",), "a frame"
+    assert read(urdf('<geometry><box size="0 0 0"/></geometry>', inertial="")).massless == ("a", "b"), "of no size"
     assert read('<mujoco model="m"><worldbody/></mujoco>').kind == "mjcf"
     assert read(urdf(inertial=MASS + MASS)).massless == ("a",), "said twice in the same way"
 

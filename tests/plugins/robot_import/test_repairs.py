@@ -63,10 +63,15 @@ def test_a_joint_that_follows_one_that_is_not_there_moves_by_itself(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("prefix", "told"), [("package:///", "a slash too many"), ("model://", "as those of packages")]
+    ("prefix", "told"),
+    [
+        ("package:///FOLDER/", "a slash too many"),
+        ("model://FOLDER/", "as those of packages"),
+        ("package://", "and no package are those beside the robot"),
+    ],
 )
-def test_a_package_with_a_slash_too_many_or_of_gazebo_is_found(tmp_path, prefix, told):
-    robot = written(tmp_path, LINK.format("a", f"{prefix}{tmp_path.name}/part.obj"))
+def test_a_package_with_a_slash_too_many_of_gazebo_or_without_a_name_is_found(tmp_path, prefix, told):
+    robot = written(tmp_path, LINK.format("a", f"{prefix.replace('FOLDER', tmp_path.name)}part.obj"))
     description, root = copy_of(robot, tmp_path / "copy")
     assert told in description.faults[0]
     assert os.path.samefile(root.find("link/visual/geometry/mesh").get("filename"), tmp_path / "part.obj")

@@ -79,8 +79,17 @@ def test_a_disabled_gear_is_ignored(tmp_path):
     assert character.motors[1].follows is None
 
 
-def test_a_rack_is_geared_in_metres_for_radians(tmp_path):
-    scale = Scale(0.01, 1.0)
+# 5 mm a turn; cm for radians in MuJoCo and Newton, whose importer takes it so, cm for degrees in PhysX
+RACKS = {
+    "newton": ("newton:mimicJoint", {"newton__mimicCoef1": 0.25 / np.pi}),
+    "mujoco": ("mjc:target", {"mjc__coef1": 0.25 / np.pi}),
+    "physx": ("physxMimicJoint:X:referenceJoint", {"physxMimicJoint__X__gearing": -0.5 / 360.0}),
+}
+
+
+@pytest.mark.parametrize("dialect", RACKS)
+def test_a_rack_is_geared_in_metres_for_radians(tmp_path, dialect):
+    scale, (leader, ratio) = Scale(0.01, 1.0), RACKS[dialect]
 
     def edit(stage):
         stage.RemovePrim(ELBOW)
@@ -88,8 +97,7 @@ def test_a_rack_is_geared_in_metres_for_radians(tmp_path):
         joint.CreateBody0Rel().SetTargets(["/Arm/upper"])
         joint.CreateBody1Rel().SetTargets([FORE])
         joint.CreateAxisAttr("X")
-        # 5 mm a turn, in cm for degrees
-        gear(stage, "newton:mimicJoint", newton__mimicCoef1=0.5 / 360.0)
+        gear(stage, leader, **ratio)
 
     character, _, _ = read(tmp_path, edit, scale)
     assert character.motors[1].linear

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +13,6 @@ from calmotion.support.naming import nearest
 from calmotion.usd.dialects import GEARS, SI, GearSpelling, number_or
 from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.units import StageUnits
-
-if TYPE_CHECKING:
-    pass
 
 _LEADING = ("revolute", "prismatic")
 
@@ -72,14 +68,15 @@ def read_gear(joint: JointPrim, kinds: dict[str, str], units: StageUnits) -> Gea
 def _gear(joint: JointPrim, spelling: GearSpelling, leader: str, leader_kind: str, units: StageUnits) -> Gear:
     ratio = number_or(joint.prim, spelling.ratio, spelling.default_ratio)
     offset = number_or(joint.prim, spelling.offset, 0.0)
-    follower_unit, leader_unit = (_to_si(kind, spelling, units) for kind in (joint.kind, leader_kind))
-    return Gear(leader, spelling.sign * ratio * follower_unit / leader_unit, spelling.sign * offset * follower_unit)
+    follower, led = (_to_si(kind, spelling.ratio_angles, units) for kind in (joint.kind, leader_kind))
+    offset *= _to_si(joint.kind, spelling.angles, units)
+    return Gear(leader, spelling.sign * ratio * follower / led, spelling.sign * offset)
 
 
-def _to_si(kind: str, spelling: GearSpelling, units: StageUnits) -> float:
+def _to_si(kind: str, angles: str, units: StageUnits) -> float:
     if kind == "prismatic":
         return units.length(1.0)
-    return 1.0 if spelling.angles == SI else float(np.deg2rad(1.0))
+    return 1.0 if angles == SI else float(np.deg2rad(1.0))
 
 
 _TO, _RATIO = "calm:motor:coupledTo", "calm:motor:coupling"
