@@ -22,6 +22,7 @@ from calmotion.usd import (
     prims_of,
 )
 
+from .description.repairs import JointFrame
 from .robot_motors import LIMITS, Axis, axes_of, free_axes, is_driven, named
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ class Placement:
         position: Of the body in its parent [m].
         rotation: Likewise, a quaternion w, x, y, z.
         axis: Of the joint, in the body; None where it has none.
+        direct: Whether no frame is between the two.
     """
 
     body: Usd.Prim
@@ -53,6 +55,7 @@ class Placement:
     position: Sequence[float]
     rotation: Sequence[float]
     axis: Sequence[float] | None = None
+    direct: bool = True
 
 
 def author_frames(units: StageUnits, placements: Iterable[Placement]) -> None:
@@ -64,7 +67,8 @@ def author_frames(units: StageUnits, placements: Iterable[Placement]) -> None:
         turn = Gf.Quatd(*place.rotation).GetNormalized()
         at = Gf.Vec3d(*place.position) / units.length(1.0)
         above = place.body.GetParent()
-        if str(above.GetPath()) == place.parent or (not place.parent and not above.HasAPI("PhysicsRigidBodyAPI")):
+        carried = str(above.GetPath()) == place.parent or (not place.parent and not is_rigid_body(above))
+        if carried and place.direct:
             _set_precisely(place.body, "xformOp:translate", at)
             _set_precisely(place.body, "xformOp:orient", turn)
         if place.joint is None:
@@ -78,19 +82,36 @@ def author_frames(units: StageUnits, placements: Iterable[Placement]) -> None:
         _set_precisely(place.joint, "physics:localPos0", at + turn.Transform(Gf.Vec3d(anchor)))
 
 
-def urdf_placements(stage: Usd.Stage, frames: Mapping[str, Any]) -> Iterator[Placement]:
-    """Those of the joints of a URDF, by their names; each is where its child is."""
+def urdf_placements(stage: Usd.Stage, frames: Mapping[str, JointFrame]) -> Iterator[Placement]:
+    """Those of the joints of a URDF, by their names; each is where its child is. A converter leaves out links that are
+    frames, and ties a joint to the body that carries its parent: fixed joints are in between."""
     from pxr import Gf
 
+    fixed_at = {frame.child: frame for frame in frames.values()}
     for prim in joint_prims(stage):
-        body = stage.GetPrimAtPath(body_on(stage, prim, 1) or "/")
-        if named(prim) in frames and is_rigid_body(body):
-            position, angles, axis = frames[named(prim)]
-            turn = Gf.Quatd(1.0)
-            for angle, unit in zip(angles, _AXES.values(), strict=True):  # about the axes of the parent, x first
-                turn = Gf.Quatd(float(np.cos(0.5 * angle)), Gf.Vec3d(*unit) * float(np.sin(0.5 * angle))) * turn
+        body, carrier = (stage.GetPrimAtPath(body_on(stage, prim, side) or "/") for side in (1, 0))
+        if named(prim) not in frames or not is_rigid_body(body):
+            continue
+        own = frames[named(prim)]
+        at, turn = Gf.Vec3d(*own.position), _turn(own.angles)
+        link: str | None = own.parent
+        while link != named(carrier) and (frame := fixed_at.get(link or "")) is not None:
+            above = _turn(frame.angles)
+            at, turn, link = Gf.Vec3d(*frame.position) + above.Transform(at), above * turn, frame.parent
+        if link == named(carrier) or carrier.IsPseudoRoot():
             rotation = (turn.GetReal(), *turn.GetImaginary())
-            yield Placement(body, body_on(stage, prim, 0), prim, position, rotation, axis)
+            direct = link == own.parent
+            yield Placement(body, body_on(stage, prim, 0), prim, tuple(at), rotation, own.axis, direct)
+
+
+def _turn(angles: Iterable[float]) -> Any:
+    """The rotation by roll, pitch and yaw, which are about the axes of the parent, x first."""
+    from pxr import Gf
+
+    turn = Gf.Quatd(1.0)
+    for angle, unit in zip(angles, _AXES.values(), strict=True):
+        turn = Gf.Quatd(float(np.cos(0.5 * angle)), Gf.Vec3d(*unit) * float(np.sin(0.5 * angle))) * turn
+    return turn
 
 
 def _between(start: Any, end: Any) -> Any:

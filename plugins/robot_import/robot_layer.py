@@ -113,7 +113,7 @@ class _Author:
         shift_limits(self._stage)
         options = self._options
         author_frames(self._units, urdf_placements(self._stage, options.robot.frames))
-        far = [name for name, (_, angles, _) in options.robot.frames.items() if max(map(abs, angles)) > _TURN]
+        far = [name for name, frame in options.robot.frames.items() if max(map(abs, frame.angles)) > _TURN]
         if far:
             self.notes.append(f"rpy of joints goes beyond a turn; degrees taken for radians? {', '.join(far)}")
         self.notes += narrow_limits(self._stage, self._units, options.robot.soft_limits)

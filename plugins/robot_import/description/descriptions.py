@@ -52,7 +52,7 @@ class Description:
         without_mass: Links of a URDF with geometry and without inertia.
         massless: Links of a URDF whose mass is 0, and those with neither inertia nor geometry: frames.
         centred: Links of a URDF whose inertia has no origin: their centre of mass is that of the link's frame.
-        frames: Of each joint of a URDF: position [m], roll, pitch, yaw [rad] and axis.
+        frames: Of each joint of a URDF.
         unread: What of the robot is not read, as sentences for the user.
         locks: Joints of an MJCF that an equality holds at one value [rad or m].
         soft_limits: Narrower limits of joints of a URDF, which its safety controllers keep [rad or m].

@@ -15,10 +15,21 @@ import shutil
 import xml.etree.ElementTree as xml
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from .packages import MODEL, PACKAGE, in_package
 
-JointFrame = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]  # [m], [rad], a direction
+
+class JointFrame(NamedTuple):
+    """Where a joint of a URDF is in its parent: position [m], roll, pitch, yaw [rad], axis, names of both links."""
+
+    position: tuple[float, ...]
+    angles: tuple[float, ...]
+    axis: tuple[float, ...]
+    parent: str
+    child: str
+
+
 _FOREIGN = "urn:undeclared:"
 _PREFIX = re.compile(r"(?:</?|\s)([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*(?=[\s/>=])")
 _ROOT = re.compile(r"<(robot|mujoco)(?=[\s/>])")
@@ -180,7 +191,7 @@ def leader(joint: xml.Element) -> str | None:
 
 
 def joint_frames(root: xml.Element) -> dict[str, JointFrame]:
-    """Position, angles and axis of the joints of a URDF whose numbers are right; the converter refuses others."""
+    """Those of the joints of a URDF whose numbers are right; the converter refuses others."""
     found = {}
     for joint in root.findall("joint"):
         origin, axis = joint.find("origin"), joint.find("axis")
@@ -188,8 +199,10 @@ def joint_frames(root: xml.Element) -> dict[str, JointFrame]:
             numbers = (_three(origin, "xyz"), _three(origin, "rpy"), _three(axis, "xyz", "1 0 0"))
         except ValueError:
             continue
-        if all(len(part) == 3 for part in numbers) and any(numbers[2]):
-            found[joint.get("name", "")] = numbers
+        ends = [node.get("link", "") for tag in ("parent", "child") if (node := joint.find(tag)) is not None]
+        turns = any(numbers[2]) or joint.get("type") == "fixed"
+        if all(len(part) == 3 for part in numbers) and turns and len(ends) == 2:
+            found[joint.get("name", "")] = JointFrame(*numbers, *ends)
     return found
 
 

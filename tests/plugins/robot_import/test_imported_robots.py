@@ -95,7 +95,18 @@ AT_ORIGIN = TWO_LINKS.replace('<origin xyz="0.2 0.01 0"/>', "").replace("</inert
 CALIBRATED = TWO_LINKS.replace('rpy="0.3 0.1 0"', 'rpy="0.0003 0 1e-4"').replace('"0 0.6 0.8"', '"0.0002 0 1"')
 
 
-@pytest.mark.parametrize("text", [TWO_LINKS, AT_ORIGIN, CALIBRATED], ids=["", "inertia_without_origin", "small_angles"])
+# frames of sensors between links, and below the first one
+FIXED = '<joint name="{0}" type="fixed"><parent link="{1}"/><child link="{2}"/><axis xyz="0 0 0"/>{3}</joint>'
+MOUNTS = '<link name="post"/><link name="flange"/><link name="cell"/>'
+MOUNTS += FIXED.format("c", "base", "post", '<origin rpy="0.2 0.3 0.4" xyz="0.1 0.2 0.3"/>')
+MOUNTS += FIXED.format("d", "upper", "flange", '<origin rpy="0 0 0.5" xyz="0 0 0.05"/>')
+MOUNTS += FIXED.format("e", "flange", "cell", '<origin rpy="0.3 0 0" xyz="0.02 0 0.03"/>')
+WITH_FRAMES = TWO_LINKS.replace('parent link="base"', 'parent link="post"')
+WITH_FRAMES = WITH_FRAMES.replace('parent link="upper"', 'parent link="cell"').replace("</robot>", f"{MOUNTS}</robot>")
+ARMS = {"": TWO_LINKS, "inertia_without_origin": AT_ORIGIN, "small_angles": CALIBRATED, "frames": WITH_FRAMES}
+
+
+@pytest.mark.parametrize("text", ARMS.values(), ids=ARMS)
 def test_two_links_of_a_urdf_need_the_torques_that_mujoco_finds(tmp_path, text):
     (tmp_path / "arm.urdf").write_text(text)
     torque, far = compare(tmp_path / "arm.urdf", tmp_path)
