@@ -228,9 +228,18 @@ def nested_copy(root: xml.Element, path: str, folder: str, parse: Callable[[str]
                 node.set(name, os.path.join(home, node.get(name, "")))
     if not any(node.get(name) for node in root.iter("compiler") for name in ("meshdir", "assetdir")):
         root.insert(0, xml.Element("compiler", {"meshdir": home}))
+    outermost: dict[str, str] = {}  # which of its bodies stands for one of a robot within this one
+    for number, model in enumerate(root.iter("model")):
+        file, own = os.path.join(home, model.get("file", "")), os.path.join(folder, f"model_{number}")
+        within = parse(file)
+        outermost |= {b.get("name", ""): _name(b, _joints_of(b)[0]) for b in within.iter("body") if _has_several(b)}
+        os.mkdir(own)
+        model.set("file", nested_copy(within, file, own, parse))
+    for attached in root.iter("attach"):
+        attached.set("body", outermost.get(attached.get("body", ""), attached.get("body", "")))
     for parent in list(root.iter()):
         for place, body in enumerate(parent):
-            if body.tag == "body" and len(_joints_of(body)) > 1:
+            if body.tag == "body" and _has_several(body):
                 parent[place] = _nested(body)
     copy = os.path.join(folder, os.path.basename(path))
     xml.ElementTree(root).write(copy, encoding="utf-8")
@@ -255,7 +264,7 @@ def _nested(body: xml.Element) -> xml.Element:
     joints, outer, inner = _joints_of(body), None, None
     for joint in joints[:-1]:
         body.remove(joint)
-        light = xml.Element("body", {"name": f"{body.get('name', 'body')}_{joint.get('name', len(body))}"})
+        light = xml.Element("body", {"name": _name(body, joint)})
         if "childclass" in body.attrib:
             light.set("childclass", body.attrib["childclass"])
         moments = " ".join([_LIGHT_INERTIA] * 3)
@@ -267,6 +276,15 @@ def _nested(body: xml.Element) -> xml.Element:
     inner.append(body)
     outer.attrib.update(placed)
     return outer
+
+
+def _name(body: xml.Element, joint: xml.Element) -> str:
+    """Of the body that one of several joints of a body gets."""
+    return f"{body.get('name', 'body')}_{joint.get('name', len(body))}"
+
+
+def _has_several(body: xml.Element) -> bool:
+    return len(_joints_of(body)) > 1
 
 
 def _joints_of(body: xml.Element) -> list[xml.Element]:

@@ -113,13 +113,20 @@ def test_two_links_of_a_urdf_need_the_torques_that_mujoco_finds(tmp_path, text):
     assert torque < 1e-4 and far < 1e-6
 
 
-def test_joints_of_one_body_move_one_after_the_other_as_in_mujoco(tmp_path):
+WHOLE = {  # of another file
+    "included": '<include file="parts/arm.xml"/>',
+    "attached": '<asset><model name="s" file="parts/arm.xml"/></asset><worldbody><body name="post">'
+    '<geom size="0.1" mass="1"/><attach model="s" body="arm" prefix="s_"/></body></worldbody>',
+}
+
+
+@pytest.mark.parametrize("text", WHOLE.values(), ids=WHOLE)
+def test_joints_of_one_body_move_one_after_the_other_as_in_mujoco(tmp_path, text):
     """A body with three joints at different places, in a file of its own whose meshes and defaults are elsewhere."""
     (tmp_path / "parts").mkdir()
-    (tmp_path / "parts" / "arm.xml").write_text(SEVERAL)
-    (tmp_path / "robot.xml").write_text(
-        '<mujoco model="m"><compiler angle="radian"/><include file="parts/arm.xml"/></mujoco>'
-    )
+    radians = '<compiler angle="radian"/>'
+    (tmp_path / "parts" / "arm.xml").write_text(SEVERAL.replace("<mujoco>", f"<mujoco>{radians}"))
+    (tmp_path / "robot.xml").write_text(f'<mujoco model="m">{radians}{text}</mujoco>')
     torque, far = compare(tmp_path / "robot.xml", tmp_path)
     assert torque < 1e-4 and far < 1e-6
 
