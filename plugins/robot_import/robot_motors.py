@@ -143,6 +143,8 @@ def author_motors(
         ShotError: A name that no joint has; a closed chain, all of whose joints would be motors; no joint at all that a
             motor can drive.
     """
+    from pxr import Sdf
+
     axes = [axis for prim in joint_prims(stage) for axis in axes_of(prim)]
     moved, notes = MotorTracks("", np.zeros(0), {}), tuple[str, ...]()
     if motion is not None:
@@ -162,17 +164,19 @@ def author_motors(
     for axis in driven:
         values = moved.values.get(axis.path)
         track = None if values is None else Track(moved.times, values)
-        _author(axis, track, units, frames_per_second, efforts.get(named(axis.prim)))
+        _author(axis, track, units, frames_per_second)
+    for axis in axes:  # those that follow others, too
+        effort = efforts.get(named(axis.prim))
+        if effort is not None:
+            limit = axis.prim.CreateAttribute(f"drive:{axis.drive}:physics:maxForce", Sdf.ValueTypeNames.Float)
+            limit.Set(effort / (units.force(1.0) if axis.linear else units.torque(1.0)))
     return notes
 
 
-def _author(axis: Axis, track: Track | None, units: StageUnits, frames_per_second: float, effort: float | None) -> None:
+def _author(axis: Axis, track: Track | None, units: StageUnits, frames_per_second: float) -> None:
     from pxr import UsdPhysics
 
-    api = UsdPhysics.DriveAPI.Apply(axis.prim, axis.drive)
-    if effort is not None:
-        api.CreateMaxForceAttr(effort / (units.force(1.0) if axis.linear else units.torque(1.0)))
-    attribute = api.CreateTargetPositionAttr()
+    attribute = UsdPhysics.DriveAPI.Apply(axis.prim, axis.drive).CreateTargetPositionAttr()
     if track is not None:
         scale = 1.0 / units.length(1.0) if axis.linear else np.degrees(1.0)
         for code, value in zip(track.times * frames_per_second, track.values * scale, strict=True):

@@ -31,12 +31,14 @@ def make(tmp_path):
 
 
 def test_joints_get_motors_that_hold_the_pose_nearest_to_zero(make):
-    character, animation, _ = make(said={"efforts": {"shoulder-pan": 20.0}, "without_mass": ("fore.arm",)})
+    character, animation, _ = make(
+        said={"efforts": {"shoulder-pan": 20.0, "finger": 3.0}, "without_mass": ("fore.arm",)}
+    )
     assert [motor.path for motor in character.motors] == [PAN, ELBOW, MIMIC]
     assert animation.tracks[0].values[0] == pytest.approx(np.radians(10.0))
     assert animation.tracks[1].values[0] == 0.0
     assert character.motors[0].max_torque == 20.0 and np.isinf(character.motors[1].max_torque)
-    assert character.motors[2].follows is not None
+    assert character.motors[2].follows is not None and character.motors[2].max_torque == pytest.approx(3.0)
     assert [joint.name for joint in character.joints] == ["shoulder-pan", "elbow", "finger"]
 
 
