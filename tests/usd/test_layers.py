@@ -16,14 +16,10 @@ def small_layer(name: str):
     return layer
 
 
-def accept(path: str) -> None:
-    assert os.path.exists(path)
-
-
 @pytest.mark.parametrize("name", ["out.usda", "out.usdc", "out.usd", "new/folder/out.usda"])
 def test_the_written_layer_opens_again_and_no_other_file_is_left(tmp_path, name):
     output = tmp_path / name
-    write_layer(small_layer("A"), str(output), accept)
+    write_layer(small_layer("A"), str(output))
     assert Sdf.Layer.FindOrOpen(str(output)).GetPrimAtPath("/A")
     assert [p.name for p in output.parent.iterdir()] == [output.name]
 
@@ -38,16 +34,38 @@ from pxr import Sdf
 import numpy as np
 layer, ends = Sdf.Layer.CreateAnonymous(".usda"), np.array([0.0, 1.0])
 attribute_spec(layer, "/A.size", Sdf.ValueTypeNames.Float).SetSpline(bezier(ends, ends, ends, ends, "float"))
-write_layer(layer, {str(tmp_path / "out.usda")!r}, lambda path: None)
+write_layer(layer, {str(tmp_path / "out.usda")!r})
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")
     assert "spline" in (tmp_path / "out.usda").read_text()
 
 
+@pytest.mark.parametrize("lost", ["value", "sample", "attribute"])
+def test_a_layer_that_is_opened_again_without_a_value_or_a_sample_is_refused(tmp_path, monkeypatch, lost):
+    layer = small_layer("A")
+    spec = Sdf.AttributeSpec(layer.GetPrimAtPath("/A"), "size", Sdf.ValueTypeNames.Float)
+    spec.default = 0.1
+    for code in (1.0, 2.0):
+        layer.SetTimeSample(spec.path, code, code)
+    write_layer(layer, str(tmp_path / "out.usda"))
+    opened = Sdf.Layer.OpenAsAnonymous(str(tmp_path / "out.usda"))
+    again = opened.GetAttributeAtPath("/A.size")
+    if lost == "value":
+        again.default = 0.2
+    elif lost == "sample":
+        opened.EraseTimeSample(again.path, 1.0)
+    else:
+        opened.GetPrimAtPath("/A").RemoveProperty(again)
+    monkeypatch.setattr("pxr.Sdf.Layer.OpenAsAnonymous", lambda path: opened)
+    with pytest.raises(ShotError, match="/A.size is not what was written"):
+        write_layer(layer, str(tmp_path / "other.usda"))
+    assert os.listdir(tmp_path) == ["out.usda"]
+
+
 def test_a_failed_validation_keeps_the_old_file(tmp_path):
     output = tmp_path / "out.usda"
-    write_layer(small_layer("Old"), str(output), accept)
+    write_layer(small_layer("Old"), str(output))
     before = output.read_bytes()
 
     def refuse(path: str) -> None:
@@ -61,9 +79,9 @@ def test_a_failed_validation_keeps_the_old_file(tmp_path):
 
 def test_an_open_layer_is_not_stale_after_a_write(tmp_path):
     output = str(tmp_path / "out.usda")
-    write_layer(small_layer("Old"), output, accept)
+    write_layer(small_layer("Old"), output)
     opened = Sdf.Layer.FindOrOpen(output)
-    write_layer(small_layer("New"), output, accept)
+    write_layer(small_layer("New"), output)
     assert opened.GetPrimAtPath("/New") and not opened.GetPrimAtPath("/Old")
 
 
@@ -71,7 +89,7 @@ def test_a_folder_that_cannot_be_written_is_an_error_with_a_remedy(tmp_path):
     blocker = tmp_path / "file"
     blocker.write_text("")
     with pytest.raises(ShotError, match="cannot be written") as caught:
-        write_layer(small_layer("A"), str(blocker / "out.usda"), accept)
+        write_layer(small_layer("A"), str(blocker / "out.usda"))
     assert caught.value.remedy
 
 

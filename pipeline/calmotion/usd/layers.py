@@ -52,15 +52,15 @@ def refuse_input_as_output(output: str, inputs: Iterable[str]) -> None:
             )
 
 
-def write_layer(layer: Sdf.Layer, output: str, validate: Callable[[str], object]) -> None:
+def write_layer(layer: Sdf.Layer, output: str, validate: Callable[[str], object] | None = None) -> None:
     """Write an anonymous layer to a file, atomically.
 
-    It is exported to a temporary file, opened again and validated before it replaces `output`, see `replaced`.
+    It is exported to a temporary file, opened again and compared before it replaces `output`, see `replaced`.
 
     Args:
         layer: The Sdf.Layer; its content is written in the format that the extension of `output` names.
         output: Destination.
-        validate: Called with the path of the temporary file; raises a ShotError if the file is wrong.
+        validate: Called with the path of the temporary file; raises a ShotError if the file is wrong otherwise.
 
     Raises:
         ShotError: The file cannot be written, or cannot be opened again.
@@ -71,9 +71,13 @@ def write_layer(layer: Sdf.Layer, output: str, validate: Callable[[str], object]
         with quiet(), replaced(output) as temporary:
             if not layer.Export(str(temporary)):
                 raise OSError("USD could not write it")
-            if Sdf.Layer.OpenAsAnonymous(str(temporary)) is None:
+            written = Sdf.Layer.OpenAsAnonymous(str(temporary))
+            if written is None:
                 raise OSError("what was written cannot be opened again")
-            validate(str(temporary))
+            if lost := _lost(layer, written):
+                raise OSError(f"{lost} is not what was written, when it is opened again")
+            if validate is not None:
+                validate(str(temporary))
     except (OSError, Tf.ErrorException) as error:
         raise ShotError(
             "the layer cannot be written",
@@ -84,3 +88,19 @@ def write_layer(layer: Sdf.Layer, output: str, validate: Callable[[str], object]
     opened = Sdf.Layer.Find(output)
     if opened is not None:
         opened.Reload(True)
+
+
+def _lost(layer: Sdf.Layer, written: Sdf.Layer) -> str:
+    """The first attribute that has another value, or number of samples or of knots, in a written copy; or empty."""
+    paths: list[Sdf.Path] = []
+    layer.Traverse("/", paths.append)
+    for path in paths:
+        made, found = layer.GetAttributeAtPath(path), written.GetAttributeAtPath(path)
+        if made and (not found or _content(made) != _content(found)):
+            return str(path)
+    return ""
+
+
+def _content(attribute: Sdf.AttributeSpec) -> tuple[object, int, int]:
+    samples = attribute.layer.GetNumTimeSamplesForPath(attribute.path)
+    return attribute.default, samples, len(attribute.GetSpline().GetKnots()) if attribute.HasSpline() else 0

@@ -48,7 +48,7 @@ def test_the_spline_is_the_solver_s_curve_between_frames_too(base, cyclic):
     motor = Motor(0, "/arm/elbow", "drive:angular:physics:targetPosition")
     character = SimpleNamespace(motors=[motor], retarget=SimpleNamespace(cyclic=cyclic))
     layer = Sdf.Layer.CreateAnonymous(".usda")
-    written = author_splines(layer, character, animation, (curve,), CLOCK, 1.0)
+    author_splines(layer, character, animation, (curve,), CLOCK, 1.0)
     stage = Usd.Stage.Open(layer)
     attribute = stage.GetAttributeAtPath(f"{motor.path}.{motor.attribute}")
     assert attribute.HasSpline() and not attribute.GetTimeSamples()
@@ -56,7 +56,6 @@ def test_the_spline_is_the_solver_s_curve_between_frames_too(base, cyclic):
     found = np.deg2rad([attribute.Get(float(code)) for code in CLOCK.time_codes(FINE)])
     assert np.abs(found - meant).max() < 1e-6
     knots = attribute.GetSpline().GetKnots()
-    assert written == {f"{motor.path}.{motor.attribute}": len(knots)}
     inner = base.times[(base.times > 0.0) & (base.times < 2.0)]
     assert len(knots) == len(np.union1d(np.round(inner, 9), np.round(KNOTS, 9)))
     later = np.deg2rad(attribute.Get(float(CLOCK.time_codes(2.4))))

@@ -70,7 +70,7 @@ def bake_bodies(
     clock: Clock,
     meters: float,
     changed: bool = False,
-) -> dict[str, int]:
+) -> None:
     """Author one matrix for each body and frame, relative to its parent prim, in place of its other transform ops.
 
     Args:
@@ -79,9 +79,6 @@ def bake_bodies(
         motion: What to bake.
         meters: Metres per unit of the stage.
         changed: Whether bodies that move, relative to their parent prim, as they are animated are left out.
-
-    Returns:
-        Path of each attribute that was written, with its number of samples.
     """
     from pxr import Sdf, UsdGeom, Vt
 
@@ -92,7 +89,6 @@ def bake_bodies(
         for k, body in enumerate(character.bodies)
         if not body.between
     }
-    written = {}
     for body in character.bodies:
         if body.between:
             continue
@@ -108,8 +104,6 @@ def bake_bodies(
             layer.SetTimeSample(spec.path, float(code), gf.to_matrix(matrix))
         order = attribute_spec(layer, f"{body.path}.xformOpOrder", Sdf.ValueTypeNames.TokenArray, uniform=True)
         order.default = Vt.TokenArray(["!resetXformStack!", _OP] if reset else [_OP])
-        written[str(spec.path)] = len(codes)
-    return written
 
 
 def bake_points(
@@ -120,24 +114,20 @@ def bake_points(
     motion: BakedMotion,
     clock: Clock,
     meters: float,
-) -> dict[str, int]:
+) -> None:
     """Author the deformed points of the meshes of flexible bodies, and their extents.
 
     Args:
         skins: One for each body; None for a rigid one.
         The others as for `bake_bodies`; `motion` is a simulated one.
-
-    Returns:
-        Path of each attribute that was written, with its number of samples.
     """
     from pxr import Sdf, Usd, UsdGeom, Vt
 
     if motion.elastic is None:
-        return {}
+        return
     codes = clock.time_codes(motion.times)
     xforms = UsdGeom.XformCache(Usd.TimeCode(clock.start))
     poses = _rest_poses(stage, character, clock.start)
-    written = {}
     for body, skin, u in zip(character.bodies, skins, motion.elastic, strict=True):
         if skin is None:
             continue
@@ -157,8 +147,6 @@ def bake_points(
                 layer.SetTimeSample(points.path, float(code), gf.to_points(moved))
                 box = np.stack([moved.min(axis=0), moved.max(axis=0)])
                 layer.SetTimeSample(extent.path, float(code), Vt.Vec3fArray.FromNumpy(box.astype(np.float32)))
-            written[str(points.path)] = len(codes)
-    return written
 
 
 def _rest_poses(stage: Usd.Stage, character: Character, start: float) -> dict[str, Pose]:

@@ -83,32 +83,25 @@ def author_curves(
     samples_per_second: float | None,
     clock: Clock,
     meters: float,
-) -> dict[str, int]:
+) -> None:
     """Author each curve as an over with time samples, degrees or stage length.
 
     Args:
         curves: Those to write.
         samples_per_second: Their density [1/s]; None: at the frames, and between where the animation needs them.
         meters: Metres in the stage's unit of length.
-
-    Returns:
-        Path of each attribute that was written, with its number of samples.
     """
     from pxr import Sdf
 
-    written = {}
     for curve in curves:
         times = sample_times(animation.frame_times, samples_per_second, [animation.tracks[curve.motor]])
         codes = clock.time_codes(times)
         motor = character.motors[curve.motor]
-        path = f"{motor.prim_path}.{motor.attribute}"
-        spec = attribute_spec(layer, path, Sdf.ValueTypeNames.Float)
+        spec = attribute_spec(layer, f"{motor.prim_path}.{motor.attribute}", Sdf.ValueTypeNames.Float)
         unit = meters if motor.linear else np.deg2rad(1.0)
         values = curve_values(animation, curve, times, character.retarget.cyclic)
         for code, value in zip(codes, values / unit, strict=True):
             layer.SetTimeSample(spec.path, float(code), float(value))
-        written[path] = len(codes)
-    return written
 
 
 def ensure_drives(layer: Sdf.Layer, stage: Usd.Stage, motors: Iterable[Motor]) -> None:

@@ -49,7 +49,7 @@ def write_root(layer: str, provenance: Provenance, role: str) -> str:
     below = [relative_asset(path, folder) for path in shot_layers(provenance.shot, replaced)]
     root.subLayerPaths = [relative_asset(os.path.realpath(layer), folder), *below]
     root.documentation = f"Opens {os.path.basename(layer)} over its shot."
-    write_layer(root, output, lambda temporary: _validate(temporary, provenance))
+    write_layer(root, output, stages.open_stage)
     return output
 
 
@@ -116,18 +116,6 @@ def relative_asset(path: str, folder: str) -> str:
     return relative if relative.startswith("../") else f"./{relative}"
 
 
-def _validate(temporary: str, provenance: Provenance) -> None:
-    """Open a root layer as a stage: it must compose, with the shot's rate."""
-    stage = stages.open_stage(temporary)
-    if stage.GetTimeCodesPerSecond() != provenance.time_codes_per_second:
-        raise ShotError(
-            "the root layer does not keep the rate of the shot",
-            path=temporary,
-            attribute="timeCodesPerSecond",
-            found=stage.GetTimeCodesPerSecond(),
-        )
-
-
 RETARGET = "CalmRetargetAPI"
 
 
@@ -178,9 +166,5 @@ def write_performance(
         for name, value in settings.items():
             attribute = Sdf.AttributeSpec(prim, name, Sdf.ValueTypeNames.Token, Sdf.VariabilityUniform)
             attribute.default = value
-
-    def validate(temporary: str) -> None:
-        stages.open_stage(temporary)
-
-    write_layer(layer, output, validate)
+    write_layer(layer, output, stages.open_stage)
     return output

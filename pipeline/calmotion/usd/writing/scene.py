@@ -36,7 +36,7 @@ def author_map(layer: Sdf.Layer, character: str, tempo: TimeMap, clock: Clock) -
 
 def author_scene(
     layer: Sdf.Layer, stage: Usd.Stage, tempo: TimeMap, clock: Clock, frame_times: Array, within: str
-) -> dict[str, int]:
+) -> None:
     """Author what moves in a stage at the tempo of a performance: cameras, props, roots, sounds.
 
     What USD interpolates has samples at the performance's frames and where the animation has them, what it holds only
@@ -46,11 +46,7 @@ def author_scene(
         stage: The shot, layers of ours muted.
         frame_times: Its frames [s].
         within: Path of the prim below which all is authored; `/` for the whole stage.
-
-    Returns:
-        Path of each attribute that was written, with its number of samples.
     """
-    written = {}
     for attribute in _attributes(layer, stage, within):
         kind = attribute.GetTypeName()
         if not attribute.ValueMightBeTimeVarying():
@@ -65,8 +61,6 @@ def author_scene(
             value = attribute.Get(float(clock.time_codes(tempo.animated(clock.seconds(np.array([code]))))[0]))
             if value is not None:
                 layer.SetTimeSample(spec.path, float(code), value)
-        written[str(spec.path)] = layer.GetNumTimeSamplesForPath(spec.path)
-    return written
 
 
 def _with_frames(codes: Array, frames: Array) -> Array:

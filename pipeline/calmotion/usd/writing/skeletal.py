@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,7 +31,7 @@ def author_skeletons(
     curves: tuple[MotorCurve, ...],
     times: Array,
     clock: Clock,
-) -> dict[str, int]:
+) -> None:
     """Author the rotations of every SkelAnimation whose joints the curves turn; its other joints keep theirs.
 
     What the motors cannot follow of a joint is kept: its rotation L becomes D(new) D(old)^T L.
@@ -42,9 +41,6 @@ def author_skeletons(
         character, animation: The shot as read.
         curves: Those to write, all of motors whose source is a skeleton.
         times: Of the samples [s].
-
-    Returns:
-        Path of each attribute that was written, with its number of samples.
     """
     changed = {character.motors[curve.motor].path: curve for curve in curves}
     tempo = animation.tempo
@@ -67,17 +63,15 @@ def author_skeletons(
         change = stack.turned(new) @ np.swapaxes(stack.turned(old), 1, 2)
         rotations = change @ stack.skeleton.local_rotations(stack.joint, made)
         turned.setdefault(str(stack.skeleton.animation.GetPath()), []).append((stack, rotations))
-    written: dict[str, int] = {}
     for name, parts in turned.items():
-        written |= dict(_author(layer, stage, name, parts, clock, times, made))
-    return written
+        _author(layer, stage, name, parts, clock, times, made)
 
 
 def _author(
     layer: Sdf.Layer, stage: Usd.Stage, name: str, parts: list[tuple[HingeStack, Array]], clock: Clock, times: Array,
     made: Array,
-) -> Iterator[tuple[str, int]]:  # fmt: skip
-    """Write one animation; yields what was written.
+) -> None:  # fmt: skip
+    """Write one animation.
 
     Args:
         times: Of the samples [s].
@@ -101,7 +95,6 @@ def _author(
             quaternion = quaternion_from_rotation(turns[n])
             found[k] = last[k] = quaternion if quaternion @ near >= 0.0 else -quaternion
         layer.SetTimeSample(rotations.path, float(code), gf.to_quaternions(found))
-    yield str(rotations.path), len(times)
     if more:
         _lengthen(layer, animation, name, joints, more, clock)
 

@@ -39,19 +39,15 @@ def hermite(animation: Animation, curve: MotorCurve, cyclic: bool) -> tuple[Arra
 def author_splines(
     layer: Sdf.Layer, character: Character, animation: Animation, curves: tuple[MotorCurve, ...], clock: Clock,
     meters: float,
-) -> dict[str, int]:  # fmt: skip
+) -> None:  # fmt: skip
     """Author each curve as an over with a spline, degrees or stage length; one of a shot that loops repeats itself.
 
     Args:
         curves: Those to write.
         meters: Metres in the stage's unit of length.
-
-    Returns:
-        Path of each attribute that was written, with its number of knots.
     """
     from pxr import Sdf, Ts
 
-    written = {}
     for curve in curves:
         motor, cyclic = character.motors[curve.motor], character.retarget.cyclic
         times, values, before, after = hermite(animation, curve, cyclic)
@@ -62,10 +58,7 @@ def author_splines(
             forever = Ts.Extrapolation(Ts.ExtrapLoopRepeat)
             spline.SetPreExtrapolation(forever)
             spline.SetPostExtrapolation(forever)
-        path = f"{motor.prim_path}.{motor.attribute}"
-        attribute_spec(layer, path, Sdf.ValueTypeNames.Float).SetSpline(spline)
-        written[path] = len(times)
-    return written
+        attribute_spec(layer, f"{motor.prim_path}.{motor.attribute}", Sdf.ValueTypeNames.Float).SetSpline(spline)
 
 
 def bezier(times: Array, values: Array, before: Array, after: Array, kind: str) -> Ts.Spline:
