@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from calmotion.model import Character, Motor, Provenance
@@ -21,6 +21,7 @@ from calmotion.usd import (
     StageUnits,
     author_origin,
     author_stage_metadata,
+    is_applied,
     open_stage,
     refuse_inputs,
     to_doubles,
@@ -29,6 +30,7 @@ from calmotion.usd import (
     write_layer,
     write_root,
 )
+from pxr import Gf, Sdf
 from scipy.spatial.transform import Rotation
 
 from .layer_metadata import metadata_of
@@ -52,9 +54,6 @@ from .model.estimates import (
     Calibration,
     Estimate,
 )
-
-if TYPE_CHECKING:
-    from pxr import Sdf
 
 GAIN_FACTOR = "calm:motor:gainFactor"
 ENTRY = "calibration"  # in the metadata of the layer
@@ -81,8 +80,6 @@ def write_calibration(
     Raises:
         ShotError: The output is a layer of the shot, or cannot be written.
     """
-    from pxr import Sdf
-
     refuse_inputs(provenance, output)
     stage = open_stage(provenance.shot)
     layer = Sdf.Layer.CreateAnonymous(".usda")
@@ -158,8 +155,6 @@ class _Writer:
             self._vector(item.path, "physics:diagonalInertia", diagonal * (item.value / item.nominal))
 
     def _center(self, path: str) -> None:
-        from pxr import Gf, Sdf
-
         prim = self._reading.stage.GetPrimAtPath(path)
         body = next(own for own in self._character.bodies if own.path == path)
         assert body.mass is not None
@@ -173,8 +168,6 @@ class _Writer:
         self._apply(path, "PhysicsMassAPI")
 
     def _motor(self, path: str, linear: bool) -> None:
-        from pxr import Sdf
-
         units = self._units
         length = units.length(1.0) if linear else float(np.deg2rad(1.0))
         effort = units.force(1.0) if linear else units.torque(1.0)
@@ -234,8 +227,6 @@ class _Writer:
 
     def _note(self, item: Estimate) -> None:
         """An offset of an encoder, which no attribute of the joint has."""
-        from pxr import Sdf
-
         prim = Sdf.CreatePrimInLayer(self._layer, item.path)
         entry = {"encoder_offset": item.value, "standard_deviation": item.standard_deviation, "unit": item.unit}
         prim.customData = {**dict(prim.customData), "calmotion": entry}
@@ -254,15 +245,11 @@ class _Writer:
         }
 
     def _number(self, path: str, name: str, value: float) -> Sdf.AttributeSpec:
-        from pxr import Sdf
-
         spec = self._spec(path, name, Sdf.ValueTypeNames.Float)
         spec.default = float(value)
         return spec
 
     def _vector(self, path: str, name: str, value: np.ndarray) -> None:
-        from pxr import Gf, Sdf
-
         if value.ndim == 2:
             w, x, y, z = (float(part) for part in Rotation.from_matrix(value).as_quat(scalar_first=True))
             spec = self._spec(path, name, Sdf.ValueTypeNames.Quatf)
@@ -273,8 +260,6 @@ class _Writer:
 
     def _spec(self, path: str, name: str, kind: Any) -> Sdf.AttributeSpec:
         """The spec of an attribute, of the type that the shot gave it."""
-        from pxr import Sdf
-
         attribute = self._reading.stage.GetPrimAtPath(path).GetAttribute(name)
         prim = Sdf.CreatePrimInLayer(self._layer, path)
         made = Sdf.Path(path).AppendProperty(name)
@@ -282,9 +267,6 @@ class _Writer:
         return self._layer.GetAttributeAtPath(made) or Sdf.AttributeSpec(prim, name, known or kind)
 
     def _apply(self, path: str, schema: str) -> None:
-        from calmotion.usd import is_applied
-        from pxr import Sdf
-
         if is_applied(self._reading.stage.GetPrimAtPath(path), schema):
             return
         prim = Sdf.CreatePrimInLayer(self._layer, path)

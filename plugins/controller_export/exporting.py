@@ -29,6 +29,7 @@ from calmotion.workflow import (
     carry_out,
     compiled_run,
     no_input,
+    plain,
     read_settings,
     refuse_layers,
     refuse_overwriting,
@@ -105,8 +106,6 @@ class Export:
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints."""
-        from calmotion.workflow import plain
-
         rows = [
             {
                 "path": path,

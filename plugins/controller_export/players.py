@@ -6,6 +6,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import Sample
 from scipy.interpolate import CubicHermiteSpline, PPoly
+from scipy.linalg import expm
 
 from .commands import BEZIER, CUBIC, FOLLOW, HOLD, QUINTIC, SETTLED, Commands, Follower
 
@@ -128,8 +129,6 @@ def _bezier(u: Array, p0: Array | float, p1: Array, p2: Array, p3: Array | float
 
 def _followed(times: Array, positions: Array, start: Array | None, follower: Follower) -> PPoly:
     """What a motor does that follows held commands, from rest: the exact solution of its linear law."""
-    from scipy.linalg import expm
-
     law = np.array([[0.0, 1.0], [-follower.gain, -follower.gain * follower.lookahead]])
     state = np.stack([positions[0] if start is None else start, np.zeros(positions.shape[1])])
     steps: dict[float, Array] = {}

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import Animation
+from scipy.interpolate import CubicSpline
 
 from .lines import Sample, Sink, Source
 from .session import Live
@@ -64,8 +65,6 @@ def play_clock(live: Live, source: Source, sink: Sink, seconds: float | None = N
 
 def samples_of_animation(live: Live, animation: Animation) -> Iterator[Sample]:
     """The animation of a shot as a stream, at the rate of the player."""
-    from scipy.interpolate import CubicSpline
-
     end = float(animation.frame_times[-1])
     curves = [CubicSpline(t.times, t.values) if len(t.times) > 1 else None for t in animation.current]
 

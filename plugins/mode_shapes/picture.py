@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from calmotion.mesh import QuadraticMesh
 from calmotion.support import replaced
-
-if TYPE_CHECKING:
-    from calmotion.mesh import QuadraticMesh
 
 COLUMNS = 4
 _WIDTH = 3.2  # of a panel [inch]

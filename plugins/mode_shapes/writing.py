@@ -7,19 +7,15 @@ import io
 import itertools
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.arrays import box_diagonal
 from calmotion.errors import ShotError
 from calmotion.model import Body
-from calmotion.reduction import inertia_integrals, modal_damping
+from calmotion.reduction import LinearModes, inertia_integrals, modal_damping
 from calmotion.support import replaced, write_text
 
 from .picture import draw_modes
-
-if TYPE_CHECKING:
-    from calmotion.reduction import LinearModes
 
 SHOWN = 0.1  # largest displacement of a mode in the files, of the size of the body
 COLUMNS = ("body", "mode", "frequency_hz", "damping_ratio", "mass_x_kg", "mass_y_kg", "mass_z_kg", "mass_kg")

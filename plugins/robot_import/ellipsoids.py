@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from calmotion.usd import StageUnits
-
-if TYPE_CHECKING:
-    from pxr import Usd
+from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
 
 def author_ellipsoids(
@@ -23,8 +21,6 @@ def author_ellipsoids(
         found: As `converters.compiled_values` gives them: of each its body, place in the body's frame [m], rotation
             (w, x, y, z), half axes [m], and what the file states of its mass [kg] or density [kg/m^3].
     """
-    from pxr import Gf, UsdGeom, UsdPhysics
-
     for ellipsoid in found:
         above = bodies[ellipsoid["body"]] if ellipsoid["body"] >= 0 else stage.GetDefaultPrim()
         sphere = UsdGeom.Sphere.Define(stage, _free_path(above))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from calmotion.errors import ShotError
@@ -21,12 +21,10 @@ from calmotion.usd import (
     joint_prims,
     prims_of,
 )
+from pxr import Gf, Sdf, Usd, UsdPhysics
 
 from .description.repairs import JointFrame
 from .robot_motors import LIMITS, Axis, axes_of, free_axes, is_driven, named
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 _SLOW = 1e5  # time in which the spring beside a damper alone would pull a joint back [s]
@@ -61,8 +59,6 @@ class Placement:
 def author_frames(units: StageUnits, placements: Iterable[Placement]) -> None:
     """Author poses of bodies and frames of their joints. The converters find angles from their cosine in single
     precision, by which those of calibrated robots are lost: 0.02 degrees, 0.1 mm on a forearm."""
-    from pxr import Gf
-
     for place in placements:
         turn = Gf.Quatd(*place.rotation).GetNormalized()
         at = Gf.Vec3d(*place.position) / units.length(1.0)
@@ -85,8 +81,6 @@ def author_frames(units: StageUnits, placements: Iterable[Placement]) -> None:
 def urdf_placements(stage: Usd.Stage, frames: Mapping[str, JointFrame]) -> Iterator[Placement]:
     """Those of the joints of a URDF, by their names; each is where its child is. A converter leaves out links that are
     frames, and ties a joint to the body that carries its parent: fixed joints are in between."""
-    from pxr import Gf
-
     fixed_at = {frame.child: frame for frame in frames.values()}
     for prim in joint_prims(stage):
         body, carrier = (stage.GetPrimAtPath(body_on(stage, prim, side) or "/") for side in (1, 0))
@@ -106,8 +100,6 @@ def urdf_placements(stage: Usd.Stage, frames: Mapping[str, JointFrame]) -> Itera
 
 def _turn(angles: Iterable[float]) -> Any:
     """The rotation by roll, pitch and yaw, which are about the axes of the parent, x first."""
-    from pxr import Gf
-
     turn = Gf.Quatd(1.0)
     for angle, unit in zip(angles, _AXES.values(), strict=True):
         turn = Gf.Quatd(float(np.cos(0.5 * angle)), Gf.Vec3d(*unit) * float(np.sin(0.5 * angle))) * turn
@@ -116,8 +108,6 @@ def _turn(angles: Iterable[float]) -> Any:
 
 def _between(start: Any, end: Any) -> Any:
     """The smallest rotation from one direction to another one, which is not opposite to it."""
-    from pxr import Gf
-
     return Gf.Quatd(1.0 + start * end, Gf.Cross(start, end)).GetNormalized()
 
 
@@ -156,8 +146,6 @@ def author_actuators(stage: Usd.Stage, values: Mapping[str, Any], joints: Sequen
 
 def author(prim: Usd.Prim, name: str, value: Any) -> None:
     """Author an attribute of a schema that usd-core does not have; what is not there and 0 stays as it is."""
-    from pxr import Sdf
-
     attribute = prim.GetAttribute(name)
     if not attribute.IsDefined() and value:
         kinds = {float: Sdf.ValueTypeNames.Double, str: Sdf.ValueTypeNames.Token}
@@ -269,8 +257,6 @@ def author_locks(stage: Usd.Stage, units: StageUnits, locks: Mapping[str, float]
     Raises:
         ShotError: The motion moves one.
     """
-    from pxr import Sdf, UsdPhysics
-
     held = [axis for prim in joint_prims(stage) if named(prim) in locks for axis in axes_of(prim)]
     for axis in held:
         target = UsdPhysics.DriveAPI.Apply(axis.prim, axis.drive).CreateTargetPositionAttr()
@@ -314,8 +300,6 @@ def _is_rough(axis: Axis) -> bool:
 
 
 def _author(prim: Usd.Prim, radians: bool, units: StageUnits) -> None:
-    from pxr import Sdf, UsdPhysics
-
     axis, damping = axes_of(prim)[0], _number(prim, "newton:damping")
     stiffness, at = _number(prim, "mjc:stiffness"), _number(prim, "mjc:springref")
     drive = UsdPhysics.DriveAPI.Apply(prim, axis.drive)

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from calmotion.errors import ShotError, raise_all
 from calmotion.model import Character
 from calmotion.usd import StageUnits, body_on, is_applied, is_rigid_body, joint_prims, prims_of
+from pxr import Gf, Usd, UsdPhysics
 
 from .ellipsoids import author_ellipsoids
 from .joints import Placement, author, author_actuators, author_frames
 from .options import RobotOptions, carried_by, geoms_of
 from .robot_motors import named
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _HEAVIEST = 1e5  # of a robot [kg]
 _FRAME_MASS, _FRAME_INERTIA = 1e-6, 1e-10  # of links without mass [kg], [kg m^2]
@@ -112,8 +110,6 @@ def _placements(
 
 
 def _author_mass(prim: Usd.Prim, body: Mapping[str, Any], units: StageUnits) -> None:
-    from pxr import Gf, UsdPhysics
-
     api = UsdPhysics.MassAPI.Apply(prim)
     api.CreateMassAttr(body["mass"] / units.mass(1.0))
     api.CreateCenterOfMassAttr(Gf.Vec3f(*(np.array(body["center"]) / units.length(1.0)).tolist()))
@@ -138,8 +134,6 @@ class _Author:
 
     def masses(self) -> None:
         """Densities of the links that have no inertia, and a milligram for those that have no mass."""
-        from pxr import Gf, UsdPhysics
-
         weightless: list[Usd.Prim] = []
         if self._options.compiled is not None:
             weightless = _author_values(self._stage, self._units, self._options.compiled, self._keeps_mass)
@@ -196,8 +190,6 @@ class _Author:
 
     def _weighs_nothing(self, body: Usd.Prim) -> bool:
         """Whether all geoms of a rigid link of an MJCF are of mass 0; where some are, they are made weightless."""
-        from pxr import UsdPhysics
-
         geoms = list(geoms_of(body))
         weightless = [prim for prim in geoms if _weight(prim) == 0.0]
         if not weightless or _weight(body):
@@ -210,8 +202,6 @@ class _Author:
 
     def _raise_moments(self) -> None:
         """Dummy links often have inertias that no body has, with all products as large as the moments."""
-        from pxr import Gf
-
         raised: list[str] = []
         missing: list[str] = []
         negative: list[str] = []

@@ -5,17 +5,15 @@ from __future__ import annotations
 import fnmatch
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from calmotion.catalogs import Material
 from calmotion.model import MotorTracks
 from calmotion.usd import is_applied, is_rigid_body
+from pxr import Usd
 
 from .description.descriptions import MJCF, Description
 from .robot_motors import named
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 
 @dataclass(frozen=True)

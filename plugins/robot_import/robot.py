@@ -18,7 +18,7 @@ from calmotion.model import Animation, Character, MotorTracks, Provenance, Sourc
 from calmotion.support import try_writing
 from calmotion.usd import EXTENSIONS, read_shot, refuse_input_as_output, relative_asset, write_layer
 from calmotion.version import __version__
-from calmotion.workflow import Given, Path, problems_of, read_settings, value_of
+from calmotion.workflow import Given, Path, plain, problems_of, read_settings, value_of
 
 from .converters import BrokenMeshes, compiled_values, convert, converter_python, temporary_folder
 from .description.descriptions import USD, Description, read_description, repaired
@@ -53,8 +53,6 @@ class ImportedRobot:
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints."""
-        from calmotion.workflow import plain
-
         character, frames = self.character, self.animation.frame_times
         report: dict[str, Any] = plain(
             {

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.errors import ShotError, raise_all
 from calmotion.support import nearest
 from calmotion.usd import StageUnits, author_material, is_rigid_body, open_stage, prims_of, quiet, units_of
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from .joints import (
     author_frames,
@@ -22,9 +22,6 @@ from .joints import (
 from .masses import MUJOCO_DENSITY, author_masses
 from .options import RobotOptions, carried_by, geoms_of, is_named
 from .robot_motors import author_motors, named, narrow_limits
-
-if TYPE_CHECKING:
-    from pxr import Sdf, Usd
 
 _TURN = 6.5  # more than one [rad]
 _THICKNESS = "calm:flexible:wallThickness"
@@ -41,8 +38,6 @@ def robot_layer(converted: str, asset: str, options: RobotOptions) -> tuple[Sdf.
     Raises:
         ShotError: A name that nothing has, or a link without mass.
     """
-    from pxr import Sdf, Usd
-
     robot = open_stage(converted)
     layer = Sdf.Layer.CreateAnonymous(".usda")
     layer.subLayerPaths = [os.path.abspath(converted)]
@@ -80,8 +75,6 @@ class _Author:
 
     def metadata(self) -> None:
         """Units, axes, default prim and clock: a layer does not inherit them from its sublayers."""
-        from pxr import UsdGeom, UsdPhysics
-
         root, options = self._stage.GetRootLayer(), self._options
         default = self._robot.GetDefaultPrim()
         root.defaultPrim = default.GetName() if default else ""
@@ -126,8 +119,6 @@ class _Author:
 
     def links(self) -> None:
         """Flexible links with their materials."""
-        from pxr import Sdf, UsdShade
-
         root = self._stage.GetDefaultPrim()
         flexible: set[str] = set()
         for given in self._options.flexible:
@@ -162,8 +153,6 @@ class _Author:
 
     def targets(self) -> None:
         """Targets at links, or at frames that links carry."""
-        from pxr import UsdGeom
-
         carried = [
             prim
             for body in self._bodies

@@ -5,7 +5,6 @@ from __future__ import annotations
 import fnmatch
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.errors import ShotError
@@ -29,9 +28,7 @@ from calmotion.usd import (
     limits_of,
     tracks_of_joints,
 )
-
-if TYPE_CHECKING:
-    from pxr import Usd
+from pxr import Sdf, Usd, UsdPhysics
 
 ALL = "all"
 LIMITS = ("physics:lowerLimit", "physics:upperLimit")
@@ -143,8 +140,6 @@ def author_motors(
         ShotError: A name that no joint has; a closed chain, all of whose joints would be motors; no joint at all that a
             motor can drive.
     """
-    from pxr import Sdf
-
     axes = [axis for prim in joint_prims(stage) for axis in axes_of(prim)]
     moved, notes = MotorTracks("", np.zeros(0), {}), tuple[str, ...]()
     if motion is not None:
@@ -174,8 +169,6 @@ def author_motors(
 
 
 def _author(axis: Axis, track: Track | None, units: StageUnits, frames_per_second: float) -> None:
-    from pxr import UsdPhysics
-
     attribute = UsdPhysics.DriveAPI.Apply(axis.prim, axis.drive).CreateTargetPositionAttr()
     if track is not None:
         scale = 1.0 / units.length(1.0) if axis.linear else np.degrees(1.0)

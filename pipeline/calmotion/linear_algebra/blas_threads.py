@@ -16,7 +16,6 @@ from typing import Any
 @cache
 def _controller() -> Any:
     """The controller of the loaded libraries; the search for them takes milliseconds."""
-    import scipy.linalg  # noqa: F401  SciPy may load its own BLAS
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()

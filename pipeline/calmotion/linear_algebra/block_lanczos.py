@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh
 
 from calmotion.arrays import Array
 from calmotion.linear_algebra.blas_threads import one_blas_thread
@@ -115,7 +116,5 @@ def _normalized(W: Array, M: Any, blocks: list[Array], inner: Array | None) -> t
 
 def _refined(K: Any, M: Any, modes: Array) -> tuple[Array, Array]:
     """Ritz values and vectors in the span of the modes; the error of the values is the square of that of the modes."""
-    from scipy.linalg import eigh
-
     values, U = eigh(modes.T @ (K @ modes), modes.T @ (M @ modes))
     return values, modes @ U

@@ -13,6 +13,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.linalg.blas import dsyrk, dtrsm
+from scipy.linalg.lapack import dpotrf
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -125,9 +127,6 @@ class MultifrontalCholesky:
             self._factor(matrix.tocsr()[self._order][:, self._order].tocsc(), dissection.parent, outer)
 
     def _factor(self, A: Any, parent: Any, outer: Any) -> None:
-        from scipy.linalg.blas import dsyrk, dtrsm
-        from scipy.linalg.lapack import dpotrf
-
         complements = _Complements(parent, outer)
         place = np.zeros(A.shape[0], dtype=np.int64)
         for k, border in enumerate(self._borders):
@@ -160,8 +159,6 @@ class MultifrontalCholesky:
 
     def solve(self, b: Array) -> Array:
         """x with matrix @ x = b, b of shape [n, k]."""
-        from scipy.linalg.blas import dtrsm
-
         x = np.ascontiguousarray(b[self._order], dtype=float)
         pieces = list(zip(self._start[:-1], self._start[1:], self._borders, self._diagonal, self._below, strict=True))
         for s, e, border, L11, L21 in pieces:

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse.csgraph import maximum_bipartite_matching
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra, maximum_bipartite_matching
 
 from calmotion.arrays import Array, BoolArray
 
@@ -50,8 +51,6 @@ def dissect(graph: Any, points: Array | None = None) -> Dissection:
     Returns:
         Pieces such that nodes of two pieces are neighbours only if one piece is an ancestor of the other.
     """
-    from scipy.sparse import csr_matrix
-
     n = graph.shape[0]
     graph = csr_matrix((np.ones(graph.nnz, dtype=np.int8), graph.indices, graph.indptr), shape=graph.shape)
     pieces: list[Any] = []
@@ -86,8 +85,6 @@ def dissect(graph: Any, points: Array | None = None) -> Dissection:
 
 def _induced(graph: Any, nodes: Any) -> Any:
     """The subgraph of some nodes, ascending."""
-    from scipy.sparse import csr_matrix
-
     n, k = graph.shape[0], len(nodes)
     place = np.full(n, -1, dtype=graph.indices.dtype)
     place[nodes] = np.arange(k, dtype=place.dtype)
@@ -106,8 +103,6 @@ def _levels(graph: Any) -> Array:
 
     They are integers, so cuts do not depend on rounding.
     """
-    from scipy.sparse.csgraph import dijkstra
-
     n = graph.shape[0]
     distances = np.zeros((n, _LANDMARKS))
     landmark = int(dijkstra(graph, unweighted=True, indices=0, directed=False).argmax())

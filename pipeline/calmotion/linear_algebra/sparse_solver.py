@@ -6,6 +6,7 @@ from copy import copy
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from calmotion.arrays import Array
 from calmotion.linear_algebra.blas_threads import one_blas_thread
@@ -57,8 +58,6 @@ class SparseSolver:
 
 def _graph(matrix: Any, block: int) -> Any:
     """Sparse CSR pattern of the blocks of a CSR matrix, shape [n / block, n / block]."""
-    from scipy.sparse import csr_matrix
-
     blocks = matrix.shape[0] // block
     row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr)) // block
     return csr_matrix((np.ones(matrix.nnz, dtype=np.int8), (row, matrix.indices // block)), shape=(blocks, blocks))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from calmotion.arrays import Array, Indices, box_diagonal
 from calmotion.mesh.surfaces.distances import ray_length
@@ -109,8 +110,6 @@ def expected_nodes(shape: Shape, size: float) -> float:
 
 def smallest_size(shape: Shape, max_nodes: int) -> float:
     """The size [m] that takes a number of nodes."""
-    from scipy.optimize import brentq
-
     low = high = shape.length
     while expected_nodes(shape, low) < max_nodes:
         low *= 0.5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import binary_closing
 
 from calmotion.arrays import Array, BoolArray, Indices, IntArray
 from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles
@@ -143,8 +144,6 @@ def closed_slits(points: Array, triangles: Indices, spacing: float) -> tuple[Arr
         Points [m], shape [k, 3], and triangles, shape [l, 3], closed and outward, some seven for each cell of the
         grid on the surface.
     """
-    from scipy.ndimage import binary_closing
-
     aside = 2.5 * spacing
     low = points.min(axis=0) - aside
     counts = np.ceil((points.max(axis=0) + aside - low) / spacing).astype(np.int64) + 1

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import spsolve
 
 from calmotion.arrays import Array, Indices, IntArray
 from calmotion.mesh.patches.cut_patches import with_rims
@@ -68,9 +70,6 @@ def heights(corners: Array, surface: NearbyTriangles) -> tuple[Array, Array, Arr
 
 def _step(points: Array, boundary: IntArray, surface: NearbyTriangles) -> Array:
     """Movement of all points that fits the boundary, to first order [m], shape [n, 3]."""
-    from scipy.sparse import coo_matrix, diags
-    from scipy.sparse.linalg import spsolve
-
     height, normal, area = heights(points[boundary], surface)
     known = np.isfinite(height)
     distance = np.where(known, height, 0.0)

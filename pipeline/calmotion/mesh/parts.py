@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from calmotion.arrays import Array, Indices, IntArray, box_diagonal
 from calmotion.mesh.surfaces.closed_surfaces import winding_numbers
@@ -93,8 +94,6 @@ def holders(places: Array, parts: Sequence[Part]) -> Indices:
 
 def _nearest(places: Array, parts: Sequence[Part], reach: float) -> Indices:
     """Index of the part with the nearest surface, shape [k]; beyond reach, of that with the nearest corner."""
-    from scipy.spatial import cKDTree
-
     least, found = np.full(len(places), np.inf), np.zeros(len(places), np.int64)
     for index, part in enumerate(parts):
         closest = NearbyTriangles(part.points, part.triangles, reach).closest(places)

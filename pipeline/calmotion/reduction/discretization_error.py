@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from calmotion.arrays import Array, Indices, IntArray
 from calmotion.mesh.quadratic import QuadraticMesh
@@ -99,8 +100,6 @@ def _recovered(mesh: QuadraticMesh, points: Array, samples: Array) -> Array:
         points: Sampling points in the reference tetrahedron, shape [3, q].
         samples: Strains there, shape [m, q, 6, k].
     """
-    from scipy.sparse import csr_matrix
-
     corners, e = mesh.tets[:, :4], len(mesh.tets)
     count = int(corners.max()) + 1
     at = mesh.basis.mapping.F(points).transpose(1, 2, 0)
@@ -128,8 +127,6 @@ def _weights(near: Any, at: Array, places: Array) -> Any:
     Returns:
         Sparse, shape [k, m q].
     """
-    from scipy.sparse import csr_matrix
-
     q = at.shape[1]
     begin = q * near.indptr
     P, normal = np.empty((begin[-1], 10)), np.zeros((len(places), 10, 10))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import eigh
 
 from calmotion.arrays import Array
 from calmotion.reduction.reduced_body import Elasticity, Invariants, ReducedBody
@@ -39,8 +40,6 @@ def principal_subspace(body: ReducedBody, motion: Array, missing: float) -> Arra
 
 def _diagonal(body: ReducedBody, T: Array) -> Array:
     """A basis of the same subspace with unit mass and diagonal stiffness."""
-    from scipy.linalg import eigh
-
     K, M = T.T @ (body.stiffness[:, None] * T), T.T @ body.invariants.M @ T
     T = T @ eigh(K, M)[1]
     return T * np.where(T[np.abs(T).argmax(axis=0), np.arange(T.shape[1])] < 0.0, -1.0, 1.0)

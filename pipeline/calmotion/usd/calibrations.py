@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Usd
 
 from calmotion.model.uncertainty import KnownFactors
 from calmotion.usd import stages
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 
 def known_factors(stage: Usd.Stage) -> KnownFactors:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from pxr import Usd
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 MOST_FRAMES = 10_000_000  # a day at 120 frames a second
 SHORTEST = 1e-6  # [s]

@@ -7,14 +7,13 @@ import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from pxr import Sdf, Tf
 
 from calmotion.errors import ShotError
 from calmotion.support.files import is_special
 from calmotion.support.foreign_files import forbidden_place, refuse_lfs_pointers
-
-if TYPE_CHECKING:
-    from pxr import Sdf
 
 MOST_CLIPS = 100_000  # of one template: USD looks for each of them
 CLIPS, _VARIANT_SETS, _CHILDREN = "clips", "variantSetNames", "primChildren"  # metadata of a prim
@@ -119,8 +118,6 @@ def refuse_special(path: str, named_by: str = "") -> None:
 def open_dependencies(root: Sdf.Layer) -> list[Sdf.Layer]:
     """The layers that a layer names, directly or not, opened before the stage so that none is a special file or a
     pointer of Git LFS."""
-    from pxr import Sdf, Tf
-
     opened, names = [root], {root.identifier}
     for layer in opened:
         for name in _named_by(layer):
@@ -145,8 +142,6 @@ def _named_by(layer: Sdf.Layer) -> list[str]:
     Raises:
         ShotError: A place of them is not opened.
     """
-    from pxr import Sdf
-
     assets = [asset for asset in (*layer.GetCompositionAssetDependencies(), *clip_assets(layer)) if asset]
     for asset in assets:
         refuse_place(asset, layer.identifier)

@@ -5,12 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
-from calmotion.support import interrupts
-
-if TYPE_CHECKING:
-    from pxr import Usd
+from pxr import Usd, UsdUtils
 
 _CIRCUMSTANCES = re.compile(r" \((?:instantiating|recomposing|composing) stage on stage @.*\)$")
 _SESSION = re.compile(r",@anon:[^@]*-session[^@]*@")
@@ -23,9 +19,6 @@ def quiet() -> Iterator[list[str]]:
     Yields:
         A list that has the messages, each once in one line, when the block has ended.
     """
-    with interrupts.deferred():  # USD goes on with half of its modules when the import of one is interrupted
-        from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdSkel, UsdUtils, Vt  # noqa: F401
-
     delegate = UsdUtils.CoalescingDiagnosticDelegate()
     messages: list[str] = []
     try:

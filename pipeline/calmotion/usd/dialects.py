@@ -10,13 +10,11 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+
+from pxr import Usd
 
 from calmotion.model.motor import FRICTION_LAWS
 from calmotion.usd import schemas
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 USD, SI = "usd", "si"  # degrees and stage units, or radians and stage units as MuJoCo has them
 

@@ -7,14 +7,12 @@ the engine. Quaternions are (w, x, y, z).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Gf, Sdf, Vt
 
 from calmotion.arrays import Array, IntArray
-
-if TYPE_CHECKING:
-    from pxr import Gf, Sdf, Vt
 
 
 def vector(value: Any) -> Array:
@@ -55,36 +53,26 @@ def indices(value: Any, width: int | None = None) -> IntArray:
 
 def to_matrix(value: Array) -> Gf.Matrix4d:
     """The Gf.Matrix4d of a matrix [4, 4] that maps column vectors."""
-    from pxr import Gf
-
     return Gf.Matrix4d(np.ascontiguousarray(value.T).tolist())
 
 
 def to_points(value: Array) -> Vt.Vec3fArray:
     """A Vt.Vec3fArray of points [n, 3]."""
-    from pxr import Vt
-
     return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(value, dtype=np.float32))
 
 
 def to_quaternion(value: Array) -> Gf.Quatf:
     """A Gf.Quatf of a quaternion (w, x, y, z), shape [4]."""
-    from pxr import Gf
-
     return Gf.Quatf(float(value[0]), Gf.Vec3f(*(float(x) for x in value[1:])))
 
 
 def to_quaternions(value: Array) -> Vt.QuatfArray:
     """A Vt.QuatfArray of quaternions (w, x, y, z), shape [n, 4]."""
-    from pxr import Vt
-
     return Vt.QuatfArray.FromNumpy(np.ascontiguousarray(np.roll(value, -1, axis=1), dtype=np.float32))
 
 
 def to_vectors(value: Array, kind: Sdf.ValueTypeName) -> Vt.Vec3fArray | Vt.Vec3hArray:
     """A Vt array of vectors [n, 3] as the value of an attribute of type Float3Array or Half3Array."""
-    from pxr import Sdf, Vt
-
     if kind == Sdf.ValueTypeNames.Half3Array:
         return Vt.Vec3hArray.FromNumpy(np.ascontiguousarray(value, dtype=np.float16))
     return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(value, dtype=np.float32))
@@ -92,13 +80,9 @@ def to_vectors(value: Array, kind: Sdf.ValueTypeName) -> Vt.Vec3fArray | Vt.Vec3
 
 def to_strings(values: Iterable[object]) -> Vt.StringArray:
     """A Vt.StringArray: a Python list in layer metadata writes a file that cannot be opened again."""
-    from pxr import Vt
-
     return Vt.StringArray([str(v) for v in values])
 
 
 def to_doubles(values: Iterable[float]) -> Vt.DoubleArray:
     """A Vt.DoubleArray; a Python list in layer metadata writes a file that cannot be opened again."""
-    from pxr import Vt
-
     return Vt.DoubleArray([float(v) for v in values])

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+
+from pxr import Sdf, Tf
 
 from calmotion.errors import ShotError
 from calmotion.support.files import replaced
 from calmotion.usd.diagnostics import quiet
-
-if TYPE_CHECKING:
-    from pxr import Sdf
 
 EXTENSIONS = (".usda", ".usdc", ".usd")
 
@@ -65,8 +63,6 @@ def write_layer(layer: Sdf.Layer, output: str, validate: Callable[[str], object]
     Raises:
         ShotError: The file cannot be written, or cannot be opened again.
     """
-    from pxr import Sdf, Tf
-
     try:
         with quiet(), replaced(output) as temporary:
             if not layer.Export(str(temporary)):

@@ -9,10 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from pxr import Sdf, Usd
+from pxr import Sdf, Usd
 
 LARGE = 20_000  # prims
 _SCHEMAS = (
@@ -36,8 +34,6 @@ def masked(stage: Usd.Stage, muted: Iterable[str] = ()) -> Usd.Stage:
     Args:
         muted: Identifiers of layers that it mutes.
     """
-    from pxr import Usd
-
     anchors = _anchors(stage)
     if anchors is None:
         return stage
@@ -51,8 +47,6 @@ def masked(stage: Usd.Stage, muted: Iterable[str] = ()) -> Usd.Stage:
 
 def _anchors(stage: Usd.Stage) -> list[Sdf.Path] | None:
     """Paths of the prims that have to do with physics, none below another; None where the stage is not large."""
-    from pxr import Usd
-
     count, found = 0, []
     walk = iter(stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimIsActive)))
     for prim in walk:

@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from pxr import Plug, Usd
 
 from calmotion.errors import ShotError
-from calmotion.support.memory import require_address_space
 from calmotion.support.naming import nearest
 
-if TYPE_CHECKING:
-    from pxr import Usd
-
-_LIBRARIES = 0.6e9  # address space of the libraries that USD loads here, and of its threads on two cores [bytes]
 CORRECT = "Correct the value, or remove the attribute"  # the usual remedy
 NAMES = ("CalmFlexibleBodyAPI", "CalmDampingAPI", "CalmMotorAPI", "CalmTargetAPI", "CalmRetargetAPI")
 
 
 def plugin_path() -> str:
-    """The folder with `plugInfo.json`, for `PXR_PLUGINPATH_NAME` or another application; does not import pxr.
+    """The folder with `plugInfo.json`, for `PXR_PLUGINPATH_NAME` or another application.
 
     Returns:
         Path of the folder inside the installed package, else of the one in the repository.
@@ -44,12 +40,6 @@ def plugin_path() -> str:
     )
 
 
-@cache
-def _require_room() -> None:
-    """Refuse, until it was there once, a limit of memory that leaves too little for USD, which would crash."""
-    require_address_space(_LIBRARIES, "USD")
-
-
 def register() -> None:
     """Register the schemas in USD; calling it again does nothing.
 
@@ -59,9 +49,6 @@ def register() -> None:
     Raises:
         ShotError: Called too late in this process.
     """
-    from pxr import Plug, Usd
-
-    _require_room()
     Plug.Registry().RegisterPlugins(plugin_path())
     registry = Usd.SchemaRegistry()
     missing = [name for name in NAMES if registry.FindAppliedAPIPrimDefinition(name) is None]
@@ -86,8 +73,6 @@ def value(prim: Usd.Prim, schema: str, attribute: str, time: float | None = None
     Returns:
         The value, or None where neither an opinion nor a fallback exists.
     """
-    from pxr import Usd
-
     authored = prim.GetAttribute(attribute)
     if authored and authored.HasAuthoredValue():
         authored_value = authored.Get() if time is None else authored.Get(time)

@@ -8,7 +8,8 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from pxr import Pcp, Sdf, Tf, Usd
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.model import InputLayer
@@ -17,9 +18,6 @@ from calmotion.support.naming import nearest_name
 from calmotion.usd import schemas
 from calmotion.usd.dependencies import open_dependencies, refuse_special
 from calmotion.usd.diagnostics import one_line, quiet
-
-if TYPE_CHECKING:
-    from pxr import Pcp, Sdf, Usd
 
 SUFFIXES = (".usda", ".usdc", ".usd", ".usdz")
 
@@ -45,8 +43,6 @@ _REFUSED = (
 @contextmanager
 def refused_by_usd(stage: Usd.Stage) -> Iterator[None]:
     """Turn an error of USD into a ShotError with the prim and attribute that USD names."""
-    from pxr import Tf
-
     try:
         yield
     except Tf.ErrorException as error:
@@ -94,8 +90,6 @@ def open_layer(path: str) -> Sdf.Layer:
     Raises:
         ShotError: The file does not exist, cannot be read, or is not a USD file.
     """
-    from pxr import Sdf, Tf
-
     if os.path.islink(path) and not os.path.exists(path):
         raise ShotError(
             "this is a symbolic link to a file that does not exist",
@@ -139,8 +133,6 @@ def open_stage(path: str, *, muted: tuple[str, ...] = ()) -> Usd.Stage:
     Raises:
         ShotError: See `open_layer`; or a sublayer, reference or payload is missing.
     """
-    from pxr import Tf, Usd
-
     schemas.register()
     layer = open_layer(path)
     with quiet():
@@ -172,8 +164,6 @@ def _reload(layer: Sdf.Layer) -> None:
     Raises:
         ShotError: It is damaged now.
     """
-    from pxr import Tf
-
     try:
         layer.Reload()
     except Tf.ErrorException as error:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
+
+from pxr import Usd, UsdGeom, UsdPhysics
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 Quantity = TypeVar("Quantity", float, Array)
 
@@ -74,8 +73,6 @@ def units_of(stage: Usd.Stage) -> StageUnits:
     Raises:
         ShotError: A unit that is not positive, or that nobody measures in.
     """
-    from pxr import UsdGeom, UsdPhysics
-
     units = StageUnits(UsdGeom.GetStageMetersPerUnit(stage), UsdPhysics.GetStageKilogramsPerUnit(stage))
     for name, value in (("metersPerUnit", units.meters), ("kilogramsPerUnit", units.kilograms)):
         if SMALLEST <= value <= LARGEST:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
+from pxr import Sdf, Usd, UsdValidation
 
 from calmotion.errors import ShotError, each
 from calmotion.model.outputs import ERROR, WARNING, Finding, Findings
@@ -14,9 +15,6 @@ from calmotion.usd.diagnostics import quiet, with_places
 from calmotion.usd.reading.context import prims_of
 from calmotion.usd.reading.shot import StageReading, read_stage
 from calmotion.usd.reading.unread import misplaced_schemas, unread_attributes
-
-if TYPE_CHECKING:
-    from pxr import Usd, UsdValidation
 
 READABLE, SCHEMAS, PLACES, LIMITS = "ShotIsReadable", "SchemasAreKnown", "SchemasFit", "AnimationKeepsLimits"
 
@@ -115,8 +113,6 @@ def _checked(name: str, stage: Usd.Stage, rule: Rule) -> list[Finding]:
 
 def _usd_findings(stage: Usd.Stage) -> list[Finding]:
     """The findings of USD's own validators."""
-    from pxr import UsdValidation
-
     registry = UsdValidation.ValidationRegistry()
     names = [m.name for m in registry.GetAllValidatorMetadata() if not m.name.startswith(f"{_PLUGIN}:")]
     context = UsdValidation.ValidationContext(registry.GetOrLoadValidatorsByName(names))
@@ -146,8 +142,6 @@ def _place(error: UsdValidation.ValidationError, stage: Usd.Stage) -> tuple[str,
 
 def register_validators() -> None:
     """Register Calmotion's rules in USD's validation framework, as stage validators; calling it again does nothing."""
-    from pxr import UsdValidation
-
     registry = UsdValidation.ValidationRegistry()
     for name, (rule, text) in RULES.items():
         full = f"{_PLUGIN}:{name}"
@@ -160,8 +154,6 @@ def register_validators() -> None:
 
 
 def _as_validator(name: str, rule: Rule) -> Callable[[Usd.Stage, Any], list[UsdValidation.ValidationError]]:
-    from pxr import Sdf, UsdValidation
-
     kinds = {ERROR: UsdValidation.ValidationErrorType.Error, WARNING: UsdValidation.ValidationErrorType.Warn}
 
     def validate(stage: Usd.Stage, times: Any) -> list[UsdValidation.ValidationError]:

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from calmotion.arrays import Array, IntArray
 from calmotion.model.character import Character
@@ -276,8 +277,6 @@ def light_of(view: View, shadow: Hits | None) -> Light:
         view: For the colors, and the camera, by which the lights stand.
         shadow: The floor in the shadow, in pixels of the picture.
     """
-    from scipy.ndimage import gaussian_filter
-
     soft, near = np.zeros((0, 0), dtype=np.float32), np.zeros((0, 0), dtype=np.float32)
     if shadow is not None and shadow.filled.any():
         rows, columns = (np.flatnonzero(shadow.filled.any(axis=axis)) for axis in (1, 0))

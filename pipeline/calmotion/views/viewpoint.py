@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from calmotion.arrays import Array, BoolArray, IntArray
 from calmotion.model.character import Character
@@ -215,8 +216,6 @@ def _still_surfaces(character: Character, motion: Motion) -> tuple[list[Array], 
 
 def hull_corners(points: Array) -> IntArray:
     """Indices of the points, shape [n, 3], that are corners of their convex hull; of all, where they are flat."""
-    from scipy.spatial import ConvexHull, QhullError
-
     try:
         return np.asarray(ConvexHull(points).vertices, dtype=np.int32)
     except (QhullError, ValueError):  # flat, or fewer than four

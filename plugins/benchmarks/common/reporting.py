@@ -14,7 +14,7 @@ from typing import Any, get_type_hints
 
 import numpy as np
 from calmotion import ShotError
-from calmotion.cli import json_option, length
+from calmotion.cli import console_on, json_option, length, print_table
 
 from .shots import load
 
@@ -173,8 +173,6 @@ def finish(
 
 def show(title: str, heads: Sequence[str], cells: Sequence[Sequence[str]]) -> None:
     """Print a table for a person."""
-    from calmotion.cli import console_on, print_table
-
     print_table(console_on(sys.stdout), title, heads, cells)
 
 

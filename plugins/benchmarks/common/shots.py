@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from calmotion import ShotError
-from calmotion.model import ON, Animation, Character, FEMeshes
+from calmotion.host import open_host
+from calmotion.model import ON, Animation, Character, FEMeshes, Source
 from calmotion.simulation import CompiledShot
 
 SAMPLES = tuple(f"samples/{name}/{name}.usda" for name in ("bartender", "dancer", "rapper", "drummer", "boxer"))
@@ -60,9 +61,6 @@ def _processed(
     path: str, command: str, wanted: Sequence[type], settings: dict[str, dict[str, object]] | None = None
 ) -> list[Any]:
     """What the operators of a command make of a shot, None where they do not make it."""
-    from calmotion.host import open_host
-    from calmotion.model import Source
-
     run = open_host([]).run([Source(path=path, command=command)], list(wanted), settings=settings)
     for result in run:
         if result.error is not None:

@@ -11,7 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from calmotion.model import Animation, Character, FEMeshes
+from calmotion.model import Animation, Character, FEMeshes, RunSettings
+from calmotion.multibody import Workspace
+from calmotion.simulation import BodyReduction, compile_shot, prepare, run_forward, sample_tracks
 from calmotion.testing import beam_arm, quintic, shot_of
 
 from ..common.reporting import bench_parser, finish, keep
@@ -42,8 +44,6 @@ class Scene:
     """A shot whose bodies are reduced once, to be simulated at any step by any integrator."""
 
     def __init__(self, made: tuple[Character, FEMeshes], animation: Animation):
-        from calmotion.simulation import BodyReduction, compile_shot
-
         self.animation = animation
         self.compiled = compile_shot(made[0], animation, BodyReduction(*made, None).bodies(None))
 
@@ -53,10 +53,6 @@ class Scene:
         Raises:
             SimulationFailure: It did not come to the end.
         """
-        from calmotion.model import RunSettings
-        from calmotion.multibody import Workspace
-        from calmotion.simulation import prepare, run_forward, sample_tracks
-
         options = RunSettings(step=step, pre_roll=0.0, integrator=integrator)
         prepared = prepare(self.compiled, options)
         angles, rates = sample_tracks(self.animation.tracks, prepared.grid)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from calmotion import ShotError
 from calmotion.arrays import Array
+from calmotion.mesh import boundary_triangles, contact_place, element_size, interface_patches, quadratic_nodes
 from calmotion.model import Body, FEMesh
+from calmotion.reduction import MeshController, assemble, clamped_modes, estimated_body, recomputed, root_at
 from calmotion.support import Fault
+from calmotion.tolerance import MeshOptions, Volume, geometry_of, mesh_of
 
 from ..common.timing import processor_time
 from ..scenes.links import Link, attachments_of, frames_of
-
-if TYPE_CHECKING:
-    from calmotion.tolerance import Volume
 
 LIMIT = 20.0  # processor time of a link that is wanted [s]
 REFERENCE = (0.002, 100_000)  # wanted error of the compliances of a reference, and its nodes at most
@@ -95,9 +95,6 @@ def survey_link(
         geometry_only: Whether its solid is made but not meshed.
         reference: Whether its frequencies are compared with those of a finer mesh, which may take minutes.
     """
-    from calmotion.reduction import recomputed
-    from calmotion.tolerance import MeshOptions, Volume, geometry_of, mesh_of
-
     body = replace(link.body, mass=link.mass)
     frames = frames_of(link)
     visual = [surface for surface in body.surfaces if surface.visible and len(surface.triangles)]
@@ -128,8 +125,6 @@ def survey_link(
 
 
 def _with_solid(row: LinkRow, geometry: Any, frames: Sequence[Any]) -> LinkRow:
-    from calmotion.mesh import boundary_triangles, contact_place
-
     solid = getattr(geometry, "solid", None)
     points = geometry.points if solid is None else solid.points
     triangles = boundary_triangles(geometry.tets) if solid is None else solid.triangles
@@ -145,8 +140,6 @@ def _with_solid(row: LinkRow, geometry: Any, frames: Sequence[Any]) -> LinkRow:
 
 
 def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
-    from calmotion.mesh import quadratic_nodes
-
     f1, f2, f3 = _frequencies(mesh, link)
     error = mesh.quality.frequency_error
     late = [
@@ -167,9 +160,6 @@ def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
 
 def _frequencies(mesh: FEMesh, link: Link) -> Array:
     """The first three frequencies [Hz], held by the joint towards the world."""
-    from calmotion.mesh import interface_patches
-    from calmotion.reduction import assemble, clamped_modes
-
     settings = link.body.flexible
     assert settings is not None
     model = assemble(mesh.points, mesh.tets, settings.material)
@@ -180,10 +170,6 @@ def _frequencies(mesh: FEMesh, link: Link) -> Array:
 
 def _with_reference(row: LinkRow, volume: Volume, body: Body, link: Link) -> LinkRow:
     """The row with the difference to a mesh of half the element size, bisected where its error arises."""
-    from calmotion.mesh import element_size
-    from calmotion.reduction import MeshController, root_at
-    from calmotion.tolerance import MeshOptions, mesh_of
-
     held = attachments_of(link)
     finer = replace(volume, size=0.5 * element_size(volume.shape))
     options = MeshOptions(time_limit=REFERENCE_TIME, cache=False)
@@ -197,8 +183,6 @@ def _with_reference(row: LinkRow, volume: Volume, body: Body, link: Link) -> Lin
 
 def _with_sections(row: LinkRow, body: Body, link: Link) -> LinkRow:
     """The row with the frequency that takes no mesh; a link that no joint holds has none."""
-    from calmotion.reduction import estimated_body
-
     if link.carrier is None:
         return row
     frequencies = estimated_body(body, attachments_of(link), 0)[0].frequencies

@@ -5,15 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from calmotion import ShotError
+from calmotion.mesh import AttachmentFrame
 from calmotion.model import Body, ElasticMaterial, FlexibleSettings, Frame, MassProperties
-
-if TYPE_CHECKING:
-    from calmotion.mesh import AttachmentFrame
-    from calmotion.usd import Reading
+from calmotion.usd import (
+    Reading,
+    is_rigid_body,
+    joint_prims,
+    mass_of,
+    open_stage,
+    prims_of,
+    quiet,
+    read_joint,
+    shapes_of,
+    tets_of,
+    units_of,
+)
 
 # of polyamide as printed links are; relative errors of frequencies do not depend on its stiffness and density
 POLYAMIDE = ElasticMaterial("", 1.8e9, 0.35, 1200.0)
@@ -46,8 +56,6 @@ def read_links(source: str) -> list[Link]:
     Raises:
         ShotError: The file cannot be read, or has no such prim.
     """
-    from calmotion.usd import Reading, is_rigid_body, mass_of, open_stage, prims_of, quiet, shapes_of, tets_of, units_of
-
     file, wanted = _split(source)
     stage = open_stage(file)
     with quiet():
@@ -107,8 +115,6 @@ def _split(source: str) -> tuple[str, str]:
 
 def _frames(reading: Reading, stage: Any) -> tuple[dict[str, Frame], dict[str, list[Frame]]]:
     """The frame of the first joint that has a body as its second one, and those of all its other joints."""
-    from calmotion.usd import is_rigid_body, joint_prims, prims_of, read_joint
-
     poses = {str(prim.GetPath()): reading.pose(prim) for prim in prims_of(stage) if is_rigid_body(prim)}
     carriers: dict[str, Frame] = {}
     others: dict[str, list[Frame]] = {}
@@ -136,6 +142,4 @@ def frames_of(link: Link) -> tuple[Frame, ...]:
 
 def attachments_of(link: Link) -> list[AttachmentFrame]:
     """The frames of a link's joints, that towards the world first, as the reduction has them."""
-    from calmotion.mesh import AttachmentFrame
-
     return [AttachmentFrame(f"joint {k}", frame, "interface") for k, frame in enumerate(frames_of(link))]

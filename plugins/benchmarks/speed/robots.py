@@ -23,6 +23,7 @@ from calmotion import ShotError
 from calmotion.arrays import Array
 from calmotion.model import WORLD, Body, Joint
 from calmotion.multibody import span_tree
+from calmotion.support import kernel_folder
 from calmotion_plugins.robot_import import import_robot
 
 from ..common.reporting import bench_parser, finish, keep, say
@@ -73,8 +74,6 @@ def measure(file: str, links: int, patience: float) -> RobotRow:
         links: How many of its links become flexible.
         patience: After which it is ended [s].
     """
-    from calmotion.support import kernel_folder
-
     name = Path(file).stem
     with tempfile.TemporaryDirectory() as folder:
         try:

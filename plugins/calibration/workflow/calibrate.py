@@ -15,6 +15,7 @@ from calmotion.multibody import IMPLICIT
 from calmotion.recordings import SensorRecording, measured_prims, read_recordings, refuse_unknown_channels
 from calmotion.simulation import CompiledShot, compile_shot
 from calmotion.tolerance import compiled_in
+from calmotion.usd import refuse_inputs
 from calmotion.workflow import (
     Given,
     Hooks,
@@ -26,6 +27,8 @@ from calmotion.workflow import (
     carry_out,
     compiled_run,
     read_settings,
+    refuse_unwritable,
+    with_shot,
 )
 
 from ..identification.calibrate import CalibrationSettings, calibrate_shots
@@ -204,8 +207,6 @@ def compiled_with_sensors(
     """A run that compiles the shot, after everything was refused that does not fit."""
     source = Source("", "", options, measured=measured_prims(recordings))
     if layer is not None:
-        from calmotion.workflow import refuse_unwritable
-
         refuse_unwritable(layer)
     first = carry_out(
         opened, "simulate", wanted=_READ, operators=operators, source=source, settings=settings, hooks=hooks
@@ -215,8 +216,6 @@ def compiled_with_sensors(
     refuse_unknown_channels(character, recordings)
     refuse_long(recordings, float(first.require(Animation).frame_times[-1]))
     if layer is not None:
-        from calmotion.usd import refuse_inputs
-
         refuse_inputs(first.require(Provenance), layer)
     return compiled_run(opened, source, settings, hooks)
 
@@ -224,8 +223,6 @@ def compiled_with_sensors(
 def with_sensors(shot: Shot | Path) -> Shot:
     """The shot, to be read again: the prims of sensors are targets of this reading alone."""
     if not isinstance(shot, Shot):
-        from calmotion.workflow import with_shot
-
         return Shot(with_shot(os.fspath(shot)))
     return shot.unread()
 

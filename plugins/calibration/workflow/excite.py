@@ -15,7 +15,9 @@ from calmotion.host import SettingError, parse_quantity, quantity_of
 from calmotion.model import Character, Provenance, RunSettings
 from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER
 from calmotion.tolerance import compiled_in
-from calmotion.workflow import Given, Hooks, Path, Progress, Shot, read_settings
+from calmotion.usd import write_performance
+from calmotion.version import __version__
+from calmotion.workflow import Given, Hooks, Path, Progress, Shot, plain, read_settings
 
 from ..identification.excitation.design import ExcitationSettings, blank_recordings, excite_shot
 from ..identification.parameters import DEFAULT, refuse_unknown
@@ -45,9 +47,6 @@ class ExcitedShot:
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints."""
-        from calmotion.version import __version__
-        from calmotion.workflow import plain
-
         found = self.excitation
         report: dict[str, Any] = plain(
             {
@@ -139,8 +138,6 @@ def excite(
         options, partial(hooks.tell, "Find a test motion"),
     )  # fmt: skip
     if target is not None:
-        from calmotion.usd import write_performance
-
         write_performance(target, outcome.require(Provenance), character, (found.times, found.values), {})
     return ExcitedShot(found, target, time.perf_counter() - begin)
 

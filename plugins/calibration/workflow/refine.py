@@ -13,7 +13,19 @@ from calmotion.arrays import Array
 from calmotion.model import OutputPaths, RunSettings
 from calmotion.retargeting import errors_on, random_scenarios, uncertain_parameters
 from calmotion.tolerance import compiled_in, found_tracks
-from calmotion.workflow import Given, OptimizationResult, Path, Progress, Shot, SimulationResult, optimize, simulate
+from calmotion.usd import CALIBRATION, open_stage, refuse_layers_of, role_of
+from calmotion.workflow import (
+    Given,
+    OptimizationResult,
+    Path,
+    Progress,
+    Shot,
+    SimulationResult,
+    optimize,
+    plain,
+    refuse_unwritable,
+    simulate,
+)
 
 from ..identification.parameters import DEFAULT
 from .calibrate import CalibratedShot, calibrate
@@ -50,8 +62,6 @@ class RefinedShot:
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints."""
-        from calmotion.workflow import plain
-
         found, played = self.optimized.report(), self.played.report()
         errors = {row["path"]: row["max_error_m"] for row in played["targets"]}
         targets = [
@@ -148,17 +158,12 @@ def refine(
 
 def _refuse(shot: str, layer: str) -> None:
     """Refuse what the last step would refuse, before the first one writes the model."""
-    from calmotion.usd import refuse_layers_of
-    from calmotion.workflow import refuse_unwritable
-
     refuse_unwritable(layer)
     refuse_layers_of(shot, layer)
 
 
 def takes_of(root: str) -> int:
     """Number of takes that a shot carries."""
-    from calmotion.usd import CALIBRATION, open_stage, role_of
-
     stage = open_stage(root)  # its layers live as long as it does
     return sum(role_of(layer) == CALIBRATION for layer in stage.GetLayerStack())
 

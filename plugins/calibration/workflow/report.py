@@ -7,6 +7,7 @@ from typing import Any
 
 from calmotion.model import WrittenLayer
 from calmotion.version import __version__
+from calmotion.workflow import plain
 
 from ..model.estimates import WITH_THIS_MODEL_ONLY, Calibration
 
@@ -15,8 +16,6 @@ def calibration_report(
     calibration: Calibration, layer: WrittenLayer | None, figures: tuple[str, ...], total_wall_s: float
 ) -> dict[str, Any]:
     """The object that `calibrate --json` prints: plain values, keys as in the USD contract."""
-    from calmotion.workflow import plain
-
     report: dict[str, Any] = plain(
         {
             "command": "calibrate",

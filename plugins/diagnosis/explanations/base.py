@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from calmotion.arrays import Array, BoolArray
+from scipy.optimize import lsq_linear
 
 from ..signals import Drive
 from ..situation import Situation
@@ -141,8 +142,6 @@ class Columns:
 
     def sizes(self, error: Array, rows: BoolArray) -> Array:
         """That fit an error best in some rows, shape [p]."""
-        from scipy.optimize import lsq_linear
-
         A = self.vectors[:, rows].T
         Q, R = np.linalg.qr(A)
         keep = np.abs(np.diag(R)) > 1e-9 * max(np.abs(R).max(), 1e-300)

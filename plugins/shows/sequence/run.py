@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 from calmotion.arrays import Array
+from calmotion.model import held_curve
 from calmotion.support import write_text
+from calmotion.usd import write_performance
 from calmotion.version import __version__
-from calmotion.workflow import Progress, plain
+from calmotion.workflow import Progress, Shot, plain
 
 from ..batch.jobs import Job, jobs_for
 from ..batch.report import BatchResult, JobResult
@@ -147,8 +149,6 @@ def _written(
     plan: Plan, clips: Sequence[Clip], folder: str, arguments: Sequence[str]
 ) -> tuple[dict[str, float], list[Job]]:
     """Write the shots of all members; their lengths [s], and their jobs."""
-    from calmotion.usd import write_performance
-
     settings = {ENDPOINTS: "kept"} | ({REFERENCE: plan.reference} if plan.reference else {})
     pace, shots = pace_of(clips, clips[0].shot.character), Path(folder) / SHOTS
     lengths: dict[str, float] = {}
@@ -195,9 +195,6 @@ def _member(job: JobResult, start: str, end: str, seconds: float, poses: tuple[A
 
 def _is_joined(job: JobResult, poses: tuple[Any, Any]) -> bool:
     """Whether the written curves begin and end in some poses, at rest."""
-    from calmotion.model import held_curve
-    from calmotion.workflow import Shot
-
     root = (job.report or {}).get("root_layer")
     if not root:
         return False

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from calmotion.arrays import Array, BoolArray, box_diagonal
 from calmotion.mesh.surfaces.distances import closest_on_triangles, triangle_parts
@@ -77,8 +78,6 @@ def contact_place(center: Array, axis: Array, triangles: Array, points: Array) -
 
 def inside_hull(points: Array, place: Array, margin: float) -> bool:
     """Whether a place is in the convex hull of points, or outside by no more than the margin [m]."""
-    from scipy.spatial import ConvexHull, QhullError
-
     try:
         equations = ConvexHull(points).equations
     except QhullError:  # flat

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from calmotion.arrays import box_diagonal
 from calmotion.errors import ShotError
@@ -105,9 +108,6 @@ def connected_pieces(points: np.ndarray, triangles: np.ndarray) -> list[Part]:
 
     Closed surfaces that only touch along an edge are separate pieces, so that a union can resolve overlaps.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     patches = patches_of(triangles, _areas(Part(points, triangles)))
     rows, columns = np.nonzero(patch_boundaries(_flipped(triangles, patches.flip), patches.label, patches.count))
     bounds = coo_matrix((np.ones(len(rows)), (columns, rows)), shape=(patches.count, int(rows.max(initial=0)) + 1))
@@ -150,10 +150,6 @@ def _best_welded(points: np.ndarray, triangles: np.ndarray, path: str, repairs: 
 
 
 def _welded(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> _Welded:
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
     used, corners = np.unique(triangles, return_inverse=True)
     places = points[used]
     pairs = cKDTree(places).query_pairs(tolerance, output_type="ndarray")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from calmotion.mesh.surfaces.orientation import directed_edges
 
@@ -34,8 +35,6 @@ def split_at_junctions(points: np.ndarray, triangles: np.ndarray, tolerance: flo
 
 def _one_pass(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> dict[int, np.ndarray]:
     """The parts of each triangle that is split at one of its edges."""
-    from scipy.spatial import cKDTree
-
     edge, _ = directed_edges(triangles)
     sides = np.flatnonzero(np.bincount(edge)[edge] == 1)
     if len(sides) == 0:

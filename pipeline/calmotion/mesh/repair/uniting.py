@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import manifold3d
 import numpy as np
 
 from calmotion.mesh.repair.closing import Part
@@ -23,8 +24,6 @@ def united(parts: Sequence[Part]) -> Part:
     Raises:
         NotManifold: manifold3d refuses a part.
     """
-    import manifold3d
-
     return part_of(manifold3d.Manifold.batch_boolean([manifold_of(part) for part in parts], manifold3d.OpType.Add))
 
 
@@ -39,8 +38,6 @@ def without_detail(part: Part, tolerance: float) -> Part:
 
 def manifold_of(part: Part) -> Any:
     """The manifold3d.Manifold of a closed surface."""
-    import manifold3d
-
     made = manifold3d.Manifold(manifold3d.Mesh64(part.points, part.triangles.astype(np.uint64)))
     if made.status() != manifold3d.Error.NoError:
         raise NotManifold(str(made.status()))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import manifold3d
 import numpy as np
 
 from calmotion.arrays import Array
@@ -33,8 +34,6 @@ def equivalent_beam(body: Body, frames: Sequence[Frame]) -> Solid:
     Raises:
         ShotError: It has no mass or no joint, or its mass is in one place.
     """
-    import manifold3d
-
     assert body.flexible is not None
     if body.mass is None or not frames:
         missing = "no mass" if body.mass is None else "no joint"

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import manifold3d
 import numpy as np
+from scipy.spatial import cKDTree
 
 from calmotion.arrays import box_diagonal
 from calmotion.mesh.repair.closing import Part, connected_pieces
@@ -31,8 +33,6 @@ def bridged(solids: Sequence[Part]) -> tuple[Part | None, float]:
     Returns:
         None instead of the union where it is not connected.
     """
-    import manifold3d
-
     prisms: list[np.ndarray] = []
     widest = 0.0
     for k, solid in enumerate(solids):
@@ -65,9 +65,6 @@ def strutted(solids: Sequence[Part]) -> tuple[Part, float]:
     Returns:
         The union, and the widest gap.
     """
-    import manifold3d
-    from scipy.spatial import cKDTree
-
     places, normals = (list(values) for values in zip(*(sampled(solid, _SAMPLES) for solid in solids), strict=True))
     whole, widest, struts = [0], 0.0, []
     left = list(range(1, len(solids)))
@@ -99,8 +96,6 @@ def _strut(near: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], gap: float
         near: Places and outward normals on a solid, shape [n, 3], and the center, for both sides.
         gap: Between the centers.
     """
-    import manifold3d
-
     radius, corners = max(_RADIUS, _SLENDER * gap), []
     for points, outward, center in near:
         inside = np.linalg.norm(points - center, axis=1) <= radius

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import manifold3d
 import numpy as np
 
 from calmotion.mesh.surfaces.closed_surfaces import Closure, boundary_walks, close
@@ -77,8 +78,6 @@ def _coplanar(loops: list[_Loop]) -> list[list[_Loop]]:
 
 def _triangulated(points: np.ndarray, group: list[_Loop]) -> np.ndarray:
     """Triangles between the loops of a plane."""
-    import manifold3d
-
     u, v = np.linalg.svd(group[0].normal[None])[2][1:]
     if np.cross(u, v) @ group[0].normal < 0.0:
         u, v = v, u

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from calmotion.errors import ShotError
 from calmotion.mesh.repair.closed_solid import Solid, closed_solid
@@ -78,8 +79,6 @@ def _fits(hidden: Sequence[SurfaceMesh], visible: Sequence[SurfaceMesh]) -> bool
 
 
 def _hull_volume(surfaces: Sequence[SurfaceMesh]) -> float:
-    from scipy.spatial import ConvexHull, QhullError
-
     try:
         return float(ConvexHull(np.vstack([surface.points[surface.triangles.ravel()] for surface in surfaces])).volume)
     except (QhullError, ValueError):  # flat, or not finite: the repair says so

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import manifold3d
 import numpy as np
 
 from calmotion.mesh.grids import CLOSED, closed_slits
@@ -90,8 +91,6 @@ def _filled(solid: Any, fine: Part, scale: float) -> tuple[Part | None, str]:
         fine: The same with small triangles.
         scale: Size of the body [m].
     """
-    import manifold3d
-
     fillings = slit_fillings(fine.points, fine.triangles, NARROW, _SINK, _BESIDE, NARROW**2)
     made = [(body, filling.width) for filling in fillings if (body := _body(filling)) is not None]
     if not made:

@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from calmotion.arrays import Array, BoolArray, Indices
 
@@ -184,8 +185,6 @@ def _closed_after(keys: Indices, edges: Indices, count: int) -> BoolArray:
         edges: Shape [k, 2].
         count: Number of points.
     """
-    from scipy.sparse import csr_matrix
-
     both = np.sort(np.concatenate([keys, keys % count * count + keys // count]))
     begins = np.searchsorted(both, count * np.arange(count + 1))
     near = csr_matrix((np.ones(len(both), np.int32), both % count, begins), shape=(count, count))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from calmotion.arrays import Array, BoolArray, Indices
 
@@ -33,9 +35,6 @@ def patches_of(triangles: Indices, areas: Array) -> Patches:
         triangles: Shape [m, 3].
         areas: Of the triangles [m^2], shape [m].
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
-
     m = len(triangles)
     edge, forward = directed_edges(triangles)
     order = np.argsort(edge, kind="stable")
@@ -78,8 +77,6 @@ def directed_edges(triangles: Indices) -> tuple[Indices, BoolArray]:
 
 def patch_boundaries(triangles: Indices, label: Indices, count: int) -> Array:
     """Boundary of each patch: net number of passes along each boundary edge, dense, shape [edges, count]."""
-    from scipy.sparse import coo_matrix
-
     edge, forward = directed_edges(triangles)
     sign = np.where(forward, 1.0, -1.0)
     net = coo_matrix((sign, (edge, np.repeat(label, 3))), shape=(int(edge.max()) + 1, count)).tocsr()

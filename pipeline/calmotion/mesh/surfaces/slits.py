@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from calmotion.arrays import Array, Indices
 from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles, unit_normals
@@ -88,9 +90,6 @@ def slit_fillings(
 
 def _smooth_parts(triangles: Indices, normal: Array, chosen: Indices) -> list[Indices]:
     """Chosen triangles, by parts that are connected by edges without a bend."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     edges = np.sort(triangles[chosen][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     keys = edges[:, 0].astype(np.int64) * (int(triangles.max(initial=0)) + 1) + edges[:, 1]
     order = np.argsort(keys, kind="stable")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.linalg import eigh
 
 from calmotion.arrays import Array, Indices, IntArray
 from calmotion.linear_algebra.sparse_solver import SparseSolver
@@ -258,8 +259,6 @@ def ritz_modes(model: FEModel, columns: Array) -> tuple[Array, Array]:
         omega^2 [1/s^2] ascending, shape [m], and combinations that are orthonormal in mass, shape [r, m]; m < r where
         columns are linearly dependent.
     """
-    from scipy.linalg import eigh
-
     if columns.shape[1] == 0:
         return np.zeros(0), np.zeros((0, 0))
     # rotations and translations differ by a length: equal kinetic energy keeps the small eigenproblem well scaled

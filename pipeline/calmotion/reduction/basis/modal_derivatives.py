@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.linalg import eigh
 
 from calmotion.arrays import Array, IntArray
 from calmotion.linear_algebra.blas_threads import one_blas_thread
@@ -274,8 +275,6 @@ def _root(K: Array) -> Array:
 
 def _orthonormal(M: Array, K: Array) -> tuple[Array, Array]:
     """Eigenvalues and mass-orthonormal eigenvectors of K and M of columns that may be nearly parallel."""
-    from scipy.linalg import eigh
-
     scale = 1.0 / np.sqrt(np.diag(M))
     # the normalisation would amplify the rounding of nearly parallel directions
     values, vectors = np.linalg.eigh(M * np.outer(scale, scale))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh
 
 from calmotion.arrays import Array, Indices
 from calmotion.linear_algebra.block_lanczos import lowest_by_lanczos
@@ -39,8 +40,6 @@ def lowest_modes(
     Raises:
         NotPositiveDefinite: K + shift M is not.
     """
-    from scipy.linalg import eigh
-
     n = K.shape[0]
     most = n if most is None else min(most, n)
     count = min(count, most)
@@ -65,8 +64,6 @@ def shift_of_free(model: FEModel) -> float:
     Args:
         model: Its matrices.
     """
-    from scipy.linalg import eigh
-
     x = model.mesh.nodes - model.mesh.nodes.mean(axis=0)
     x = x / max(float(np.abs(x).max()), np.finfo(float).tiny)
     i, j = np.triu_indices(3)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, identity, kron
 
 from calmotion.arrays import Array, Indices, IntArray
 from calmotion.mesh.parts import Filling, element_masses, filling_of, makeup_of
@@ -40,16 +41,12 @@ class FEModel:
 
     def stiffened(self, factor: float) -> FEModel:
         """The same model with its stiffness times a factor."""
-        from scipy.sparse import csr_matrix
-
         own = self.stiffness
         return replace(self, stiffness=csr_matrix((factor * own.data, own.indices, own.indptr), shape=own.shape))
 
 
 def vector_mass(mass: Any) -> Any:
     """m (x) E, sparse CSR, shape [3n, 3n], from the scalar mass matrix m, shape [n, n]."""
-    from scipy.sparse import identity, kron
-
     return kron(mass, identity(3), format="csr")
 
 
@@ -67,8 +64,6 @@ def assemble_mass(mesh: QuadraticMesh, density: float) -> Any:
 
 def _mass_of_filling(mesh: QuadraticMesh, basis: Any, filling: Filling) -> Any:
     """`assemble_mass` of a body of several materials, for a density of 1."""
-    from scipy.sparse import coo_matrix
-
     n, tets = len(mesh.nodes), mesh.tets.astype(np.int64)
     values = np.stack([basis.elem.lbasis(basis.X, a)[0] for a in range(10)])
     exact = np.einsum("aq,bq,q->ab", values, values, basis.W) / basis.W.sum()
@@ -98,7 +93,6 @@ def assemble_stiffness(mesh: QuadraticMesh, youngs_modulus: float, poissons_rati
     int lambda div(u) div(v) + 2 mu e(u):e(v) needs D[i,a,j,b] = int d_a N_i d_b N_j alone. Elements are summed on the
     pattern of nodes, of which both halves get the same numbers in the same order: the matrix is exactly symmetric.
     """
-    from scipy.sparse import bsr_matrix, csr_matrix
     from skfem import Basis, ElementTetP2
     from skfem.models.elasticity import lame_parameters
 

@@ -7,6 +7,7 @@ the undeformed state as P = C:sym(G) + P''[G, G]/2 + ..., where P''[A, B] is sym
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg.blas import dsyrk
 
 from calmotion.arrays import Array
 from calmotion.mesh.quadratic import QuadraticMesh
@@ -130,8 +131,6 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
     Source: Barbic and James, Real-Time Subspace Integration for St. Venant-Kirchhoff Deformable Models, 2005 (the
     cubic polynomial), in the form of a Gram matrix.
     """
-    from scipy.linalg.blas import dsyrk
-
     r = modes.shape[2]
     p = r if directions is None else directions.shape[1]
     size = r + p * (p + 1) // 2

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from calmotion.arrays import Array, Indices, IntArray
 from calmotion.mesh.quadratic import QuadraticMesh
@@ -85,8 +86,6 @@ def embed(mesh: QuadraticMesh, points: Array) -> Embedding:
 
 def _nearest_elements(mesh: QuadraticMesh, centers: Array, normals: Array, offsets: Array, points: Array) -> Indices:
     """The element that contains each point, or the one whose face planes it exceeds least."""
-    from scipy.spatial import cKDTree
-
     element = np.empty(len(points), dtype=np.int64)
     if len(points) * len(centers) <= _ALL_PAIRS:
         rows = max(1, 200_000 // len(centers))

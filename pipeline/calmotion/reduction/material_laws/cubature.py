@@ -9,6 +9,7 @@ The poses are equilibria under random loads, because a random sum of modes stret
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import lsq_linear, nnls
 
 from calmotion.arrays import Array, box_diagonal
 from calmotion.errors import ShotError
@@ -157,8 +158,6 @@ def greedy_cubature(columns: Array, target: Array, error: float, most: int) -> t
     Returns:
         Indices of the columns, their weights, and the error reached, relative to the target.
     """
-    from scipy.optimize import lsq_linear, nnls
-
     norm = np.linalg.norm(columns, axis=0)
     norm[norm == 0.0] = np.inf
     chosen: list[int] = []

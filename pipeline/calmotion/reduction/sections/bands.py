@@ -9,6 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import cKDTree
 
 from calmotion.arrays import Array, BoolArray, Indices
 from calmotion.reduction.sections.cells import Cells
@@ -44,8 +47,6 @@ def bands_of(cells: Cells, root: BoolArray) -> Bands:
     Args:
         root: Cells that are held, at least one, shape [n].
     """
-    from scipy.sparse.csgraph import dijkstra
-
     first, second, length = _neighbours(cells)
     first, second, length = _joined(cells, first, second, length)
     graph = _graph(len(root), first, second, length)
@@ -79,16 +80,11 @@ def _neighbours(cells: Cells) -> tuple[Indices, Indices, Array]:
 
 
 def _graph(count: int, first: Indices, second: Indices, length: Array) -> object:
-    from scipy.sparse import coo_matrix
-
     return coo_matrix((length, (first, second)), shape=(count, count)).tocsr()
 
 
 def _joined(cells: Cells, first: Indices, second: Indices, length: Array) -> tuple[Indices, Indices, Array]:
     """The pairs, with those that join loose parts to the largest one, where they are nearest."""
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
     count, label = connected_components(_graph(len(cells.places), first, second, length), directed=False)
     if count == 1:
         return first, second, length
@@ -108,8 +104,6 @@ def _joined(cells: Cells, first: Indices, second: Indices, length: Array) -> tup
 
 def _parts(band: Indices, first: Indices, second: Indices) -> Indices:
     """Number of the connected part of its band to which each cell belongs, the held cells one, number 0."""
-    from scipy.sparse.csgraph import connected_components
-
     same = (band[first] == band[second]) & (band[first] > 0)
     held = np.flatnonzero(band == 0)
     a = np.concatenate([first[same], held[:-1]])

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_fill_holes, distance_transform_edt, label
 
 from calmotion.arrays import Array, BoolArray, Indices
 from calmotion.mesh.grids import projected_area, ray_crossing
@@ -177,8 +178,6 @@ def _cross(corners: Array, aside_y: float, aside_z: float, changes: Array) -> No
 
 def _without_loose(solid: BoolArray) -> BoolArray:
     """The solid cells without small parts that nothing holds."""
-    from scipy.ndimage import label
-
     parts, count = label(solid, np.ones((3, 3, 3)))
     if count == 1:
         return solid
@@ -190,8 +189,6 @@ def _without_loose(solid: BoolArray) -> BoolArray:
 
 def _solid_neighbours(solid: BoolArray) -> BoolArray:
     """Whether all six neighbours of a cell are solid, shape of `solid`, whose rim is empty."""
-    from scipy.ndimage import binary_fill_holes
-
     whole = binary_fill_holes(solid)  # walls of a cavity are no outside
     within = whole.copy()
     for axis in range(3):
@@ -208,8 +205,6 @@ def _wall_share(solid: BoolArray, sides: Array, settings: FlexibleSettings) -> A
 
 def _skin_share(solid: BoolArray, sides: Array, thickness: float) -> Array:
     """Share of each solid cell that lies no deeper than a thickness [m], shape [n]."""
-    from scipy.ndimage import distance_transform_edt
-
     depth = distance_transform_edt(solid, sampling=sides)[solid]  # of its center, and half a cell more
     side = float(sides.mean())
     # in a layer of cells that is thicker than the wall the wall is a part of each

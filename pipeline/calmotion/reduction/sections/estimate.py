@@ -11,6 +11,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh
+from scipy.sparse import diags
+from scipy.sparse.linalg import eigsh, splu
+from scipy.spatial import cKDTree
 
 from calmotion.arrays import Array, Indices, box_diagonal
 from calmotion.errors import ShotError
@@ -125,16 +129,12 @@ def _welded(points: Array, triangles: Indices) -> tuple[Array, Indices]:
 
 def _carriers(cells: Cells, bands: Bands, frames: Sequence[Frame]) -> list[int]:
     """The section that carries each frame: that of the nearest cell at the surface."""
-    from scipy.spatial import cKDTree
-
     outside = np.flatnonzero(cells.outside)
     nearest = cKDTree(cells.places[outside]).query(np.array([f.position for f in frames]).reshape(-1, 3))[1]
     return [int(k) for k in bands.section[outside[nearest]]]
 
 
 def _diagonal(weights: Array) -> Any:
-    from scipy.sparse import diags
-
     return diags(weights)
 
 
@@ -144,9 +144,6 @@ def _modes(frame: BeamFrame, loaded: Sequence[int]) -> tuple[Array, Array]:
     Returns:
         omega^2 [1/s^2], ascending, shape [r], and motions of the nodes, mass-orthonormal, shape [s, 6, r].
     """
-    from scipy.linalg import eigh
-    from scipy.sparse.linalg import eigsh, splu
-
     free = 6 * (len(frame.nodes) - 1)
     if free == 0:
         return np.zeros(0), np.zeros((len(frame.nodes), 6, 0))

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import binary_closing, binary_fill_holes
+from scipy.sparse import block_diag, coo_matrix
 
 from calmotion.arrays import Array, Indices
 from calmotion.model.character import ElasticMaterial
@@ -34,8 +36,6 @@ class BeamFrame:
 
     def mass(self) -> Any:
         """Mass matrix of the free nodes, as of `stiffness`."""
-        from scipy.sparse import block_diag
-
         blocks = []
         for node, points, mass in zip(self.nodes[1:], self.points[1:], self.point_mass[1:], strict=True):
             motion = np.vstack([carried(point - node) for point in points])
@@ -94,8 +94,6 @@ def _moments(places: Array, weight: Array, section: Indices, count: int, cells: 
 def _assembled(
     bands: Bands, center: Array, stiff: Array, second: Array, material: ElasticMaterial, sections: _Sections
 ) -> Any:
-    from scipy.sparse import coo_matrix
-
     rows, columns, values = [], [], []
     for (a, b), direction, touch in zip(bands.pairs, bands.directions, bands.touch, strict=True):
         wide = stiff[[a, b]] / bands.width[[a, b]]
@@ -185,8 +183,6 @@ def _torsion(area: float, polar: float, hole: float, hole_polar: float) -> float
 
 def _hole(places: Array, side: float) -> tuple[float, float]:
     """Area [m^2] and polar moment [m^4] of what a section encloses, by its cells [m], shape [n, 2]."""
-    from scipy.ndimage import binary_closing, binary_fill_holes
-
     at = np.round((places - places.min(axis=0)) / side).astype(int) + 2
     filled = np.zeros(tuple(at.max(axis=0) + 3), bool)
     filled[tuple(at.T)] = True

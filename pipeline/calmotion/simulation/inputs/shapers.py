@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
 
 from calmotion.arrays import Array, BoolArray
 from calmotion.errors import ShotError
@@ -87,8 +88,6 @@ def shaped(
         )
     times = grid.times
     if kind == "lowpass":
-        from scipy.signal import butter, sosfiltfilt
-
         edge, highest = cutoff * slow[0], 0.5 / grid.h
         if not edge < highest:
             raise ShotError(

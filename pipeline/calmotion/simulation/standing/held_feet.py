@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
 from calmotion.arrays import Array
@@ -17,8 +18,6 @@ STANDS = 5e-3  # points of a body that are higher above its lowest one, over its
 
 def points_of(body: Body, pose: Frame) -> Array:
     """Points of a body's geometry in a pose, world, shape [n, 3]: of what is drawn, else of all."""
-    from scipy.spatial.transform import Rotation
-
     clouds = [surface.points for surface in body.surfaces if surface.visible] or [s.points for s in body.surfaces]
     if not clouds:
         return np.zeros((0, 3))
@@ -62,8 +61,6 @@ def margins(sole: Array, places: Array, up: Array) -> Array | None:
 def outline(points: Array) -> Array | None:
     """Edges of the convex hull of points of shape [n, 2]: rows (n, c) with n.x + c <= 0 inside, shape [e, 3]; None
     where they have no area."""
-    from scipy.spatial import ConvexHull, QhullError
-
     if len(points) < 3:
         return None
     try:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Ts, Usd, UsdGeom
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -15,9 +16,6 @@ from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.gf import matrix
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below, prims_of
-
-if TYPE_CHECKING:
-    from pxr import Ts, Usd
 
 _BEYOND = 1.0  # time codes past the first and last knot of a spline that goes on there
 
@@ -37,8 +35,6 @@ def animation_codes(attribute: Usd.Attribute, parts: int = 3) -> list[float]:
 
 
 def _codes_of_spline(spline: Ts.Spline, parts: int) -> list[float]:
-    from pxr import Ts
-
     knots = np.array(list(spline.GetKnots().keys()), dtype=np.float64)
     if len(knots) == 0:
         return []
@@ -84,8 +80,6 @@ def refuse_moving(reading: Reading, fixed: dict[Usd.Prim, str], others: list[Usd
 
 def codes_of(prim: Usd.Prim) -> list[float]:
     """Time codes at which the local transform of a prim has samples, or splines their knots and points between."""
-    from pxr import UsdGeom
-
     xform = UsdGeom.Xformable(prim)
     if not xform:
         return []
@@ -111,8 +105,6 @@ def schedule_of(prim: Usd.Prim, schema: str, name: str, clock: Clock) -> Schedul
 
 def moving_prims(stage: Usd.Stage) -> list[Usd.Prim]:
     """The prims with animated transforms that carry geometry, and those below them that reset their transforms."""
-    from pxr import UsdGeom
-
     found: list[Usd.Prim] = []
     for prim in prims_of(stage):
         xform = UsdGeom.Xformable(prim)
@@ -129,16 +121,12 @@ def _is_pattern(prim: Usd.Prim) -> bool:
 
 def has_splines(prim: Usd.Prim) -> bool:
     """Whether a spline animates the local transform of a prim."""
-    from pxr import UsdGeom
-
     xform = UsdGeom.Xformable(prim)
     return bool(xform) and any(one.GetAttr().HasSpline() for one in xform.GetOrderedXformOps())
 
 
 def carriers(prim: Usd.Prim) -> list[Usd.Prim]:
     """A prim and the prims above it, up to one that resets the transform stack."""
-    from pxr import UsdGeom
-
     chain, above = [], prim
     while above and not above.IsPseudoRoot():
         chain.append(above)
@@ -150,8 +138,6 @@ def carriers(prim: Usd.Prim) -> list[Usd.Prim]:
 
 def moves(reading: Reading, prim: Usd.Prim) -> tuple[Usd.Prim, float] | None:
     """The first prim, from a body upwards, that moves the body, with the time code; None if there is none."""
-    from pxr import UsdGeom
-
     start = reading.world_matrix(prim)
     for mover in carriers(prim):
         for code in codes_of(mover):
@@ -165,8 +151,6 @@ def moves(reading: Reading, prim: Usd.Prim) -> tuple[Usd.Prim, float] | None:
 
 def moves_on_body(prim: Usd.Prim) -> bool:
     """Whether the transform of a prim, or of one between it and its body, is animated."""
-    from pxr import UsdGeom
-
     while prim and not is_rigid_body(prim):
         if prim.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(prim).TransformMightBeTimeVarying():
             return True
@@ -188,8 +172,6 @@ def hold_constants(stage: Usd.Stage) -> list[str]:
     Returns:
         A note for each attribute whose samples differ.
     """
-    from pxr import Usd
-
     notes = []
     for prim in prims_of(stage):
         if not (prim.GetAppliedSchemas() or str(prim.GetTypeName()).startswith(("Physics", "Material"))):

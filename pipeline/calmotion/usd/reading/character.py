@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Usd
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.model import Body, Character, Joint, MassProperties, RetargetSettings
@@ -44,9 +45,6 @@ from calmotion.usd.reading.plausibility import warn_of_units
 from calmotion.usd.reading.unread import tell_what_is_not_used
 from calmotion.usd.reading.variants import no_bodies
 from calmotion.usd.transforms import Pose
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 BETWEEN = 1e-6  # mass and inertia of a part between two axes of a joint, over those of the lighter body at the joint
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
+
+from pxr import Usd, UsdGeom
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -13,9 +15,6 @@ from calmotion.usd.gf import matrix
 from calmotion.usd.schemas import is_applied
 from calmotion.usd.transforms import Pose, pose_from_matrix, refuse_infinite
 from calmotion.usd.units import StageUnits
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 RIGID_BODY = "PhysicsRigidBodyAPI"
 
@@ -46,8 +45,6 @@ class Reading:
     whole: Any = None
 
     def __post_init__(self) -> None:
-        from pxr import UsdGeom
-
         self._xforms = UsdGeom.XformCache(self.start)
 
     def note(self, text: str) -> None:
@@ -94,15 +91,11 @@ class Reading:
 
 def prims_of(stage: Usd.Stage) -> Iterator[Usd.Prim]:
     """Every prim of a stage in depth-first order, those inside instances too."""
-    from pxr import Usd
-
     return iter(stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
 
 
 def prims_below(prim: Usd.Prim, stop: Callable[[Usd.Prim], bool]) -> Iterator[Usd.Prim]:
     """A prim and those below it, depth first, not entering a prim below it for which `stop` holds."""
-    from pxr import Usd
-
     walk = iter(Usd.PrimRange(prim, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
     for below in walk:
         if below != prim and stop(below):
@@ -143,8 +136,6 @@ def refuse_without_transform(prim: Usd.Prim, what: str) -> None:
     Args:
         what: It stands for, such as `a target`.
     """
-    from pxr import UsdGeom
-
     if not prim.IsA(UsdGeom.Xformable):
         raise ShotError(
             f"{what} needs a transform",

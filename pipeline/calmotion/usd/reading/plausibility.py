@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from pxr import UsdGeom
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -84,8 +85,6 @@ def warn_of_units(reading: Reading, path: str, character: Character, resting: Se
         path: Prim that stands for the robot.
         resting: Paths of bodies that are fixed to the world, whose masses nothing shows.
     """
-    from pxr import UsdGeom
-
     far, units = reach(character), reading.units
     for doubt in _doubts_of_robot(path, character, far, units):
         reading.warn(doubt)

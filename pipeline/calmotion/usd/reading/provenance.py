@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+
+from pxr import Sdf, Usd, UsdGeom
 
 from calmotion.model import InputLayer, Provenance
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import prims_of
 from calmotion.usd.units import units_of
-
-if TYPE_CHECKING:
-    from pxr import Sdf, Usd
 
 _ENCODED = "tn__"  # prefix of names that USD's converters encode (Bootstring)
 _PACKAGE = ".usdz"
@@ -26,8 +24,6 @@ def provenance_of(path: str, stage: Usd.Stage, clock: Clock, earlier: tuple[str,
         path: Its file, as it was given.
         earlier: Identifiers of the layers of ours that it carries.
     """
-    from pxr import UsdGeom
-
     default, units = stage.GetDefaultPrim(), units_of(stage)
     return Provenance(
         shot=path,
@@ -88,8 +84,6 @@ def _changed_inputs(layer: Sdf.Layer, path: str, inputs: Sequence[InputLayer]) -
 
     Not those of ours, which are muted or only name the others, nor what is in a package now, which is hashed as one.
     """
-    from pxr import Sdf
-
     origin = layer.customLayerData[stages.METADATA_KEY]
     present, packed = {source.sha256 for source in inputs}, any(source.path.endswith(_PACKAGE) for source in inputs)
     made_from = zip(map(str, origin.get("inputs", [])), map(str, origin.get("sha256", [])), strict=False)

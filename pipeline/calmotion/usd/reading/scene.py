@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd, UsdGeom
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -16,9 +16,6 @@ from calmotion.usd import gf, schemas
 from calmotion.usd.calibrations import known_factors, predictions
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.units import EARTH_GRAVITY
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _SCHEMA = "CalmRetargetAPI"
 
@@ -35,8 +32,6 @@ def gravity(reading: Reading, bodies: Sequence[str] = ()) -> Array:
     Raises:
         ShotError: A direction or magnitude that is not finite.
     """
-    from pxr import UsdGeom
-
     up = UsdGeom.GetStageUpAxis(reading.stage)
     down: Array = 0.0 - np.eye(3)["XYZ".index(str(up))]
     scenes = [p for p in prims_of(reading.stage) if p.GetTypeName() == "PhysicsScene"]

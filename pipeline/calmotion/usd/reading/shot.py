@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd, UsdSkel
 
 from calmotion.errors import raise_all
 from calmotion.model import Animation, Character, MotorTracks, MovingFrame, Provenance, Track
@@ -38,9 +38,6 @@ from calmotion.usd.reading.unread import misplaced_schemas, unread_attributes
 from calmotion.usd.reading.variants import naming_variants, physics_elsewhere
 from calmotion.usd.reading.well_formed import broken_transforms, wrong_types
 from calmotion.usd.units import other_units, units_of
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _PARTS = 8  # of a frame, at which bodies that splines pose are read
 
@@ -155,8 +152,6 @@ def read_stage(
 def shot_clock(stage: Usd.Stage, given: MotorTracks | None) -> Clock:
     """The clock of a shot: its range is that of the stage, else of the samples of its drives, else of those of bodies
     and skeletons; one frame where nothing is animated."""
-    from pxr import UsdSkel
-
     codes = [c for prim in joint_prims(stage) for drive in target_positions(prim) for c in sample_codes(drive)]
     if given is not None:
         rate, start = stage.GetTimeCodesPerSecond(), stage.GetStartTimeCode()

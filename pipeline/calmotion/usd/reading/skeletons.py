@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Gf, Tf, Usd, UsdGeom, UsdSkel
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -14,9 +15,6 @@ from calmotion.support.naming import nearest
 from calmotion.usd import gf
 from calmotion.usd.reading.context import prims_of
 from calmotion.usd.transforms import pose_from_matrix
-
-if TYPE_CHECKING:
-    from pxr import Gf, Usd, UsdSkel
 
 _UNIT = 1e-2  # how far the length of a quaternion may be off 1: half precision and interpolation
 
@@ -56,8 +54,6 @@ class BoundSkeleton:
         return self._posed[code]
 
     def _computed(self, code: float) -> Sequence[Gf.Matrix4d]:
-        from pxr import Tf
-
         try:
             complete = self._has_all(code)
             transforms: Sequence[Gf.Matrix4d] = self.query.ComputeJointLocalTransforms(code)
@@ -97,8 +93,6 @@ class BoundSkeleton:
 
     def placement(self, code: float) -> Array:
         """From the skeleton's space to the world, shape [4, 4]."""
-        from pxr import UsdGeom
-
         return gf.matrix(UsdGeom.XformCache(code).GetLocalToWorldTransform(self.prim))
 
     def in_skeleton(self, local: Array) -> Array:
@@ -122,8 +116,6 @@ def bound_skeletons(stage: Usd.Stage) -> list[BoundSkeleton]:
     Raises:
         ShotError: One whose joints are no tree, or without a rest pose.
     """
-    from pxr import Usd, UsdSkel
-
     cache, found = UsdSkel.Cache(), []
     for prim in prims_of(stage):
         if prim.IsA(UsdSkel.Root):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Sdf, Usd
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -19,9 +20,6 @@ from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated import animation_codes, moves_on_body
 from calmotion.usd.reading.context import Reading, carrying_body, prims_of, refuse_without_transform, switched_off_body
 from calmotion.usd.transforms import Pose, pose_from_matrix
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _SCHEMA = "CalmTargetAPI"
 WEIGHTS = ("calm:target:positionWeight", "calm:target:rotationWeight")
@@ -64,8 +62,6 @@ def _measured_prim(reading: Reading, path: str) -> Usd.Prim:
 
 def _is_prim_path(path: str) -> bool:
     """Whether a text is the path of a prim."""
-    from pxr import Sdf
-
     return bool(Sdf.Path.IsValidPathString(path)[0]) and Sdf.Path(path).IsAbsoluteRootOrPrimPath()
 
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
+
+from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
 
 from calmotion.errors import ShotError
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of, switched_off_body
 from calmotion.usd.reading.joints.joint_prims import JointPrim
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _NAMESPACE = "calm"
 _READ_ANYWAY = ("CalmMotorAPI", "CalmDampingAPI")  # on what UsdPhysics makes a motor or a material
@@ -52,8 +50,6 @@ def unread_attributes(stage: Usd.Stage, declared: bool = False) -> Iterator[Shot
 
 def misplaced_schemas(stage: Usd.Stage) -> Iterator[ShotError]:
     """Calmotion's schemas on prims of the wrong kind, where they have no effect, as warnings."""
-    from pxr import UsdGeom, UsdPhysics, UsdShade
-
     fits = {
         "CalmFlexibleBodyAPI": (is_rigid_body, "a body (PhysicsRigidBodyAPI)"),
         "CalmDampingAPI": (lambda prim: prim.IsA(UsdShade.Material), "a Material"),
@@ -75,8 +71,6 @@ def misplaced_schemas(stage: Usd.Stage) -> Iterator[ShotError]:
 
 def _owners() -> dict[str, str]:
     """The schema of each attribute."""
-    from pxr import Usd
-
     registry, found = Usd.SchemaRegistry(), {}
     for schema in schemas.NAMES:
         definition = registry.FindAppliedAPIPrimDefinition(schema)

@@ -5,16 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+
+from pxr import Sdf, Usd
 
 from calmotion.errors import ShotError, each, raise_all
 from calmotion.usd.diagnostics import quiet
 from calmotion.usd.reading.animated import moving_prims
 from calmotion.usd.reading.context import RIGID_BODY, prims_of
 from calmotion.usd.schemas import is_applied
-
-if TYPE_CHECKING:
-    from pxr import Sdf, Usd
 
 _PROBLEM = "no bodies: the shot has no prim with PhysicsRigidBodyAPI"
 
@@ -74,8 +72,6 @@ _DRIVE = "PhysicsDriveAPI"
 def physics_elsewhere(stage: Usd.Stage) -> str:
     """Which variant to select for more bodies, joints or drives than the stage has, as an imperative; empty where no
     other variant has more."""
-    from pxr import Sdf, Usd
-
     others = _others(stage)
     if not others:
         return ""

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+
+from pxr import Sdf, Tf, Usd, UsdGeom
 
 from calmotion.errors import ShotError
 from calmotion.usd.reading.animated import animation_codes
 from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.schemas import NAMES
-
-if TYPE_CHECKING:
-    from pxr import Sdf, Usd
 
 _PHYSICS = ("PhysicsMassAPI", "PhysicsRigidBodyAPI", "PhysicsCollisionAPI", "PhysicsMaterialAPI")
 _DRIVE, _DRIVES = "PhysicsDriveAPI", ("angular", "linear")
@@ -30,8 +28,6 @@ def wrong_types(stage: Usd.Stage) -> Iterator[ShotError]:
     USD accepts such opinions silently and returns values of the authored type. Attributes of Calmotion, masses and
     drives are checked even where their schema is not applied.
     """
-    from pxr import Sdf, Usd
-
     known = _known()
     # also classes and undefined prims: materials may be bound there
     for prim in stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimIsActive)):
@@ -57,8 +53,6 @@ def wrong_types(stage: Usd.Stage) -> Iterator[ShotError]:
 def broken_transforms(stage: Usd.Stage) -> Iterator[ShotError]:
     """Prims whose xformOpOrder names an operation that does not exist or has a wrong type, and bodies with animated
     operations without an order, which USD does not apply."""
-    from pxr import Tf, UsdGeom
-
     for prim in prims_of(stage):
         order = prim.GetAttribute("xformOpOrder")
         if is_rigid_body(prim) and (unordered := _animated_without_order(prim)):
@@ -100,8 +94,6 @@ def _animated_without_order(prim: Usd.Prim) -> list[str]:
 
 def _type_of(definition: Usd.PrimDefinition, name: str) -> str:
     """Type of a property of a schema, `rel` for a relationship; empty for one that the schema does not have."""
-    from pxr import Sdf
-
     kind = definition.GetSpecType(name)
     if kind == Sdf.SpecTypeRelationship:
         return "rel"
@@ -112,8 +104,6 @@ def _type_of(definition: Usd.PrimDefinition, name: str) -> str:
 
 def _known() -> dict[str, str]:
     """Type of every property of our schemas, and of those of UsdPhysics that are read wherever they are authored."""
-    from pxr import Usd
-
     registry = Usd.SchemaRegistry()
     found: dict[str, str] = {}
     for schema in (*NAMES, *_PHYSICS, _DRIVE):
@@ -129,8 +119,6 @@ def _known() -> dict[str, str]:
 def _alike(found: str, wanted: str) -> bool:
     """Whether values of two types are the same in Python, such as of `point3f[]` and `float3[]`, or of float and
     double."""
-    from pxr import Sdf
-
     one, other = (Sdf.ValueTypeNames.Find(name) for name in (found, wanted))
     return bool(one and other) and one.isArray == other.isArray and _kind(one) == _kind(other)
 

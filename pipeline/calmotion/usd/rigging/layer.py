@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from calmotion.arrays import Array
 from calmotion.catalogs.materials import Material
@@ -19,9 +19,6 @@ from calmotion.usd.units import StageUnits, units_of
 from calmotion.usd.writing.metadata import author_origin, author_stage_metadata
 from calmotion.usd.writing.root import relative_asset
 
-if TYPE_CHECKING:
-    from pxr import Gf, Sdf, Usd, UsdPhysics, UsdShade
-
 
 def author_material(stage: Usd.Stage, path: str, material: Material, units: StageUnits) -> UsdShade.Material:
     """Define an elastic material.
@@ -30,8 +27,6 @@ def author_material(stage: Usd.Stage, path: str, material: Material, units: Stag
         stage: Where it is authored.
         material: The material, SI.
     """
-    from pxr import Sdf, UsdPhysics, UsdShade
-
     shader = UsdShade.Material.Define(stage, path)
     prim = shader.GetPrim()
     UsdPhysics.MaterialAPI.Apply(prim).CreateDensityAttr(material.density / units.density(1.0))
@@ -74,8 +69,6 @@ class RobotLayer:
 
     def _author_robot(self) -> None:
         """Author the prims for all that is no body."""
-        from pxr import UsdGeom
-
         for path in _above(self.robot):
             self._stage.OverridePrim(path)
         robot = UsdGeom.Xform.Define(self._stage, self.robot)
@@ -91,16 +84,12 @@ class RobotLayer:
 
     def _author_solid(self, prim: Usd.Prim, flexible: bool) -> None:
         """Make a body of the material."""
-        from pxr import UsdShade
-
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(self._solid, materialPurpose="physics")
         if flexible:
             prim.AddAppliedSchema("CalmFlexibleBodyAPI")
 
     def _author_body(self, path: str, pose: Pose, mass: MassProperties | None) -> Usd.Prim:
         """Define a body that the shot does not have."""
-        from pxr import UsdGeom, UsdPhysics
-
         xform = UsdGeom.Xform.Define(self._stage, path)
         xform.AddTransformOp().Set(rigid(pose))
         prim = xform.GetPrim()
@@ -111,8 +100,6 @@ class RobotLayer:
         return prim
 
     def _author_mass(self, prim: Usd.Prim, mass: MassProperties) -> None:
-        from pxr import Gf, UsdPhysics
-
         moments, axes = np.linalg.eigh(mass.inertia)
         axes[:, 0] *= np.linalg.det(axes)
         api = UsdPhysics.MassAPI.Apply(prim)
@@ -124,8 +111,6 @@ class RobotLayer:
 
     def _fix(self, name: str, side0: tuple[str, Pose], side1: tuple[str, Pose]) -> None:
         """Fix a body to another one, or to the world, whose path is empty."""
-        from pxr import UsdPhysics
-
         joint = UsdPhysics.FixedJoint.Define(self._stage, f"{self.robot}/joints/{name}")
         self._place(joint, side0, side1, side1[1])
 
@@ -144,8 +129,6 @@ class RobotLayer:
             axis, point: In the world.
             side0, side1: Path and pose of the bodies.
         """
-        from pxr import UsdPhysics
-
         path = f"{self.robot}/joints/{name}"
         joint = (UsdPhysics.PrismaticJoint if linear else UsdPhysics.RevoluteJoint).Define(self._stage, path)
         joint.CreateAxisAttr("Z")
@@ -158,8 +141,6 @@ class RobotLayer:
 
     def _place(self, joint: UsdPhysics.Joint, side0: tuple[str, Pose], side1: tuple[str, Pose], frame: Pose) -> None:
         """The bodies of a joint, and its frames in both of them, from that in the world."""
-        from pxr import Gf
-
         for side, (body, pose) in enumerate((side0, side1)):
             if body:
                 (joint.CreateBody0Rel, joint.CreateBody1Rel)[side]().SetTargets([body])
@@ -174,8 +155,6 @@ class RobotLayer:
         Args:
             tip: In the body's own axes.
         """
-        from pxr import Gf, UsdGeom
-
         path = f"{body}/target"
         xform = UsdGeom.Xform.Define(self._stage, path)
         xform.AddTranslateOp().Set(Gf.Vec3d(*tip.tolist()))
@@ -188,8 +167,6 @@ class RobotLayer:
         Args:
             what: It was made of, for people.
         """
-        from pxr import Sdf
-
         layer = Sdf.Layer.CreateAnonymous(".usda")
         layer.TransferContent(self._stage.GetRootLayer())
         author_stage_metadata(layer, provenance)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Sdf, Usd, UsdGeom
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -16,9 +16,6 @@ from calmotion.usd.reading.animated import carriers, codes_of, moving_prims
 from calmotion.usd.reading.context import prims_below
 from calmotion.usd.transforms import pose_from_matrix
 from calmotion.usd.units import units_of
-
-if TYPE_CHECKING:
-    from pxr import Sdf, Usd
 
 _STRETCH = 1e-4  # a part whose scale changes by more, relative to it, is no rigid body: rounding errors are a tenth
 
@@ -56,8 +53,6 @@ def read_parts(stage: Usd.Stage) -> Parts | None:
     Raises:
         ShotError: The shot has no duration.
     """
-    from pxr import UsdGeom
-
     prims = moving_prims(stage)
     keys = {code for prim in prims for one in carriers(prim) for code in codes_of(one)}
     if not keys:
@@ -91,14 +86,10 @@ def read_parts(stage: Usd.Stage) -> Parts | None:
 
 def own_geometry(prim: Usd.Prim, parts: Parts) -> bool:
     """Whether geometry is below a prim that belongs to no part below it."""
-    from pxr import UsdGeom
-
     return any(one.IsA(UsdGeom.Gprim) for one in prims_below(prim, lambda other: str(other.GetPath()) in parts.paths))
 
 
 def _size(prim: Usd.Prim, code: float) -> float:
-    from pxr import UsdGeom
-
     box = UsdGeom.Imageable(prim).ComputeWorldBound(float(code), *UsdGeom.Imageable.GetOrderedPurposeTokens())
     return float(np.linalg.norm(gf.vector(box.ComputeAlignedRange().GetSize())))
 

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd, UsdGeom
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.rigging.links import unique_name
 from calmotion.rigging.part_joints import FIXED, FREE, REVOLUTE, PartJoint
 from calmotion.rigging.part_trees import WORLD, PartMotions, Seat, closed_chains, seat_parts
 from calmotion.usd.rigging.parts import Parts, own_geometry
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _UNSURE = 1e-4  # [m] an axis that may be elsewhere by more is told
 
@@ -114,8 +111,6 @@ def _resolved(seats: Sequence[Seat], still: set[int], part: int) -> int:
 
 def _base(stage: Usd.Stage, parts: Parts, part: int) -> str:
     """The prim with geometry that stands still and carries a part; empty for the scene as a whole."""
-    from pxr import UsdGeom
-
     above = stage.GetPrimAtPath(parts.paths[part]).GetParent()
     if parts.nested[part] != parts.above[part]:
         return ""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics
 from scipy.spatial.transform import Rotation
 
 from calmotion.arrays import Array
@@ -24,9 +24,6 @@ from calmotion.usd.rigging.layer import WORLD, RobotLayer, rigid
 from calmotion.usd.rigging.parts import Parts
 from calmotion.usd.rigging.posed_bodies import PosedBody
 from calmotion.usd.transforms import Pose
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _NO_HINGES = HingeRow(np.zeros((0, 3)), np.zeros((0, 0)), np.zeros(0))
 
@@ -51,8 +48,6 @@ class PosedRobot(RobotLayer):
         material: Material,
         name: str,
     ) -> None:
-        from pxr import Sdf, Usd
-
         layer = Sdf.Layer.CreateAnonymous(".usda")
         layer.timeCodesPerSecond = stage.GetTimeCodesPerSecond()
         layer.subLayerPaths = [os.path.abspath(path)]
@@ -69,8 +64,6 @@ class PosedRobot(RobotLayer):
                 part.
             flexible: Names of the flexible bodies.
         """
-        from pxr import UsdPhysics
-
         self._author_robot()
         prims = [self._editable(body.path) for body in self._bodies]
         others = [prim for prim in prims_of(self._stage) if is_rigid_body(prim) and prim not in prims]
@@ -141,8 +134,6 @@ class PosedRobot(RobotLayer):
 
     def _attach(self, k: int, poses: Sequence[Pose], servo: MassProperties) -> None:
         """The joint of a body, as hinges with a servo between each two, or a slide; none for a root that moves."""
-        from pxr import UsdPhysics
-
         body, joint = self._bodies[k], self._bodies[k].joint
         side0 = (self._bodies[body.carrier].path, poses[body.carrier]) if body.carrier >= 0 else ("", WORLD)
         side1 = (body.path, poses[k])
@@ -164,8 +155,6 @@ class PosedRobot(RobotLayer):
 
     def _servo_between(self, k: int, number: int, mass: MassProperties) -> tuple[str, Pose]:
         """A servo that turns about the axes of a joint up to one of them: its path, and pose at the first frame."""
-        from pxr import UsdGeom
-
         body = self._bodies[k]
         assert body.joint is not None
         R, p = self._motions.R[body.on], self._motions.p[body.on]

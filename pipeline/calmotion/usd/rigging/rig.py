@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd
 
 from calmotion.arrays import Array
 from calmotion.catalogs.materials import MATERIALS
@@ -33,9 +33,6 @@ from calmotion.usd.rigging.reproduction import largest_distance
 from calmotion.usd.rigging.skinned_robot import SkinnedRobot
 from calmotion.usd.rigging.skins import read_skin, skinned_meshes
 from calmotion.usd.transforms import pose_from_matrix
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 
 @dataclass(frozen=True)

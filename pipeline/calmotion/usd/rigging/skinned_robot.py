@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, Vt
 
 from calmotion.arrays import Array, IntArray
 from calmotion.catalogs.materials import Material
@@ -16,9 +16,6 @@ from calmotion.usd import gf
 from calmotion.usd.reading.skeletons import BoundSkeleton
 from calmotion.usd.rigging.layer import WORLD, RobotLayer, rigid
 from calmotion.usd.transforms import Pose, pose_from_matrix
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _STILL = 1e-6  # a root whose matrix changes by less, relative to its size, does not move
 
@@ -41,8 +38,6 @@ class SkinnedRobot(RobotLayer):
         material: Material,
         name: str,
     ) -> None:
-        from pxr import Usd
-
         super().__init__(stage, Usd.Stage.CreateInMemory(), material, name)
         self._skeleton, self._codes, self._links = skeleton, codes, links
         # world matrices of the skeleton's joints at each time code
@@ -96,8 +91,6 @@ class SkinnedRobot(RobotLayer):
         return self._servo_of(mass, size)
 
     def _author_link(self, k: int, mass: MassProperties, flexible: bool) -> None:
-        from pxr import UsdPhysics
-
         prim = self._author_body(self.body(k), self._poses[k], None if flexible else mass)
         self.mass += self._units.mass(mass.mass) if flexible else 0.0
         piece = self._links[k].piece
@@ -108,8 +101,6 @@ class SkinnedRobot(RobotLayer):
             UsdPhysics.RigidBodyAPI(prim).CreateKinematicEnabledAttr(True)
 
     def _author_mesh(self, path: str, points: Array, triangles: IntArray) -> None:
-        from pxr import UsdGeom, Vt
-
         mesh = UsdGeom.Mesh.Define(self._stage, path)
         mesh.CreatePointsAttr(gf.to_points(points))
         mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(triangles), 3))
@@ -126,8 +117,6 @@ class SkinnedRobot(RobotLayer):
 
     def _attach_root(self, k: int) -> None:
         """Fix a root to the world, or animate its transform."""
-        from pxr import UsdGeom
-
         if not self._moves(k):
             self._fix(self._links[k].name, ("", WORLD), (self.body(k), self._poses[k]))
             return
@@ -137,8 +126,6 @@ class SkinnedRobot(RobotLayer):
 
     def _hinge(self, k: int, servo: float) -> None:
         """The hinges of a link, with a servo between each two."""
-        from pxr import Sdf
-
         link, pose = self._links[k], self._poses[k]
         above = self._skeleton.parent(link.joint)
         carrier = pose_from_matrix(self._worlds[0][above], str(self._skeleton.prim.GetPath())).rotation

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd, UsdSkel
 
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
@@ -14,9 +14,6 @@ from calmotion.usd import gf
 from calmotion.usd.reading.bodies.shapes import mesh_geometry
 from calmotion.usd.reading.context import prims_of
 from calmotion.usd.reading.skeletons import BoundSkeleton
-
-if TYPE_CHECKING:
-    from pxr import Usd, UsdSkel
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +35,6 @@ class Skin:
 
 def skinned_meshes(stage: Usd.Stage, skeleton: BoundSkeleton) -> Iterator[UsdSkel.SkinningQuery]:
     """The meshes that a skeleton moves; one that several roots hold comes several times."""
-    from pxr import Usd, UsdSkel
-
     cache, every = UsdSkel.Cache(), Usd.TraverseInstanceProxies()
     for prim in prims_of(stage):
         if not prim.IsA(UsdSkel.Root):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Sdf, Usd, UsdGeom, Vt
 
 from calmotion.arrays import Array
 from calmotion.model import Character, Motion, Skin
@@ -14,9 +14,6 @@ from calmotion.usd import gf
 from calmotion.usd.clock import Clock
 from calmotion.usd.transforms import Pose, pose_from_matrix
 from calmotion.usd.writing.curves import attribute_spec
-
-if TYPE_CHECKING:
-    from pxr import Sdf, Usd
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +77,6 @@ def bake_bodies(
         meters: Metres per unit of the stage.
         changed: Whether bodies that move, relative to their parent prim, as they are animated are left out.
     """
-    from pxr import Sdf, UsdGeom, Vt
-
     codes = clock.time_codes(motion.times)
     poses = _rest_poses(stage, character, clock.start)
     worlds = {
@@ -121,8 +116,6 @@ def bake_points(
         skins: One for each body; None for a rigid one.
         The others as for `bake_bodies`; `motion` is a simulated one.
     """
-    from pxr import Sdf, Usd, UsdGeom, Vt
-
     if motion.elastic is None:
         return
     codes = clock.time_codes(motion.times)
@@ -151,8 +144,6 @@ def bake_points(
 
 def _rest_poses(stage: Usd.Stage, character: Character, start: float) -> dict[str, Pose]:
     """World poses of the bodies as authored at the first frame, stage units, with their scales."""
-    from pxr import Usd, UsdGeom
-
     xforms = UsdGeom.XformCache(Usd.TimeCode(start))
     return {
         body.path: pose_from_matrix(
@@ -176,8 +167,6 @@ def _parent_matrices(
     stage: Usd.Stage, parent: Usd.Prim, worlds: dict[str, Array], poses: dict[str, Pose], codes: Array, start: float
 ) -> Array:
     """Local-to-world matrices of the prim above a body, shape [f, 4, 4], carried by the body above that, if any."""
-    from pxr import Usd, UsdGeom
-
     carrier = parent
     while carrier and str(carrier.GetPath()) not in worlds:
         if carrier.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(carrier).GetResetXformStack():
@@ -193,14 +182,10 @@ def _parent_matrices(
 
 def _same(local: Array, prim: Usd.Prim, codes: Array) -> bool:
     """Whether local matrices, shape [f, 4, 4], are those that a prim is animated with."""
-    from pxr import UsdGeom
-
     xform = UsdGeom.Xformable(prim)
     authored = np.array([gf.matrix(xform.GetLocalTransformation(float(code))) for code in codes])
     return bool(np.max(np.abs(local - authored)) <= _EQUAL * max(1.0, float(np.max(np.abs(authored)))))
 
 
 def _local_to_world(prim: Usd.Prim, code: float) -> Array:
-    from pxr import Usd, UsdGeom
-
     return gf.matrix(UsdGeom.XformCache(Usd.TimeCode(code)).GetLocalToWorldTransform(prim))

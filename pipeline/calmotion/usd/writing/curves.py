@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Sdf, Usd
 
 from calmotion.arrays import Array
 from calmotion.model import Animation, Character, Motor, MotorCurve, Track
 from calmotion.usd.clock import Clock
 from calmotion.usd.schemas import is_applied
-
-if TYPE_CHECKING:
-    from pxr import Sdf, Usd
 
 SAME = 1e-6  # times that are closer are one [s]
 NEAR = 1e-5  # a curve that is nearer to what was authored is the same [rad or m]
@@ -91,8 +88,6 @@ def author_curves(
         samples_per_second: Their density [1/s]; None: at the frames, and between where the animation needs them.
         meters: Metres in the stage's unit of length.
     """
-    from pxr import Sdf
-
     for curve in curves:
         times = sample_times(animation.frame_times, samples_per_second, [animation.tracks[curve.motor]])
         codes = clock.time_codes(times)
@@ -107,8 +102,6 @@ def author_curves(
 def ensure_drives(layer: Sdf.Layer, stage: Usd.Stage, motors: Iterable[Motor]) -> None:
     """Apply the drives that motors' attributes belong to, where the shot has none (motors that an actuator of another
     dialect makes)."""
-    from pxr import Sdf
-
     for motor in motors:
         drive = f"PhysicsDriveAPI:{motor.attribute.split(':')[1]}"
         if not is_applied(stage.GetPrimAtPath(motor.prim_path), drive):
@@ -119,8 +112,6 @@ def ensure_drives(layer: Sdf.Layer, stage: Usd.Stage, motors: Iterable[Motor]) -
 
 def attribute_spec(layer: Sdf.Layer, path: str, kind: Sdf.ValueTypeName, uniform: bool = False) -> Sdf.AttributeSpec:
     """The spec of an attribute in a layer, made with overs above it where needed."""
-    from pxr import Sdf
-
     sdf = Sdf.Path(path)
     spec = layer.GetAttributeAtPath(sdf)
     if spec is not None:

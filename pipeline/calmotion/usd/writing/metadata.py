@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Sdf
 
 from calmotion.model import Character, Provenance, Result
 from calmotion.model.tolerance import verdict_on
 from calmotion.usd import gf
 from calmotion.usd.stages import METADATA_KEY
 from calmotion.version import __version__
-
-if TYPE_CHECKING:
-    from pxr import Sdf
 
 Entries = dict[str, Any]  # values that USD stores in layer metadata
 

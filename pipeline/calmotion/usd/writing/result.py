@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from pxr import Sdf
 
 from calmotion.errors import ShotError
 from calmotion.model import Animation, Character, Motor, MotorCurve, Provenance, Result, Track
@@ -19,9 +21,6 @@ from calmotion.usd.writing.root import keeps_earlier_curves, root_path, write_ro
 from calmotion.usd.writing.scene import author_map, author_scene
 from calmotion.usd.writing.skeletal import author_skeletons
 from calmotion.usd.writing.splines import author_splines
-
-if TYPE_CHECKING:
-    from pxr import Sdf
 
 BAKES = ("none", "motors", "simulated")
 
@@ -67,8 +66,6 @@ def write_result(
     Raises:
         ShotError: The output is an input, cannot be written, or cannot be baked.
     """
-    from pxr import Sdf
-
     options = options or WriteOptions()
     refuse_options(options, motors_that_may_change(character) if result.after else ())
     refuse_inputs(provenance, output)

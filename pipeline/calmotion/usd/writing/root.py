@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from pxr import Sdf
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -38,8 +39,6 @@ def write_root(layer: str, provenance: Provenance, role: str) -> str:
     Raises:
         ShotError: It cannot be written, or does not compose.
     """
-    from pxr import Sdf
-
     output = root_path(layer)
     root = Sdf.Layer.CreateAnonymous(".usda")
     author_stage_metadata(root, provenance)
@@ -141,8 +140,6 @@ def write_performance(
     Raises:
         ShotError: It cannot be written, or does not compose.
     """
-    from pxr import Sdf
-
     schemas.register()
     layer = Sdf.Layer.CreateAnonymous(".usda")
     author_stage_metadata(layer, provenance)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Gf, Sdf, Usd, Vt
 
 from calmotion.arrays import Array
 from calmotion.model.tempo import TimeMap
@@ -13,9 +14,6 @@ from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated import MAP
 from calmotion.usd.reading.context import prims_of
 from calmotion.usd.writing.curves import attribute_spec
-
-if TYPE_CHECKING:
-    from pxr import Sdf, Usd
 
 SAME = 1e-6  # time codes that are closer are one
 _OPS = ("xformOp:", "xformOpOrder")
@@ -27,8 +25,6 @@ def author_map(layer: Sdf.Layer, character: str, tempo: TimeMap, clock: Clock) -
     Args:
         character: Path of the root.
     """
-    from pxr import Gf, Sdf, Vt
-
     spec = attribute_spec(layer, f"{character}.{MAP}", Sdf.ValueTypeNames.Double2Array, uniform=True)
     pairs = zip(clock.time_codes(tempo.animation), clock.time_codes(tempo.performance), strict=True)
     spec.default = Vt.Vec2dArray([Gf.Vec2d(float(made), float(shown)) for made, shown in pairs])
@@ -74,8 +70,6 @@ def _with_frames(codes: Array, frames: Array) -> Array:
 
 def _attributes(layer: Sdf.Layer, stage: Usd.Stage, within: str) -> Iterator[Any]:
     """Attributes that follow the tempo."""
-    from pxr import Sdf
-
     root = Sdf.Path(within)
     for prim in prims_of(stage):
         if not prim.GetPath().HasPrefix(root) or prim.IsInstanceProxy():
@@ -90,15 +84,11 @@ def _attributes(layer: Sdf.Layer, stage: Usd.Stage, within: str) -> Iterator[Any
 
 
 def _is_time(attribute: Usd.Attribute) -> bool:
-    from pxr import Sdf
-
     return bool(attribute.GetTypeName() == Sdf.ValueTypeNames.TimeCode and attribute.HasAuthoredValue())
 
 
 def _author_time(layer: Sdf.Layer, attribute: Usd.Attribute, tempo: TimeMap, clock: Clock) -> None:
     """Author a time of the animation, such as when a sound begins, as that of the performance."""
-    from pxr import Sdf
-
     found = float(attribute.Get())
     spec = attribute_spec(layer, str(attribute.GetPath()), attribute.GetTypeName(), uniform=True)
     moved = clock.time_codes(tempo.performed(clock.seconds(np.array([found]))))
@@ -107,8 +97,6 @@ def _author_time(layer: Sdf.Layer, attribute: Usd.Attribute, tempo: TimeMap, clo
 
 def _interpolates(kind: Sdf.ValueTypeName) -> bool:
     """Whether USD interpolates values of a type."""
-    from pxr import Sdf
-
     names = Sdf.ValueTypeNames
     held = (
         names.Bool, names.UChar, names.Int, names.UInt, names.Int64, names.UInt64, names.String, names.Token,

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from pxr import Sdf, Usd, UsdSkel, Vt
 
 from calmotion.arrays import Array
 from calmotion.model import Animation, Character, MotorCurve
@@ -18,9 +17,6 @@ from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stack
 from calmotion.usd.transforms import pose_from_matrix
 from calmotion.usd.units import units_of
 from calmotion.usd.writing.curves import attribute_spec, curve_values
-
-if TYPE_CHECKING:
-    from pxr import Sdf, Usd, UsdSkel
 
 
 def author_skeletons(
@@ -77,8 +73,6 @@ def _author(
         times: Of the samples [s].
         made: Time codes of the shot with what these show.
     """
-    from pxr import Sdf, UsdSkel
-
     animation = UsdSkel.Animation(stage.GetPrimAtPath(name))
     joints = [str(joint) for joint in animation.GetJointsAttr().Get()]
     more = [stack for stack, _ in parts if stack.skeleton.joints[stack.joint] not in joints]
@@ -108,8 +102,6 @@ def _lengthen(
     layer: Sdf.Layer, animation: UsdSkel.Animation, name: str, joints: list[str], more: list[HingeStack], clock: Clock
 ) -> None:
     """Add joints that the animation did not have, at rest but for their rotations."""
-    from pxr import Sdf, Vt
-
     names = [*joints, *(stack.skeleton.joints[stack.joint] for stack in more)]
     attribute_spec(layer, f"{name}.joints", Sdf.ValueTypeNames.TokenArray, uniform=True).default = Vt.TokenArray(names)
     rests = np.array([stack.skeleton.rest[stack.joint] for stack in more])

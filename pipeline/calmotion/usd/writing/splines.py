@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from pxr import Sdf, Ts
 
 from calmotion.arrays import Array
 from calmotion.model import Animation, Character, MotorCurve
 from calmotion.usd.clock import Clock
 from calmotion.usd.writing.curves import attribute_spec
-
-if TYPE_CHECKING:
-    from pxr import Sdf, Ts
 
 SAME = 1e-9  # times that are closer are one [s]
 
@@ -46,8 +42,6 @@ def author_splines(
         curves: Those to write.
         meters: Metres in the stage's unit of length.
     """
-    from pxr import Sdf, Ts
-
     for curve in curves:
         motor, cyclic = character.motors[curve.motor], character.retarget.cyclic
         times, values, before, after = hermite(animation, curve, cyclic)
@@ -70,8 +64,6 @@ def bezier(times: Array, values: Array, before: Array, after: Array, kind: str) 
         before, after: Derivatives by time code on either side of each, shape [n].
         kind: Type of its values, that of the attribute.
     """
-    from pxr import Ts
-
     spline, width = Ts.Spline(kind), np.diff(times) / 3.0
     spline.SetCurveType(Ts.CurveTypeBezier)
     for k in range(len(times)):

@@ -6,9 +6,10 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Usd
 
 from calmotion.catalogs.motor_types import MotorType, likely_motor_types, motor_type_named, motor_types
 from calmotion.errors import ShotError
@@ -19,9 +20,6 @@ from calmotion.usd.reading.actuators.foreign_actuators import NewtonActuator, ac
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.units import StageUnits
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 TYPE, MODEL, VOLTAGE = "calm:motor:type", "calm:motor:model", "calm:motor:voltage"
 SCHEMA, AUTO = "CalmMotorAPI", "auto"

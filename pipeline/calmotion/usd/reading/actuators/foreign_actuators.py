@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Usd
 
 from calmotion.usd.dialects import POSITION_ACTUATOR, number_of
 from calmotion.usd.reading.joints.joint_prims import JointPrim
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _SAME = 1e-6  # of a gain: what a conversion rounds
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd, UsdShade
 
 from calmotion.errors import ShotError
 from calmotion.mesh.tetrahedra import surface_volume
@@ -19,9 +19,6 @@ from calmotion.usd.dialects import number_of, number_or
 from calmotion.usd.reading.bodies.shapes import Shape
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
 from calmotion.usd.transforms import Pose
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 ELASTIC = "PhysicsVolumeDeformableMaterialAPI"  # of the AOUSD proposal; usd-core does not define it
 _REMEDY = (
@@ -63,8 +60,6 @@ def bound_elastic_material(reading: Reading, prim: Usd.Prim) -> ElasticMaterial 
 
 
 def _bound(prim: Usd.Prim) -> Usd.Prim | None:
-    from pxr import UsdShade
-
     material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
     return material.GetPrim() if material else None
 

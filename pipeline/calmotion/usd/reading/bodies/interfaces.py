@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd, UsdGeom
 
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
@@ -16,9 +16,6 @@ from calmotion.usd.reading.bodies.polygons import triangulate
 from calmotion.usd.reading.bodies.shapes import finite_points, to_body
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
 from calmotion.usd.transforms import Pose
-
-if TYPE_CHECKING:
-    from pxr import Usd, UsdGeom
 
 FAMILY = "calmInterface"
 JOINT = "calm:interface:joint"
@@ -39,8 +36,6 @@ def interfaces_of(
     Raises:
         ShotError: A subset without faces, of faces that do not exist, or that names no joint of this body.
     """
-    from pxr import UsdGeom
-
     surfaces: list[InterfaceSurface] = []
     for prim in prims_below(body_prim, is_rigid_body):
         subset = UsdGeom.Subset(prim)

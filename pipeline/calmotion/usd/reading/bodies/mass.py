@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Usd, UsdGeom, UsdShade
+from scipy.spatial import ConvexHull, QhullError
 
 from calmotion.arrays import Array
 from calmotion.mesh.moments import Moments, sum_of, surface_moments
@@ -18,9 +20,6 @@ from calmotion.usd.reading.bodies.shapes import MESH, Shape
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
 from calmotion.usd.schemas import is_applied
 from calmotion.usd.transforms import Pose
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _FOLLOWS = "Correct it, or remove the attribute so that it follows from the geometry"
 _DEFAULT_DENSITY = 1000.0  # kg/m^3: what UsdPhysics assumes for a collider without any density
@@ -194,8 +193,6 @@ def _from_geometry(
 
 def _note_unread_colliders(reading: Reading, prim: Usd.Prim) -> None:
     """Note colliders that give no mass because their geometry is of a type without a volume here."""
-    from pxr import UsdGeom
-
     for below in prims_below(prim, is_rigid_body):
         kind = str(below.GetTypeName())
         if below.IsA(UsdGeom.Gprim) and is_applied(below, "PhysicsCollisionAPI") and kind not in (MESH, *TYPES):
@@ -220,8 +217,6 @@ def note_unread_masses(reading: Reading, prim: Usd.Prim, shapes: list[Shape]) ->
 
 def _hull_moments(reading: Reading, shape: Shape) -> Moments:
     """Moments of the convex hull of an open surface."""
-    from scipy.spatial import ConvexHull, QhullError
-
     points = shape.surface.points
     try:
         hull = ConvexHull(points)
@@ -241,8 +236,6 @@ def _material_density(prim: Usd.Prim, elastic: bool = True) -> float | None:
     Args:
         elastic: Also that of an elastic one, which flexible bodies have from their mesh.
     """
-    from pxr import UsdShade
-
     material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
     if not material or not is_applied(material.GetPrim(), "PhysicsMaterialAPI"):
         return None

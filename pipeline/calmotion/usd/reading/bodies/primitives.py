@@ -5,16 +5,13 @@ Cylinders and capsules also of two radii (`Cylinder_1`, `Capsule_1`)."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd
 
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
 from calmotion.mesh.moments import Moments
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 Part = tuple[float, float, Callable[[Array], Array]]  # from and to along z, and the radius there
 _TWO_RADII = ("Cylinder_1", "Capsule_1")

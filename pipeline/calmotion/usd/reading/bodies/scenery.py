@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Gf, Tf, Usd, UsdGeom
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -14,9 +14,6 @@ from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd.reading.bodies import primitives
 from calmotion.usd.reading.bodies.shapes import color_of, mesh_geometry
 from calmotion.usd.reading.context import Reading, is_rigid_body
-
-if TYPE_CHECKING:
-    from pxr import Gf, Usd, UsdGeom
 
 NEAR = 1.5  # sizes of the robot: what lies farther from its middle is not read
 LARGEST = 5.0  # sizes of the robot: a larger prim is a sky or a landscape
@@ -31,8 +28,6 @@ def scenery_of(reading: Reading, bodies: Sequence[Body]) -> tuple[SurfaceMesh, .
     A prim that cannot be read is left out: scenery never makes a shot fail. Animated prims, skinned characters and
     point instances are left out as well.
     """
-    from pxr import Tf
-
     cloud = [
         surface.points @ rotation_from_quaternion(body.rest.rotation).T + body.rest.position
         for body in bodies
@@ -77,8 +72,6 @@ def _still_geometry(reading: Reading, middle: Array, size: float) -> Iterator[Us
     What is far is left out by its box, models as a whole by their extents hints. Of a set of hundreds of thousands of
     prims only the first ones are looked at.
     """
-    from pxr import Gf, Usd, UsdGeom
-
     boxes, scale = UsdGeom.BBoxCache(reading.start, list(SHOWN), useExtentsHint=True), reading.units.length(1.0)
     stage, place = reading.whole or reading.stage, Gf.Vec3d(*(middle / scale))
     walk = iter(stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
@@ -114,8 +107,6 @@ def _box_is_near(
 
 
 def _is_animated_or_hidden(prim: Usd.Prim, time: float) -> bool:
-    from pxr import UsdGeom
-
     image = UsdGeom.Imageable(prim)
     if not image:
         return False

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Usd, UsdGeom, UsdShade
 
 from calmotion.arrays import Array, IntArray
 from calmotion.errors import ShotError
@@ -18,9 +19,6 @@ from calmotion.usd.reading.bodies.polygons import triangulate
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
 from calmotion.usd.schemas import is_applied
 from calmotion.usd.transforms import Pose
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 MESH = "Mesh"
 _ROUNDED = ("catmullClark", "loop")  # schemes of subdivision that move points
@@ -216,16 +214,12 @@ def mesh_geometry(prim: Usd.Prim, time: float) -> tuple[Array, IntArray]:
 
 def _shown_purposes(body_prim: Usd.Prim) -> set[str]:
     """Purposes of the geometry by which a body is shown: guides and proxies where it has nothing else."""
-    from pxr import UsdGeom
-
     geometry = [p for p in prims_below(body_prim, _is_elsewhere) if p.IsA(UsdGeom.Gprim)]
     purposes = {str(UsdGeom.Imageable(prim).ComputePurpose()) for prim in geometry}
     return purposes - {"guide", "proxy"} or purposes
 
 
 def _is_visible(prim: Usd.Prim, time: float, purposes: set[str]) -> bool:
-    from pxr import UsdGeom
-
     image = UsdGeom.Imageable(prim)
     return str(image.ComputePurpose()) in purposes and image.ComputeVisibility(time) != UsdGeom.Tokens.invisible
 
@@ -243,8 +237,6 @@ def _is_copy(points: Array, triangles: IntArray, earlier: list[Shape]) -> bool:
 
 def color_of(prim: Usd.Prim, time: float) -> tuple[float, float, float] | None:
     """The display colour, else the diffuse colour of a preview surface; linear RGB."""
-    from pxr import UsdGeom, UsdShade
-
     primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayColor")
     if primvar and primvar.HasValue() and str(primvar.GetTypeName()).endswith("3f[]"):
         values = gf.points(primvar.Get(time))

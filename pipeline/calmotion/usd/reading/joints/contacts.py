@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING
+
+from pxr import Usd
 
 from calmotion.errors import ShotError
 from calmotion.model import Frame
@@ -15,9 +16,6 @@ from calmotion.usd.reading.animated import schedule_of
 from calmotion.usd.reading.context import Reading, carrying_body, prims_of, refuse_without_transform
 from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.transforms import Pose, pose_from_matrix
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _SCHEMA, ACTIVE = "CalmContactAPI", "calm:contact:active"
 _KIND, _FRICTION = "calm:contact:kind", "calm:contact:friction"

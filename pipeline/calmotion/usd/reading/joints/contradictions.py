@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -17,9 +17,6 @@ from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.reading.joints.roots import world_side_prim
 from calmotion.usd.schemas import is_applied
 from calmotion.usd.transforms import Pose
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _KINDS = ("fixed", "revolute", "prismatic", "spherical")
 AWAY = 1e-2  # from each other, over the size of the robot

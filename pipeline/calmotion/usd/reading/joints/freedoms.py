@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+
+from pxr import Usd
 
 from calmotion.usd import schemas
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 GENERIC_JOINT = "PhysicsJoint"
 NO_ROTATION, NO_TRANSLATION = 1e-2, 1e-5  # play of a locked direction [deg], [stage length]

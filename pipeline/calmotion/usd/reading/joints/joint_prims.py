@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -19,9 +20,6 @@ from calmotion.usd.dialects import number_of, number_or
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.reading.joints import freedoms
 from calmotion.usd.transforms import Pose, axis_rotation
-
-if TYPE_CHECKING:
-    from pxr import Sdf, Usd
 
 _KINDS = {
     "PhysicsRevoluteJoint": "revolute",
@@ -81,8 +79,6 @@ class JointPrim:
 
 def joint_prims(stage: Usd.Stage) -> list[Usd.Prim]:
     """The enabled joints of a stage, in its order."""
-    from pxr import UsdPhysics
-
     enabled = []
     for prim in prims_of(stage):
         if prim.IsA(UsdPhysics.Joint) and prim.GetAttribute("physics:jointEnabled").Get() is not False:
@@ -305,8 +301,6 @@ def refuse_no_place(joint: Usd.Prim, name: str, target: Usd.Prim) -> None:
     Raises:
         ShotError: It is of a type that has no transform.
     """
-    from pxr import UsdGeom
-
     kind = str(target.GetTypeName())
     if kind and kind != "Scope" and not target.IsA(UsdGeom.Xformable):
         raise ShotError(

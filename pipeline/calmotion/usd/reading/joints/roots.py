@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd
 
 from calmotion.model import Frame, MovingFrame
 from calmotion.usd.clock import Clock
@@ -14,9 +14,6 @@ from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints.chains import axis_joints
 from calmotion.usd.reading.joints.joint_prims import JointPrim, read_joint
 from calmotion.usd.transforms import Pose
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 
 def world_side_prim(reading: Reading, joint: JointPrim) -> Usd.Prim | None:

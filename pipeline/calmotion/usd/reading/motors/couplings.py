@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Usd
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -21,9 +22,6 @@ from calmotion.usd.reading.context import Reading, body_on, prims_of
 from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.reading.motors.gearing import Gear
 from calmotion.usd.reading.motors.posed_motors import joint_motions
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 GEAR, RACK = "PhysxPhysicsGearJoint", "PhysxPhysicsRackAndPinionJoint"
 # the joints that a prim of each type couples; the first leads where both are driven

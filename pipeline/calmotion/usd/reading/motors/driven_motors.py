@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from pxr import Usd
 
 from calmotion.errors import ShotError
 from calmotion.model import Follows, Motor
@@ -29,9 +30,6 @@ from calmotion.usd.reading.motors.undriven_joints import (
     refuse_unused_animation,
 )
 from calmotion.usd.units import StageUnits
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _TARGET_POSITION = "drive:{drive}:physics:targetPosition"
 SKEL_JOINT = "calm:motor:skelJoint"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError, raise_all
@@ -15,10 +15,6 @@ from calmotion.model import MotorTracks
 from calmotion.support.naming import nearest
 from calmotion.usd.reading.joints import freedoms
 from calmotion.usd.reading.joints.joint_prims import joint_prims
-
-if TYPE_CHECKING:
-    from pxr import Usd
-
 
 _ANGLES = {"rad": 1.0, "deg": float(np.radians(1.0))}
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd
 
 from calmotion.model import Character, FreeTrack, Motor
 from calmotion.model.motor import SERVO
@@ -24,9 +24,6 @@ from calmotion.usd.reading.actuators.foreign_actuators import (
 from calmotion.usd.reading.animated import schedule_of, switched
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints.joint_prims import JointPrim
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 _SCHEMA, _FREE, _POWERED = "CalmMotorAPI", "calm:motor:optimize", "calm:motor:powered"
 _SAME = 1e-4  # of a range: what a conversion rounds

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd, UsdGeom
+from scipy.spatial.transform import Rotation
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -22,9 +23,6 @@ from calmotion.usd.reading.joints.joint_prims import JointPrim
 from calmotion.usd.reading.joints.roots import world_frame, world_side_prim
 from calmotion.usd.transforms import pose_from_matrix
 from calmotion.usd.units import StageUnits
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 MOVED = 1e-6  # a relative pose that changes by more is animated [rad or m]
 TILT_TOLERANCE = 1e-3  # a pose farther off the joint's axis than this is reported [rad]
@@ -103,8 +101,6 @@ def _bodies(joints: Sequence[JointPrim]) -> list[str]:
 
 
 def _about_z(R: Array, x: Array, slides: bool) -> JointMotion:
-    from scipy.spatial.transform import Rotation
-
     from calmotion.rigging.hinge_rows import about
 
     turn = Rotation.from_matrix(R)
@@ -117,8 +113,6 @@ def _about_z(R: Array, x: Array, slides: bool) -> JointMotion:
 
 def _poses(stage: Usd.Stage, paths: Sequence[str], codes: Array, units: StageUnits) -> dict[str, tuple[Array, Array]]:
     """World rotations [n, 3, 3] and origins [n, 3] [m] of bodies."""
-    from pxr import UsdGeom
-
     cache, prims = UsdGeom.XformCache(), [stage.GetPrimAtPath(path) for path in paths]
     found = {path: (np.zeros((len(codes), 3, 3)), np.zeros((len(codes), 3))) for path in paths}
     for n, code in enumerate(codes):

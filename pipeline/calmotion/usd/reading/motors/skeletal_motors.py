@@ -11,9 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pxr import Usd
+from scipy.spatial.transform import Rotation
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -28,9 +29,6 @@ from calmotion.usd.reading.motors.driven_motors import SKEL_JOINT, SKELETON, Dri
 from calmotion.usd.reading.motors.posed_motors import GAP_TOLERANCE, TILT_TOLERANCE, joint_motions
 from calmotion.usd.reading.skeletons import BoundSkeleton, bound_skeletons, skeleton_with
 from calmotion.usd.transforms import pose_from_matrix
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 SKEL_POSE = "calm:motor:skelPose"
 MOST = 3  # motors that one joint of a skeleton takes
@@ -57,8 +55,6 @@ class HingeStack:
 
     def turned(self, angles: Array) -> Array:
         """D at angles of the motors [rad], shape [n, m] to [n, 3, 3]."""
-        from scipy.spatial.transform import Rotation
-
         turn = Rotation.identity(len(angles))
         for k, axis in enumerate(self.axes):
             turn = turn * Rotation.from_rotvec((angles[:, k] - self.start[k])[:, None] * axis)

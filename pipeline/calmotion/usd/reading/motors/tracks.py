@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from pxr import Gf, Sdf, Ts, Usd
 
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
@@ -12,9 +11,6 @@ from calmotion.model import Track
 from calmotion.model.curves import interpolate
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading
-
-if TYPE_CHECKING:
-    from pxr import Gf, Sdf, Ts, Usd
 
 STEP = 0.01  # duration over which a step is played, since no motor can jump [s]
 _JUMP = 1e-6  # smallest step, relative to the range of the spline
@@ -57,8 +53,6 @@ def read_spline(attribute: Usd.Attribute, clock: Clock, reading: Reading, to_si:
 
 
 def _interval(frames: Array) -> Gf.Interval:
-    from pxr import Gf
-
     return Gf.Interval(float(frames[0]), float(frames[-1]))
 
 
