@@ -15,10 +15,10 @@ from .identification.signals import place_of as place_of
 from .identification.signals import signals_of as signals_of
 from .layer_metadata import prediction_errors as prediction_errors
 from .layer_metadata import unexplained_share as unexplained_share
-from .model.estimates import HIGHER_MODES as HIGHER_MODES
 from .model.estimates import Calibration as Calibration
 from .model.estimates import CalibrationFigures as CalibrationFigures
 from .model.estimates import Estimate as Estimate
+from .model.kinds import HIGHER_MODES as HIGHER_MODES
 from .workflow.calibrate import CalibratedShot as CalibratedShot
 from .workflow.calibrate import calibrate as calibrate
 from .workflow.calibrate import read_performed as read_performed

@@ -10,7 +10,8 @@ from calmotion.recordings import ANGLE, MARKER
 from calmotion.support import rotation_from_quaternion
 from calmotion.usd import to_doubles, to_strings
 
-from .model.estimates import ENCODER_OFFSET, Calibration, Estimate
+from .model import kinds
+from .model.estimates import Calibration, Estimate
 
 NARROWER = 0.9  # standard deviation over that of the prior, from which on the recordings tell something
 
@@ -88,7 +89,7 @@ def _arm(character: Character, path: str) -> float:
 
 def _has_factor(item: Estimate) -> bool:
     """Whether a parameter can be drawn as a factor of its value: one about zero cannot."""
-    if item.axis >= 0 or item.kind == ENCODER_OFFSET:
+    if item.axis >= 0 or item.kind == kinds.ENCODER_OFFSET:
         return False
     return item.logarithmic or item.value > 3.0 * item.standard_deviation
 

@@ -34,33 +34,20 @@ from pxr import Gf, Sdf
 from scipy.spatial.transform import Rotation
 
 from .layer_metadata import metadata_of
-from .model.estimates import (
-    ARMATURE,
-    CENTRE,
-    DAMPING,
-    DELAY,
-    DENSITY,
-    ENCODER_OFFSET,
-    FRICTION,
-    GEAR_STIFFNESS,
-    LOAD_FRICTION,
-    MASS,
-    MAX_TORQUE,
-    MODULUS,
-    POSITION_GAIN,
-    VELOCITY_GAIN,
-    VISCOUS_FRICTION,
-    WITH_THIS_MODEL_ONLY,
-    Calibration,
-    Estimate,
-)
+from .model import kinds
+from .model.estimates import WITH_THIS_MODEL_ONLY, Calibration, Estimate
 
 GAIN_FACTOR = "calm:motor:gainFactor"
 ENTRY = "calibration"  # in the metadata of the layer
 _MOTOR = {
-    POSITION_GAIN: "positionGain", VELOCITY_GAIN: "velocityGain", GEAR_STIFFNESS: "gearStiffness", ARMATURE: "armature",
-    FRICTION: "friction", VISCOUS_FRICTION: "viscousFriction", DELAY: "delay",
-}  # fmt: skip
+    kinds.POSITION_GAIN: "positionGain",
+    kinds.VELOCITY_GAIN: "velocityGain",
+    kinds.GEAR_STIFFNESS: "gearStiffness",
+    kinds.ARMATURE: "armature",
+    kinds.FRICTION: "friction",
+    kinds.VISCOUS_FRICTION: "viscousFriction",
+    kinds.DELAY: "delay",
+}
 
 
 def write_calibration(
@@ -108,17 +95,17 @@ class _Writer:
     def write(self) -> None:
         """All of them."""
         for item in self._values.values():
-            if item.kind == MODULUS:
+            if item.kind == kinds.MODULUS:
                 self._attribute(item.path, "physics:youngsModulus", item, self._units.pressure(1.0))
-            elif item.kind == DENSITY:
+            elif item.kind == kinds.DENSITY:
                 self._attribute(item.path, "physics:density", item, self._units.density(1.0))
-            elif item.kind == DAMPING:
+            elif item.kind == kinds.DAMPING:
                 self._damping(item)
-            elif item.kind == MASS:
+            elif item.kind == kinds.MASS:
                 self._mass(item)
-            elif item.kind == ENCODER_OFFSET:
+            elif item.kind == kinds.ENCODER_OFFSET:
                 self._note(item)
-        for path in dict.fromkeys(item.path for item in self._values.values() if item.kind == CENTRE):
+        for path in dict.fromkeys(item.path for item in self._values.values() if item.kind == kinds.CENTRE):
             self._center(path)
         for motor in self._character.motors:
             self._motor(motor.path, motor.linear)
@@ -159,7 +146,7 @@ class _Writer:
         body = next(own for own in self._character.bodies if own.path == path)
         assert body.mass is not None
         scale = self._reading.pose(prim).scale * self._units.length(1.0)
-        items = [self._values.get((CENTRE, path, axis)) for axis in range(3)]
+        items = [self._values.get((kinds.CENTRE, path, axis)) for axis in range(3)]
         center = [body.mass.center[k] if item is None else item.value for k, item in enumerate(items)]
         spec = self._spec(path, "physics:centerOfMass", Sdf.ValueTypeNames.Point3f)
         spec.default = Gf.Vec3f(*[float(value) for value in np.array(center) / scale])
@@ -172,14 +159,14 @@ class _Writer:
         length = units.length(1.0) if linear else float(np.deg2rad(1.0))
         effort = units.force(1.0) if linear else units.torque(1.0)
         unit = {
-            ARMATURE: units.mass(1.0) if linear else units.inertia(1.0),
-            FRICTION: effort,
-            DELAY: 1.0,
+            kinds.ARMATURE: units.mass(1.0) if linear else units.inertia(1.0),
+            kinds.FRICTION: effort,
+            kinds.DELAY: 1.0,
         }
         found = [self._values[kind, path, -1] for kind in _MOTOR if (kind, path, -1) in self._values]
         motor = next(own for own in self._character.motors if own.path == path)
-        if (POSITION_GAIN, path, -1) in self._values and (motor.rotor.back_emf > 0.0 or path in self._factors):
-            item = self._values[POSITION_GAIN, path, -1]
+        if (kinds.POSITION_GAIN, path, -1) in self._values and (motor.rotor.back_emf > 0.0 or path in self._factors):
+            item = self._values[kinds.POSITION_GAIN, path, -1]
             found.remove(item)
             self._attribute(path, GAIN_FACTOR, item, motor.position_gain)
         if motor.rotor.back_emf > 0.0 and found:  # else viscous friction would hold it
@@ -188,19 +175,19 @@ class _Writer:
             self._attribute(path, f"calm:motor:{_MOTOR[item.kind]}", item, unit.get(item.kind, effort / length))
         self._load(motor)
         self._largest(motor, effort)
-        kinds = {item.kind for item in found}
+        told = {item.kind for item in found}
+        gains = {kinds.POSITION_GAIN: motor.position_gain, kinds.VELOCITY_GAIN: motor.velocity_gain}
         # gains are read from one dialect: both are there, or none, and what the second multiplies
-        if kinds & {POSITION_GAIN, VELOCITY_GAIN}:
+        if told & set(gains):
             self._spec(path, DAMPING_ON, Sdf.ValueTypeNames.Token).default = motor.damping_on
-        for kind, value in ((POSITION_GAIN, motor.position_gain), (VELOCITY_GAIN, motor.velocity_gain)):
-            if kinds & {POSITION_GAIN, VELOCITY_GAIN} and kind not in kinds:
-                self._number(path, f"calm:motor:{_MOTOR[kind]}", value / (effort / length))
+            for kind in set(gains) - told:
+                self._number(path, f"calm:motor:{_MOTOR[kind]}", gains[kind] / (effort / length))
         if found:
             self._apply(path, "CalmMotorAPI")
 
     def _load(self, motor: Motor) -> None:
         """The shares of the load in the friction."""
-        item = self._values.get((LOAD_FRICTION, motor.path, -1))
+        item = self._values.get((kinds.LOAD_FRICTION, motor.path, -1))
         if item is None:
             return
         law = motor.rotor.law.with_share(item.value)
@@ -211,7 +198,7 @@ class _Writer:
 
     def _largest(self, motor: Motor, effort: float) -> None:
         """The largest torque, which a factor of the gain of a motor with back-EMF multiplies as well."""
-        item, gain = (self._values.get((kind, motor.path, -1)) for kind in (MAX_TORQUE, POSITION_GAIN))
+        item, gain = (self._values.get((kind, motor.path, -1)) for kind in (kinds.MAX_TORQUE, kinds.POSITION_GAIN))
         if item is None:
             return
         prim = self._reading.stage.GetPrimAtPath(motor.path)

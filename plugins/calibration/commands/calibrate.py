@@ -121,7 +121,7 @@ def _prior(text: str) -> tuple[str, float]:
 
 def parameter_arguments(args: argparse.Namespace) -> dict[str, Any]:
     """What is estimated, as `calibrate`, `excite` and `refine` take it."""
-    from ..identification.parameters import DEFAULT
+    from ..model.kinds import DEFAULT
 
     return {
         "parameters": args.parameters or DEFAULT,

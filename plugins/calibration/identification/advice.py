@@ -9,7 +9,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.recordings import ACCELEROMETER, ANGLE, EFFORT, MARKER
 
-from ..model.estimates import ROBOT_KINDS
+from ..model import kinds
 from .problem import Calibrated
 
 RATE = 100.0  # of the sensors that are imagined [Hz]
@@ -56,7 +56,7 @@ def advised(problem: Calibrated, information: Array, z: Array) -> dict[int, Advi
     missing = [
         k
         for k, (p, deviation) in enumerate(zip(problem.parameters, deviations, strict=True))
-        if p.kind in ROBOT_KINDS and deviation > IDENTIFIABLE
+        if p.kind in kinds.ROBOT_KINDS and deviation > IDENTIFIABLE
     ]
     if not missing:
         return {}

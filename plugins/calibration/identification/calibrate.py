@@ -14,20 +14,13 @@ from calmotion.model import PRESCRIBED, SERVO, RunSettings, curve_of
 from calmotion.recordings import ANGLE, STRAIN, SensorRecording, unit_of
 from calmotion.simulation import CompiledShot
 
-from ..model.estimates import (
-    CLOCK_DRIFT,
-    CLOCK_OFFSET,
-    ROBOT_KINDS,
-    Calibration,
-    ChannelCurves,
-    ChannelFit,
-    Estimate,
-)
+from ..model import kinds
+from ..model.estimates import Calibration, ChannelCurves, ChannelFit, Estimate
 from .advice import IDENTIFIABLE, advised
 from .disagreement import misses
 from .measurement import Measurement, Motions
 from .motor_groups import of_each_motor
-from .parameters import DEFAULT, Parameter
+from .parameters import Parameter
 from .problem import Calibrated
 from .recordings.clocks import clock_of
 from .recordings.plausible import refuse_long, refuse_unlike
@@ -53,7 +46,7 @@ class CalibrationSettings:
         by_motor_type: Whether motors of one type share their parameters.
     """
 
-    parameters: tuple[str, ...] = DEFAULT
+    parameters: tuple[str, ...] = kinds.DEFAULT
     priors: Mapping[str, float] = field(default_factory=dict)
     validate: bool = True
     halvings: int = HALVINGS
@@ -98,7 +91,7 @@ def calibrate_shots(
         refuse_long(recordings, float(shot.animation.frame_times[-1]))
         if not recordings:
             raise ShotError("there are no recordings", path=shot.character.path, remedy="Name one with --recording")
-    known = CLOCK_OFFSET in settings.priors  # then time 0 is the first frame, within this standard deviation
+    known = kinds.CLOCK_OFFSET in settings.priors  # then time 0 is the first frame, within this standard deviation
     takes, factors = takes_of(performed, settings)
     options, nominal = all_simulable(takes, options)
     all_recordings = [recording for _, recordings in performed for recording in recordings]
@@ -176,7 +169,7 @@ def _estimates(found: Found) -> tuple[Estimate, ...]:
         x, sd = float(found.z[k]), float(deviations[k])
         identifiable = sd <= IDENTIFIABLE
         text = ""
-        if not identifiable and p.kind in ROBOT_KINDS:
+        if not identifiable and p.kind in kinds.ROBOT_KINDS:
             text = (
                 f"{advice[k].sentence} narrow it to {100.0 * advice[k].sigma:.2g}% of its prior"
                 if k in advice
@@ -300,7 +293,7 @@ def _notes(
                     f"{correlations[k, other]:+.2f}): what is known well is a combination of both"
                 )
     for k, item in enumerate(estimates):
-        if item.kind in (CLOCK_OFFSET, CLOCK_DRIFT) or abs(found.z[k]) < 4.0:
+        if item.kind in (kinds.CLOCK_OFFSET, kinds.CLOCK_DRIFT) or abs(found.z[k]) < 4.0:
             continue
         notes.append(
             f"{item.name} is {abs(found.z[k]):.1f} standard deviations of its prior away from the shot: check the "

@@ -17,17 +17,7 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.recordings import ACCELEROMETER, MARKER, STRAIN, Channel, LowPass
 
-from ..model.estimates import (
-    BIAS,
-    CLOCK_DRIFT,
-    CLOCK_OFFSET,
-    FILTER_DAMPING,
-    FILTER_FREQUENCY,
-    GAIN,
-    OFFSET,
-    PLACE,
-    START,
-)
+from ..model import kinds
 from .parameters import Parameter
 from .recordings.sensors import Sensor, decay_paths, own_path
 from .signals import Signals
@@ -66,14 +56,14 @@ class Measurement:
             x: Of the parameters, in standard deviations of their priors, shape [m].
         """
         file = self.recordings[sensor.recording]
-        start, drift = (self._value(x, kind, file) for kind in (CLOCK_OFFSET, CLOCK_DRIFT))
+        start, drift = (self._value(x, kind, file) for kind in (kinds.CLOCK_OFFSET, kinds.CLOCK_DRIFT))
         return np.asarray((sensor.channel.times - start) * (1.0 + drift))
 
     def low_pass(self, channel: Channel, x: Array) -> LowPass | None:
         """The filter of a channel's sensor, or None."""
         if channel.low_pass is None:
             return None
-        frequency, damping = (self._value(x, kind, channel.path) for kind in (FILTER_FREQUENCY, FILTER_DAMPING))
+        frequency, damping = (self._value(x, kind, channel.path) for kind in kinds.FILTER)
         return LowPass(frequency or channel.low_pass.frequency, damping or channel.low_pass.damping)
 
     def predicted(self, motions: Motions, sensor: Sensor, x: Array) -> Array:
@@ -86,22 +76,22 @@ class Measurement:
         signals = motions[sensor.take]
         values = signals.at(kind, sensor.index, times, low_pass=self.low_pass(sensor.channel, x))
         if kind == STRAIN:
-            values = self._value(x, GAIN, path) * values + self._value(x, OFFSET, path)
-        if kind == MARKER and isinstance(sensor.index, int) and np.any(place := self._vector(x, PLACE, path)):
+            values = self._value(x, kinds.GAIN, path) * values + self._value(x, kinds.OFFSET, path)
+        if kind == MARKER and isinstance(sensor.index, int) and np.any(place := self._vector(x, kinds.PLACE, path)):
             values = values + signals.axes_at(sensor.index, times) @ place
         if kind == ACCELEROMETER:
-            values = values + self._vector(x, BIAS, path)
+            values = values + self._vector(x, kinds.BIAS, path)
         free = self._free(signals, sensor, x)
         return values if free is None else values + signals.decays(times) @ free
 
     def _free(self, signals: Signals, sensor: Sensor, x: Array) -> Array | None:
         """Free motions in which a sensor begins, shape [2 modes, c]; None for one that rests."""
         paths = decay_paths(sensor, signals)
-        if not any(p.kind == START and p.path in paths for p in self.parameters):
+        if not any(p.kind == kinds.START and p.path in paths for p in self.parameters):
             return None
         count = sensor.channel.values.shape[1]
         axes = range(count) if count > 1 else (-1,)
-        return np.array([[self._value(x, START, path, axis) for axis in axes] for path in paths])
+        return np.array([[self._value(x, kinds.START, path, axis) for axis in axes] for path in paths])
 
     def derivatives(self, motions: Motions, sensor: Sensor, x: Array) -> Array:
         """Derivative of `predicted` by the parameters, shape [n, c, m]."""
@@ -112,31 +102,31 @@ class Measurement:
         low_pass = self.low_pass(channel, x)
         rate = signals.at(channel.kind, sensor.index, times, 1, low_pass)
         if channel.kind == STRAIN:
-            rate = self._value(x, GAIN, path) * rate
+            rate = self._value(x, kinds.GAIN, path) * rate
         if (free := self._free(signals, sensor, x)) is not None:
             rate = rate + signals.decays(times, 1) @ free
         index = sensor.index if isinstance(sensor.index, int) else 0
-        if channel.kind == MARKER and np.any(place := self._vector(x, PLACE, path)):
+        if channel.kind == MARKER and np.any(place := self._vector(x, kinds.PLACE, path)):
             rate = rate + signals.axes_at(index, times, 1) @ place
-        start, drift = (self._value(x, kind, file) for kind in (CLOCK_OFFSET, CLOCK_DRIFT))
+        start, drift = (self._value(x, kind, file) for kind in (kinds.CLOCK_OFFSET, kinds.CLOCK_DRIFT))
         for m, p in enumerate(self.parameters):
-            if p.kind == CLOCK_OFFSET and p.path == file:
+            if p.kind == kinds.CLOCK_OFFSET and p.path == file:
                 out[:, :, m] = -(1.0 + drift) * p.spread * rate
-            elif p.kind == CLOCK_DRIFT and p.path == file:
+            elif p.kind == kinds.CLOCK_DRIFT and p.path == file:
                 out[:, :, m] = p.spread * (channel.times - start)[:, None] * rate
-            elif p.kind == BIAS and channel.kind == ACCELEROMETER and p.path == path:
+            elif p.kind == kinds.BIAS and channel.kind == ACCELEROMETER and p.path == path:
                 out[:, p.axis, m] = p.spread
-            elif p.kind in (GAIN, OFFSET) and channel.kind == STRAIN and p.path == path:
-                own = signals.at(STRAIN, sensor.index, times, low_pass=low_pass) if p.kind == GAIN else 1.0
+            elif p.kind in (kinds.GAIN, kinds.OFFSET) and channel.kind == STRAIN and p.path == path:
+                own = signals.at(STRAIN, sensor.index, times, low_pass=low_pass) if p.kind == kinds.GAIN else 1.0
                 out[:, :, m] = p.slope(float(x[m])) * own
-            elif p.kind in (FILTER_FREQUENCY, FILTER_DAMPING) and low_pass is not None and p.path == channel.path:
-                gain = self._value(x, GAIN, path) if channel.kind == STRAIN else 1.0
+            elif p.kind in kinds.FILTER and low_pass is not None and p.path == channel.path:
+                gain = self._value(x, kinds.GAIN, path) if channel.kind == STRAIN else 1.0
                 ends = [self.low_pass(channel, x + side * np.eye(len(x))[m]) for side in (SIDE, -SIDE)]
                 one, other = (signals.at(channel.kind, sensor.index, times, low_pass=end) for end in ends)
                 out[:, :, m] = gain * (one - other) / (2.0 * SIDE)
-            elif p.kind == START and p.path in (paths := decay_paths(sensor, signals)):
+            elif p.kind == kinds.START and p.path in (paths := decay_paths(sensor, signals)):
                 out[:, max(p.axis, 0), m] = p.spread * signals.decays(times)[:, paths.index(p.path)]
-            elif p.kind == PLACE and channel.kind == MARKER and p.path == path:
+            elif p.kind == kinds.PLACE and channel.kind == MARKER and p.path == path:
                 out[:, :, m] = p.spread * signals.axes_at(index, times)[:, :, p.axis]
         return out
 

@@ -9,7 +9,8 @@ import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import Character
 
-from ..model.estimates import ENCODER_OFFSET, MOTOR_KINDS, Estimate
+from ..model import kinds
+from ..model.estimates import Estimate
 from .parameters import Parameter
 
 OWN = 1e-6  # share of the variance that each motor has for itself, so that covariances stay positive
@@ -26,7 +27,7 @@ def grouped(parameters: Sequence[Parameter], character: Character) -> tuple[Para
     types = {m.path: (m.kind, m.model, m.linear) for m in character.motors if m.kind}
     found: dict[object, Parameter] = {}
     for p in parameters:
-        shared = p.kind in MOTOR_KINDS and p.kind != ENCODER_OFFSET and p.path in types
+        shared = p.kind in kinds.MOTOR_KINDS and p.kind != kinds.ENCODER_OFFSET and p.path in types
         key: object = (p.kind, types[p.path]) if shared else p.name
         first = found.get(key)
         found[key] = p if first is None else replace(first, alike=(*first.alike, (p.path, p.nominal)))

@@ -17,53 +17,8 @@ from calmotion.retargeting import payload_bodies
 from calmotion.simulation import CompiledShot
 from calmotion.support import nearest
 
-from ..model.estimates import (
-    ARMATURE,
-    AXES,
-    BIAS,
-    CENTRE,
-    CLOCK_DRIFT,
-    CLOCK_OFFSET,
-    DAMPING,
-    DELAY,
-    DENSITY,
-    ENCODER_OFFSET,
-    FILTER_DAMPING,
-    FILTER_FREQUENCY,
-    FRICTION,
-    GAIN,
-    GEAR_STIFFNESS,
-    HIGHER_MODES,
-    LOAD_FRICTION,
-    MASS,
-    MAX_TORQUE,
-    MODULUS,
-    OFFSET,
-    PLACE,
-    POSITION_GAIN,
-    ROBOT_KINDS,
-    VELOCITY_GAIN,
-    VISCOUS_FRICTION,
-)
-
-# Standard deviations of the priors: of logarithms as ln(1 + s), of the others in SI.
-PRIORS: Mapping[str, float] = {
-    MODULUS: 0.3, DAMPING: 1.0, DENSITY: 0.05, MASS: 0.1, CENTRE: 0.01, POSITION_GAIN: 0.3, VELOCITY_GAIN: 0.5,
-    GEAR_STIFFNESS: 0.5, ARMATURE: 0.5, FRICTION: 1.0, VISCOUS_FRICTION: 1.0, LOAD_FRICTION: 1.0,
-    MAX_TORQUE: 0.3, DELAY: 0.005,
-    ENCODER_OFFSET: float(np.radians(1.0)), HIGHER_MODES: 0.01, CLOCK_OFFSET: 0.05, CLOCK_DRIFT: 1e-4,
-    BIAS: 0.3, PLACE: 0.002, GAIN: 1.0, OFFSET: 1.0, FILTER_FREQUENCY: 0.1, FILTER_DAMPING: 0.3,
-}  # fmt: skip
-DEFAULT = (
-    MODULUS, DAMPING, MASS, POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION,
-    LOAD_FRICTION, MAX_TORQUE, DELAY,
-)  # fmt: skip
-LOGARITHMIC = (
-    MODULUS, DAMPING, DENSITY, MASS, POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION,
-    LOAD_FRICTION, MAX_TORQUE,
-)  # fmt: skip
-
-OF_ROTOR = (ARMATURE, FRICTION, VISCOUS_FRICTION, LOAD_FRICTION)  # what the effort of an ideal motor tells
+from ..model import kinds
+from ..model.estimates import AXES
 
 
 @dataclass(frozen=True)
@@ -117,7 +72,7 @@ class Parameter:
 
 def robot_parameters(
     shot: CompiledShot,
-    wanted: Sequence[str] = DEFAULT,
+    wanted: Sequence[str] = kinds.DEFAULT,
     priors: Mapping[str, float] | None = None,
     efforts: Collection[str] = (),
 ) -> tuple[Parameter, ...]:
@@ -133,7 +88,7 @@ def robot_parameters(
     Raises:
         ShotError: There is no such kind, a pattern fits nothing, or there is no parameter at all.
     """
-    given = {**PRIORS, **(priors or {})}
+    given = {**kinds.PRIORS, **(priors or {})}
     refuse_unknown(wanted, priors or {})
     found: dict[str, Parameter] = {}
     for text in wanted:
@@ -159,8 +114,8 @@ def robot_parameters(
             "mass or encoder_offset",
         )
     # without it, the error of the mesh would be taken for another modulus and mass
-    moduli = [p for p in found.values() if p.kind == MODULUS]
-    graded = [Parameter(HIGHER_MODES, p.path, 0.0, given[HIGHER_MODES], logarithmic=False) for p in moduli]
+    moduli = [p for p in found.values() if p.kind == kinds.MODULUS]
+    graded = [Parameter(kinds.HIGHER_MODES, p.path, 0.0, given[kinds.HIGHER_MODES], logarithmic=False) for p in moduli]
     return (*found.values(), *graded)
 
 
@@ -171,8 +126,8 @@ def refuse_unknown(wanted: Sequence[str], priors: Mapping[str, float]) -> None:
         ShotError: There is one.
     """
     for attribute, known, names in (
-        ("--parameters", ROBOT_KINDS, [text.partition(":")[0] for text in wanted]),
-        ("--prior", tuple(PRIORS), list(priors)),
+        ("--parameters", kinds.ROBOT_KINDS, [text.partition(":")[0] for text in wanted]),
+        ("--prior", tuple(kinds.PRIORS), list(priors)),
     ):
         for name in names:
             if name not in known:
@@ -188,35 +143,35 @@ def refuse_unknown(wanted: Sequence[str], priors: Mapping[str, float]) -> None:
                 "the standard deviation of a prior must be positive",
                 attribute="--prior",
                 found=f"{name}={value:g}",
-                remedy=f"Use a relative one, such as {name}={PRIORS[name]:g}, or leave the parameter out",
+                remedy=f"Use a relative one, such as {name}={kinds.PRIORS[name]:g}, or leave the parameter out",
             )
 
 
 def _of_kind(shot: CompiledShot, kind: str, pattern: str, prior: float, efforts: Collection[str]) -> list[Parameter]:
     """All parameters of a kind; masses of bodies within a chain only where a pattern asks for them."""
     character = shot.character
-    spread = float(np.log1p(prior)) if kind in LOGARITHMIC else prior
-    if kind in (MODULUS, DAMPING, DENSITY):
+    spread = float(np.log1p(prior)) if kind in kinds.LOGARITHMIC else prior
+    if kind in (kinds.MODULUS, kinds.DAMPING, kinds.DENSITY):
         found = {}
         for body in character.bodies:
             if body.flexible is not None and body.simulated_flexible:
                 material = body.flexible.material
                 value = {
-                    MODULUS: (material.youngs_modulus, "Pa"),
+                    kinds.MODULUS: (material.youngs_modulus, "Pa"),
                     # of both coefficients, where they are Rayleigh's
-                    DAMPING: (material.damping_ratio if material.rayleigh is None else 1.0, ""),
-                    DENSITY: (material.density, "kg/m^3"),
+                    kinds.DAMPING: (material.damping_ratio if material.rayleigh is None else 1.0, ""),
+                    kinds.DENSITY: (material.density, "kg/m^3"),
                 }[kind]
                 # the density of a body whose mass is authored follows from that mass
-                if value[0] > 0.0 and not (kind == DENSITY and body.mass is not None):
+                if value[0] > 0.0 and not (kind == kinds.DENSITY and body.mass is not None):
                     found[material.path] = Parameter(kind, material.path, value[0], spread, value[1])
         return list(found.values())
-    if kind in (MASS, CENTRE):
+    if kind in (kinds.MASS, kinds.CENTRE):
         ends, rows = set(payload_bodies(shot)), []
         for index, body in enumerate(character.bodies):
             if body.simulated_flexible or body.mass is None or body.between or not (pattern or index in ends):
                 continue
-            if kind == MASS:
+            if kind == kinds.MASS:
                 rows.append(Parameter(kind, body.path, body.mass.mass, spread, "kg"))
             else:
                 rows += [
@@ -236,24 +191,24 @@ def _of_motor(motor: Motor, kind: str, spread: float, measured: bool) -> list[Pa
         measured: Whether its effort is, which tells the rotor of an ideal motor.
     """
     angle, effort = ("m", "N") if motor.linear else ("rad", "N m")
-    if kind == ENCODER_OFFSET:
-        own = 1e-3 if motor.linear and spread == PRIORS[ENCODER_OFFSET] else spread
+    if kind == kinds.ENCODER_OFFSET:
+        own = 1e-3 if motor.linear and spread == kinds.PRIORS[kinds.ENCODER_OFFSET] else spread
         return [Parameter(kind, motor.path, 0.0, own, angle, logarithmic=False)]
     ideal = motor.model == PRESCRIBED
-    if motor.follows is not None or (ideal and not (measured and kind in OF_ROTOR)):
+    if motor.follows is not None or (ideal and not (measured and kind in kinds.OF_ROTOR)):
         return []
-    if kind == DELAY:
+    if kind == kinds.DELAY:
         return [Parameter(kind, motor.path, motor.delay, spread, "s", logarithmic=False, lower=0.0)]
     own_value, unit = {
-        POSITION_GAIN: (motor.position_gain, f"{effort}/{angle}"),
-        VELOCITY_GAIN: (motor.velocity_gain, f"{effort} s/{angle}"),
-        GEAR_STIFFNESS: (motor.rotor.gear_stiffness, f"{effort}/{angle}"),
-        ARMATURE: (motor.rotor.armature, "kg" if motor.linear else "kg m^2"),
-        FRICTION: (motor.rotor.friction, effort),
-        VISCOUS_FRICTION: (motor.rotor.viscous_friction, f"{effort} s/{angle}"),
-        LOAD_FRICTION: (motor.rotor.law.share, ""),
-        MAX_TORQUE: (motor.max_torque, effort),
+        kinds.POSITION_GAIN: (motor.position_gain, f"{effort}/{angle}"),
+        kinds.VELOCITY_GAIN: (motor.velocity_gain, f"{effort} s/{angle}"),
+        kinds.GEAR_STIFFNESS: (motor.rotor.gear_stiffness, f"{effort}/{angle}"),
+        kinds.ARMATURE: (motor.rotor.armature, "kg" if motor.linear else "kg m^2"),
+        kinds.FRICTION: (motor.rotor.friction, effort),
+        kinds.VISCOUS_FRICTION: (motor.rotor.viscous_friction, f"{effort} s/{angle}"),
+        kinds.LOAD_FRICTION: (motor.rotor.law.share, ""),
+        kinds.MAX_TORQUE: (motor.max_torque, effort),
     }[kind]
-    if kind not in (POSITION_GAIN, VELOCITY_GAIN) and motor.model == DRIVE:
+    if kind not in (kinds.POSITION_GAIN, kinds.VELOCITY_GAIN) and motor.model == DRIVE:
         return []
     return [Parameter(kind, motor.path, own_value, spread, unit)] if 0.0 < own_value < np.inf else []

@@ -17,26 +17,7 @@ from calmotion.reduction import (
 )
 from calmotion.simulation import CompiledShot, compile_shot, with_material_damping
 
-from ..model.estimates import (
-    ARMATURE,
-    CENTRE,
-    DAMPING,
-    DELAY,
-    DENSITY,
-    ENCODER_OFFSET,
-    FRICTION,
-    GEAR_STIFFNESS,
-    HIGHER_MODES,
-    LOAD_FRICTION,
-    MASS,
-    MATERIAL_KINDS,
-    MAX_TORQUE,
-    MODULUS,
-    MOTOR_KINDS,
-    POSITION_GAIN,
-    VELOCITY_GAIN,
-    VISCOUS_FRICTION,
-)
+from ..model import kinds
 from .parameters import Parameter
 
 Values = Mapping[tuple[str, str, int], float]  # by kind, path and axis
@@ -70,24 +51,23 @@ def robot_with(shot: CompiledShot, values: Values) -> Robot:
     for these materials and masses, so that a shot with these values has the same robot.
     """
     character = shot.character
-    offsets = np.array([values.get((ENCODER_OFFSET, motor.path, -1), 0.0) for motor in character.motors])
-    if not any(kind != ENCODER_OFFSET for kind, _, _ in values):
+    offsets = np.array([values.get((kinds.ENCODER_OFFSET, motor.path, -1), 0.0) for motor in character.motors])
+    if not any(kind != kinds.ENCODER_OFFSET for kind, _, _ in values):
         return Robot(shot, offsets)
-    kinds = {kind for kind, _, _ in values}
     bodies = [_body(own, body, values) for own, body in zip(character.bodies, shot.bodies, strict=True)]
     changed = replace(
         character,
         bodies=tuple(_with_material(body, values) for body in character.bodies),
         motors=tuple(_motor(motor, values) for motor in character.motors),
     )
-    if kinds - set(MOTOR_KINDS):
+    if not {kind for kind, _, _ in values} <= set(kinds.MOTOR_KINDS):
         bodies = with_material_damping(changed, shot.tree, bodies)
     return Robot(compile_shot(changed, shot.animation, bodies), offsets)
 
 
 def material_with(material: ElasticMaterial, values: Values) -> ElasticMaterial:
     """A material with some values; a damping scales both coefficients where they are Rayleigh's."""
-    modulus, damping, density = (values.get((kind, material.path, -1)) for kind in (MODULUS, DAMPING, DENSITY))
+    modulus, damping, density = (values.get((kind, material.path, -1)) for kind in kinds.MATERIAL_KINDS)
     rayleigh, ratio = material.rayleigh, material.damping_ratio
     if damping is not None and rayleigh is not None:
         rayleigh = (damping * rayleigh[0], damping * rayleigh[1])
@@ -103,7 +83,7 @@ def material_with(material: ElasticMaterial, values: Values) -> ElasticMaterial:
 
 
 def _with_material(body: Body, values: Values) -> Body:
-    if body.flexible is None or not any((kind, body.flexible.material.path, -1) in values for kind in MATERIAL_KINDS):
+    if body.flexible is None:
         return body
     return replace(body, flexible=replace(body.flexible, material=material_with(body.flexible.material, values)))
 
@@ -113,13 +93,13 @@ def _body(own: Body, body: ReducedBody, values: Values) -> ReducedBody:
         given = own.flexible.material
         material = material_with(given, values)
         body = with_scaled_stiffness(body, material.youngs_modulus / given.youngs_modulus)
-        body = with_graded_stiffness(body, values.get((HIGHER_MODES, given.path, -1), 0.0))
+        body = with_graded_stiffness(body, values.get((kinds.HIGHER_MODES, given.path, -1), 0.0))
         # a body whose mass is authored keeps it
         return with_scaled_density(body, material.density / given.density) if own.mass is None else body
     if own.mass is None:
         return body
-    mass = values.get((MASS, own.path, -1), own.mass.mass)
-    center = np.array([values.get((CENTRE, own.path, axis), own.mass.center[axis]) for axis in range(3)])
+    mass = values.get((kinds.MASS, own.path, -1), own.mass.mass)
+    center = np.array([values.get((kinds.CENTRE, own.path, axis), own.mass.center[axis]) for axis in range(3)])
     return replace(body, invariants=_rigid(body.invariants, mass, center))
 
 
@@ -133,20 +113,20 @@ def _motor(motor: Motor, values: Values) -> Motor:
     def of(kind: str, own: float) -> float:
         return values.get((kind, motor.path, -1), own)
 
-    motor = motor.with_gain(of(POSITION_GAIN, motor.position_gain))
+    motor = motor.with_gain(of(kinds.POSITION_GAIN, motor.position_gain))
     law = motor.rotor.law
     rotor = replace(
         motor.rotor,
-        gear_stiffness=of(GEAR_STIFFNESS, motor.rotor.gear_stiffness),
-        armature=of(ARMATURE, motor.rotor.armature),
-        friction=of(FRICTION, motor.rotor.friction),
-        viscous_friction=of(VISCOUS_FRICTION, motor.rotor.viscous_friction),
-        law=law.with_share(of(LOAD_FRICTION, law.share)),
+        gear_stiffness=of(kinds.GEAR_STIFFNESS, motor.rotor.gear_stiffness),
+        armature=of(kinds.ARMATURE, motor.rotor.armature),
+        friction=of(kinds.FRICTION, motor.rotor.friction),
+        viscous_friction=of(kinds.VISCOUS_FRICTION, motor.rotor.viscous_friction),
+        law=law.with_share(of(kinds.LOAD_FRICTION, law.share)),
     )
     return replace(
         motor,
-        max_torque=of(MAX_TORQUE, motor.max_torque),
-        velocity_gain=of(VELOCITY_GAIN, motor.velocity_gain),
-        delay=of(DELAY, motor.delay),
+        max_torque=of(kinds.MAX_TORQUE, motor.max_torque),
+        velocity_gain=of(kinds.VELOCITY_GAIN, motor.velocity_gain),
+        delay=of(kinds.DELAY, motor.delay),
         rotor=rotor,
     )

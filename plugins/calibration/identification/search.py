@@ -13,7 +13,7 @@ from calmotion.support import answer
 from scipy.stats import norm
 from scipy.stats.qmc import Sobol
 
-from ..model.estimates import DAMPING, DELAY, FRICTION, LOAD_FRICTION, MAX_TORQUE
+from ..model import kinds
 from .disagreement import Scattered, settled, together
 from .least_squares import Solution, chord, loss_of, minimize, posterior, weights_of
 from .measurement import Measurement
@@ -296,12 +296,13 @@ def _drawn(problem: Calibrated) -> list[Array]:
     """Robots all over the priors, where a motor's friction or largest torque is estimated: these decide how a robot
     moves only beyond some torque, so that a search that begins on the other side does not find them."""
     n, m = len(problem.parameters), len(problem.measurement.parameters)
-    own = np.array([p.kind in (FRICTION, LOAD_FRICTION, MAX_TORQUE) for p in problem.parameters])
+    own = np.array([p.kind in (kinds.FRICTION, kinds.LOAD_FRICTION, kinds.MAX_TORQUE) for p in problem.parameters])
     if not own.any() or n > FEW:
         return []
     draws = norm.ppf(Sobol(n, rng=0).random(DRAWN))
     return [
-        np.concatenate([np.where([p.kind != DELAY for p in problem.parameters], x, 0.0), np.zeros(m)]) for x in draws
+        np.concatenate([np.where([p.kind != kinds.DELAY for p in problem.parameters], x, 0.0), np.zeros(m)])
+        for x in draws
     ]
 
 
@@ -315,7 +316,7 @@ def _of_decay(problem: Calibrated) -> list[Array]:
     if found is None:
         return []
     for k, p in enumerate(problem.parameters):
-        if p.kind in STIFF or p.kind == DAMPING:
+        if p.kind in STIFF or p.kind == kinds.DAMPING:
             factor = found[0] ** 2 if p.kind in STIFF else found[1]
             z[k] = np.clip(np.log(factor) / p.spread, -FARTHEST, FARTHEST)
     return [z]

@@ -14,9 +14,9 @@ from calmotion.multibody import IMPLICIT, SimulationFailure
 from calmotion.recordings import ANGLE, EFFORT, SensorRecording
 from calmotion.simulation import MAX_STEP, CompiledShot, failure_error, prepare
 
-from ..model.estimates import GEAR_STIFFNESS, MODULUS, POSITION_GAIN
+from ..model import kinds
 from .motor_groups import grouped
-from .parameters import OF_ROTOR, Parameter, robot_parameters
+from .parameters import Parameter, robot_parameters
 from .recordings.sensors import Sensor
 from .robots import robot_at, robot_with
 from .signals import Signals, ends_at_rest, signals_of
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 FIRST = 5  # samples that tell where an encoder begins
 OFF, SURE = 0.03, 5.0  # from where the shot begins: share of the motion, and standard deviations of the noise
-STIFF = (MODULUS, POSITION_GAIN, GEAR_STIFFNESS)  # what decides about frequencies
+STIFF = (kinds.MODULUS, kinds.POSITION_GAIN, kinds.GEAR_STIFFNESS)  # what decides about frequencies
 SCHEME = "generalized-alpha"  # a quarter of BDF2's error, and no damping to speak of
 STIFFER = 30.0  # times as stiff as the shot's: a robot that hardly shakes, by which clocks are found
 
@@ -56,7 +56,7 @@ class Take:
     def moving(self) -> BoolArray:
         """Which parameters the motion depends on, shape [n]: all but those of rotors of ideal motors."""
         ideal = {motor.path for motor in self.shot.character.motors if motor.model == PRESCRIBED}
-        return np.array([not (p.kind in OF_ROTOR and p.path in ideal) for p in self.parameters], bool)
+        return np.array([not (p.kind in kinds.OF_ROTOR and p.path in ideal) for p in self.parameters], bool)
 
     @property
     def end(self) -> float:
@@ -98,7 +98,7 @@ def takes_of(
     other = [
         row[0].path
         for row in zip(*(take.parameters for take in takes), strict=True)
-        if row[0].kind == POSITION_GAIN and not np.allclose([p.nominal for p in row], row[0].nominal, rtol=1e-6)
+        if row[0].kind == kinds.POSITION_GAIN and not np.allclose([p.nominal for p in row], row[0].nominal, rtol=1e-6)
     ]
     return takes, tuple(other)
 

@@ -8,30 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from calmotion.arrays import Array, BoolArray
 
-# kinds of parameters of the robot
-MODULUS, DAMPING, DENSITY, MASS, CENTRE = "modulus", "damping", "density", "mass", "centre"
-POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS = "position_gain", "velocity_gain", "gear_stiffness"
-ARMATURE, FRICTION, VISCOUS_FRICTION, DELAY = "armature", "friction", "viscous_friction", "delay"
-LOAD_FRICTION = "load_friction"  # at rest, over the mean of the torques on both sides of the gear
-MAX_TORQUE = "max_torque"  # of a servo, at rest
-ENCODER_OFFSET = "encoder_offset"
-# what the model of the robot has wrong, and no attribute of a shot takes
-HIGHER_MODES = "higher_modes"
-# kinds of parameters of a measurement
-CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE = "clock_offset", "clock_drift", "bias", "place"
-GAIN, OFFSET = "gain", "offset"  # of a strain gauge
-FILTER_FREQUENCY, FILTER_DAMPING = "filter_frequency", "filter_damping"  # of a sensor's low-pass
-START = "start"  # free motion in which a shot begins, of a sensor's signal
+from .kinds import ROBOT_KINDS
 
-MATERIAL_KINDS = (MODULUS, DAMPING, DENSITY)
-BODY_KINDS = (MASS, CENTRE)
-MOTOR_KINDS = (
-    POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION, LOAD_FRICTION, MAX_TORQUE,
-    DELAY, ENCODER_OFFSET,
-)  # fmt: skip
-ROBOT_KINDS = (*MATERIAL_KINDS, *BODY_KINDS, *MOTOR_KINDS)
-MODEL_KINDS = (HIGHER_MODES,)
-MEASUREMENT_KINDS = (CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE, GAIN, OFFSET, FILTER_FREQUENCY, FILTER_DAMPING, START)
 AXES = "xyz"
 WITH_THIS_MODEL_ONLY = "with this model only"
 

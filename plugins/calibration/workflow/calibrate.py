@@ -32,9 +32,10 @@ from calmotion.workflow import (
 )
 
 from ..identification.calibrate import CalibrationSettings, calibrate_shots
-from ..identification.parameters import DEFAULT, refuse_unknown
+from ..identification.parameters import refuse_unknown
 from ..identification.recordings.plausible import refuse_long
 from ..identification.signals import refuse_cyclic
+from ..model import kinds
 from ..model.estimates import Calibration, CalibrationFigures, Estimate
 
 _READ = (Character, Animation, Provenance)
@@ -92,7 +93,7 @@ def calibrate(
     *,
     others: Sequence[tuple[Shot | Path, Sequence[Path] | Path]] = (),
     layer: Path | None = None,
-    parameters: Sequence[str] = DEFAULT,
+    parameters: Sequence[str] = kinds.DEFAULT,
     priors: Mapping[str, float] | None = None,
     validate: bool = True,
     by_motor_type: bool = False,

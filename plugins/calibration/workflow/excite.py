@@ -20,7 +20,8 @@ from calmotion.version import __version__
 from calmotion.workflow import Given, Hooks, Path, Progress, Shot, plain, read_settings
 
 from ..identification.excitation.design import ExcitationSettings, blank_recordings, excite_shot
-from ..identification.parameters import DEFAULT, refuse_unknown
+from ..identification.parameters import refuse_unknown
+from ..model import kinds
 from ..model.excitation import Excitation, PlannedSensor
 from .calibrate import compiled_with_sensors, with_sensors
 
@@ -85,7 +86,7 @@ def excite(
     *,
     layer: Path | None = None,
     sensors: Sequence[str] = SENSORS,
-    parameters: Sequence[str] = DEFAULT,
+    parameters: Sequence[str] = kinds.DEFAULT,
     priors: Mapping[str, float] | None = None,
     duration: float | str = 4.0,
     amplitude: float | str = "10deg",

@@ -27,7 +27,7 @@ from calmotion.workflow import (
     simulate,
 )
 
-from ..identification.parameters import DEFAULT
+from ..model import kinds
 from .calibrate import CalibratedShot, calibrate
 
 DRAWS = 20  # robots within the error of the calibration, on which the new curves are measured
@@ -99,7 +99,7 @@ def refine(
     recordings: Sequence[Path] | Path,
     *,
     layer: Path,
-    parameters: Sequence[str] = DEFAULT,
+    parameters: Sequence[str] = kinds.DEFAULT,
     priors: Mapping[str, float] | None = None,
     by_motor_type: bool = False,
     tolerance: float | str | None = None,

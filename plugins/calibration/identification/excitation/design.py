@@ -21,13 +21,13 @@ from calmotion.multibody import SimulationFailure
 from calmotion.recordings import COMPONENTS, Channel, SensorRecording
 from calmotion.simulation import CompiledShot, pose_modes
 
-from ...model.estimates import ROBOT_KINDS
+from ...model import kinds
 from ...model.excitation import Clear, Excitation, MotorUse, PlannedSensor, Predicted
 from ..advice import IDENTIFIABLE
 from ..measurement import Measurement
 from ..model_error import covariance_of_model
 from ..motor_groups import grouped
-from ..parameters import DEFAULT, Parameter, robot_parameters
+from ..parameters import Parameter, robot_parameters
 from ..problem import Calibrated
 from ..recordings.sensors import measurement_parameters, sensors_of
 from ..signals import Signals, refuse_cyclic
@@ -59,7 +59,7 @@ class ExcitationSettings:
     """
 
     sensors: tuple[PlannedSensor, ...]
-    parameters: tuple[str, ...] = DEFAULT
+    parameters: tuple[str, ...] = kinds.DEFAULT
     priors: Mapping[str, float] = field(default_factory=dict)
     duration: float = 4.0
     amplitude: float = float(np.radians(10.0))
@@ -174,7 +174,7 @@ class _Rated:
 
 def _wanted(parameters: Sequence[Parameter]) -> list[int]:
     """Those of the robot: what the model has wrong is estimated beside them, and not wanted."""
-    return [k for k, p in enumerate(parameters) if p.kind in ROBOT_KINDS]
+    return [k for k, p in enumerate(parameters) if p.kind in kinds.ROBOT_KINDS]
 
 
 def _score(jacobian: Array, wanted: Sequence[int]) -> float:

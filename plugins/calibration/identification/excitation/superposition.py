@@ -14,7 +14,7 @@ import numpy as np
 from calmotion.arrays import Array
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ...model.estimates import CLOCK_DRIFT, CLOCK_OFFSET
+from ...model import kinds
 from ..problem import Calibrated
 from .waveforms import Family
 
@@ -60,7 +60,7 @@ class Superposition:
                 [sign * p.spread * (p.kind == kind and p.path == measurement.recordings[file])
                  for p in measurement.parameters] for file in files
             ])
-            for kind, sign in ((CLOCK_OFFSET, -1.0), (CLOCK_DRIFT, 1.0))
+            for kind, sign in ((kinds.CLOCK_OFFSET, -1.0), (kinds.CLOCK_DRIFT, 1.0))
         )  # fmt: skip
         # as many samples as a frame has, each with its noise
         rates = [frame / (own.channel.times[1] - own.channel.times[0]) for own in sensors]

@@ -20,18 +20,8 @@ from calmotion.recordings import (
     refuse_unknown_channels,
 )
 
-from ...model.estimates import (
-    BIAS,
-    CLOCK_DRIFT,
-    CLOCK_OFFSET,
-    FILTER_DAMPING,
-    FILTER_FREQUENCY,
-    GAIN,
-    OFFSET,
-    PLACE,
-    START,
-)
-from ..parameters import PRIORS, Parameter
+from ...model import kinds
+from ..parameters import Parameter
 from ..signals import Place, Signals, place_of
 from .clocks import fitted_gain
 from .noise import noise_of
@@ -130,19 +120,19 @@ def measurement_parameters(
     Args:
         take: Index of the shot.
     """
-    given = {**PRIORS, **(priors or {})}
+    given = {**kinds.PRIORS, **(priors or {})}
     found = []
     for recording, clock in zip(recordings, clocks, strict=True):
-        found.append(Parameter(CLOCK_OFFSET, recording.file, clock, given[CLOCK_OFFSET], "s", -1, False))
-        found.append(Parameter(CLOCK_DRIFT, recording.file, 0.0, given[CLOCK_DRIFT], "", -1, False))
+        found.append(Parameter(kinds.CLOCK_OFFSET, recording.file, clock, given[kinds.CLOCK_OFFSET], "s", -1, False))
+        found.append(Parameter(kinds.CLOCK_DRIFT, recording.file, 0.0, given[kinds.CLOCK_DRIFT], "", -1, False))
         for channel in recording.channels:
-            kind = {MARKER: PLACE, ACCELEROMETER: BIAS}.get(channel.kind)
+            kind = {MARKER: kinds.PLACE, ACCELEROMETER: kinds.BIAS}.get(channel.kind)
             if kind is not None:
-                unit = "m" if kind == PLACE else "m/s^2"
+                unit = "m" if kind == kinds.PLACE else "m/s^2"
                 path = _of_take(channel.path, take)
                 found += [Parameter(kind, path, 0.0, given[kind], unit, axis, False) for axis in range(3)]
             if (low_pass := channel.low_pass) is not None:
-                own = {FILTER_FREQUENCY: (low_pass.frequency, "Hz"), FILTER_DAMPING: (low_pass.damping, "")}
+                own = {kinds.FILTER_FREQUENCY: (low_pass.frequency, "Hz"), kinds.FILTER_DAMPING: (low_pass.damping, "")}
                 found += [
                     Parameter(kind, channel.path, value, float(np.log1p(given[kind])), unit)
                     for kind, (value, unit) in own.items()
@@ -155,15 +145,16 @@ def gauge_parameters(
     sensors: Sequence[Sensor], clocks: Sequence[float], nominal: Signals, priors: Mapping[str, float]
 ) -> tuple[Parameter, ...]:
     """Gains and offsets of strain gauges, about those by which the robot of the shot is most like its recording."""
-    given, found = {**PRIORS, **priors}, []
+    given, found = {**kinds.PRIORS, **priors}, []
     for sensor in sensors:
         if sensor.channel.kind == STRAIN:
             signal = _nominal(sensor, clocks, nominal)
             gain, values = fitted_gain(signal, sensor.channel.values), sensor.channel.values[sensor.used]
             offset = float(np.nanmean(values) - gain * signal[sensor.used].mean())
             path = own_path(sensor)
-            found.append(Parameter(GAIN, path, gain, float(np.log1p(given[GAIN])), ""))
-            found.append(Parameter(OFFSET, path, offset, given[OFFSET] * float(np.nanstd(values)), "", -1, False))
+            found.append(Parameter(kinds.GAIN, path, gain, float(np.log1p(given[kinds.GAIN])), ""))
+            spread = given[kinds.OFFSET] * float(np.nanstd(values))
+            found.append(Parameter(kinds.OFFSET, path, offset, spread, "", -1, False))
     return tuple(found)
 
 
@@ -182,7 +173,7 @@ def start_parameters(
         spread = FREE * _range(sensor.channel.values[sensor.used])
         components = COMPONENTS[sensor.channel.kind]
         found += [
-            Parameter(START, path, 0.0, spread, UNITS[sensor.channel.kind], -1 if components == 1 else c, False)
+            Parameter(kinds.START, path, 0.0, spread, UNITS[sensor.channel.kind], -1 if components == 1 else c, False)
             for path in decay_paths(sensor, nominal)
             for c in range(components)
         ]

@@ -8,7 +8,7 @@ from calmotion import ShotError
 from calmotion.model.motor import DRIVE, SERVO, Rotor
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion_plugins.calibration.identification.parameters import robot_parameters
-from calmotion_plugins.calibration.model.estimates import ROBOT_KINDS
+from calmotion_plugins.calibration.model.kinds import ROBOT_KINDS
 
 
 @pytest.fixture(scope="module")

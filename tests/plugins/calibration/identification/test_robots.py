@@ -10,7 +10,7 @@ from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.preparation import pose_modes
 from calmotion_plugins.calibration.identification.robots import robot_with
-from calmotion_plugins.calibration.model.estimates import CENTRE, DAMPING, DELAY, DENSITY, ENCODER_OFFSET, MASS, MODULUS
+from calmotion_plugins.calibration.model.kinds import CENTRE, DAMPING, DELAY, DENSITY, ENCODER_OFFSET, MASS, MODULUS
 
 NYLON, HAND = "/Arm/Nylon", "/Arm/Hand"
 

@@ -17,7 +17,7 @@ from calmotion.testing.beam_arms import IDENTITY
 from calmotion_plugins.calibration.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion_plugins.calibration.identification.robots import robot_with
 from calmotion_plugins.calibration.identification.signals import signals_of
-from calmotion_plugins.calibration.model.estimates import HIGHER_MODES
+from calmotion_plugins.calibration.model.kinds import HIGHER_MODES
 from exudyn_arm import ExudynArm as Arm
 from scipy.interpolate import make_interp_spline
 
