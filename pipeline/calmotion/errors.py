@@ -1,7 +1,5 @@
 """The one kind of error that a user sees: what is wrong, where, and what to do."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

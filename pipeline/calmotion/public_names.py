@@ -3,8 +3,6 @@
 The stub of the package (`__init__.pyi`) says where each name is defined, for type checkers and at run time.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from functools import cache

@@ -1,7 +1,5 @@
 """Error against run time, how honest estimates are, and speed, measured: the command `bench`."""
 
-from __future__ import annotations
-
 from calmotion.host import registration
 
 __all__ = ["register", "unregister"]

@@ -1,7 +1,5 @@
 """`calmotion bench`: error against run time, measured."""
 
-from __future__ import annotations
-
 import argparse
 
 from calmotion.cli import Output, entry

@@ -1,7 +1,5 @@
 """Flexible bodies in few coordinates, and the natural frequencies of the character."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Mapping, Sequence
 from typing import Any

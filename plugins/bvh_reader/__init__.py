@@ -1,7 +1,5 @@
 """Motion captures onto motors: run with `--motion FILE.bvh --set bvh.read.map="RightArm.Zrotation=shoulder"`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The BVH format: a hierarchy of joints with channels, then a row of numbers for each frame."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

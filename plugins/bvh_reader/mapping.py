@@ -1,7 +1,5 @@
 """Which channel drives which motor: `channel=motor*factor+offset`, with commas between."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

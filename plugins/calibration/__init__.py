@@ -1,7 +1,5 @@
 """Parameters of a robot from recordings: the commands `calibrate`, `excite` and `refine`, and the same in Python."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from calmotion.host import Operator, Property, RunContext, registration

@@ -1,7 +1,5 @@
 """Figures of a calibration: measured against simulated signals, spectra of the residuals, and intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 

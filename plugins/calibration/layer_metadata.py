@@ -1,7 +1,5 @@
 """What the layer of a calibration tells beside its attributes: all parameters, their covariance, its predictions."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

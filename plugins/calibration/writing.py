@@ -4,8 +4,6 @@ Each attribute has its standard deviation in `customData["calmotion"]`, in its o
 has all parameters with the hashes of the recordings, and the covariance that `optimize --robust` draws from.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """Formats of commands for motor controllers: operators that write them and read them back."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Commands of a motor controller: what is to be commanded, what a file holds, and how its player interpolates it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

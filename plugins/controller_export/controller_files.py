@@ -1,7 +1,5 @@
 """Files of commands for motor controllers, in the formats that plugins add."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Commands for motor controllers, and what playing them costs: written, read back, played and simulated."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """What the user of an export gave: format, rate, delay and lengths, refused where no controller or shot has them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from numbers import Real
 

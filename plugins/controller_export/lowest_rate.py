@@ -1,7 +1,5 @@
 """The lowest rate of commands that keeps an allowed loss, with few simulations."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

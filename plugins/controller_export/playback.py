@@ -1,7 +1,5 @@
 """What a robot does when a player plays commands, against what it does with the smooth curves that they stand for."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

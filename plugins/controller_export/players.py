@@ -1,7 +1,5 @@
 """What a player makes of commands: it holds or follows them, or interpolates by lines, cubics, quintics or Beziers."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import Sample

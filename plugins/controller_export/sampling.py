@@ -1,7 +1,5 @@
 """Curves sampled for players."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .commands import (

@@ -1,7 +1,5 @@
 """What shakes? The command `diagnose`, and the same in Python."""
 
-from __future__ import annotations
-
 from calmotion.host import registration
 from calmotion.public_names import public_names
 

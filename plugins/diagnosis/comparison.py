@@ -1,7 +1,5 @@
 """Which causes explain the error: sets of explanations, compared by what they predict of held-out samples."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Diagnose a recording: the command as a function."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Figures of a diagnosis: motion and error in time, spectra of the error, and the error over speed and torque."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A set of explanations, fitted together: loops first, joint by joint, then what they leave."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

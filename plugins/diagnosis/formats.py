@@ -1,7 +1,5 @@
 """Files with commands and motion together, or with a spectrum: datasets of LeRobot, Klipper's tables of resonances."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Loops whose gains are not known, as encoders show them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """The equations of motion of one joint, with and without play, and of oscillators along a motion, step by step."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.arrays import Array
 from numba import njit

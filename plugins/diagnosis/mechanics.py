@@ -1,7 +1,5 @@
 """The rigid robot on its intended motion: inertias, loads and levers of its joints, and the robot with its links."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

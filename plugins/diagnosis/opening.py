@@ -1,7 +1,5 @@
 """From a compiled shot and recordings to a `Situation`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

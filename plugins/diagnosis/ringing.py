@@ -1,7 +1,5 @@
 """Frequencies at which a signal rings, whatever the cause: of what is left, and of spectra that printers write."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

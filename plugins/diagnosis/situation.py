@@ -1,7 +1,5 @@
 """What was commanded and recorded, on one clock, and what a healthy robot would have done."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Tetrahedra for flexible bodies."""
 
-from __future__ import annotations
-
 from calmotion.host import registration
 
 from .operator import TetrahedralizeFlexibleBodies

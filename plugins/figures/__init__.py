@@ -1,7 +1,5 @@
 """Draws a result as figures (.png)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

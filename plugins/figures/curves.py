@@ -1,7 +1,5 @@
 """Figures of curves: errors over time, motor angles, convergence."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """All figures of a result."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 

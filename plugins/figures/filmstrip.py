@@ -1,7 +1,5 @@
 """The motion in pictures: each row is a motion over the silhouette of the intended one, each column an instant."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

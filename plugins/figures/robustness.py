@@ -1,7 +1,5 @@
 """How curves do on robots that differ from the model: distributions of the largest error."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.model import Character, Robustness
 from calmotion.views import AFTER, BEFORE, CHANGE, SMALL, new_figure, tidy, titles

@@ -1,7 +1,5 @@
 """Spectra of the errors before and after, with the natural frequencies of the character."""
 
-from __future__ import annotations
-
 from calmotion.model import Character, Result, SystemModes
 from calmotion.views import LIMIT, SMALL, error_spectrum, highest_frequency, new_figure, tidy, titles
 from matplotlib.figure import Figure

@@ -1,7 +1,5 @@
 """The tempo of a performance over time, and what makes it slower; and the tempo that a robot would need."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

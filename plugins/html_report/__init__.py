@@ -1,7 +1,5 @@
 """Shows a result as one self-contained page (.html)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Figures of curves as data that a page draws: the same lines, labels and limits that Matplotlib would draw."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Arrays in a page: quantised, as differences, compressed, as text."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The page: the template with the words of the report, and the data of its charts and its scene."""
 
-from __future__ import annotations
-
 import json
 import re
 import zipfile

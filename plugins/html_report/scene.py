@@ -1,7 +1,5 @@
 """The 3D player's data: surfaces with their deflections, and motions as deviations from the intended one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

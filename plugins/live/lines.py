@@ -1,7 +1,5 @@
 """Samples and commands as JSON lines, and as messages of OSC."""
 
-from __future__ import annotations
-
 import json
 import queue
 import socket

@@ -1,7 +1,5 @@
 """What a look-ahead is worth to a robot: the motion of its shot as a stream, played by the whole simulated robot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From a shot to a robot that can be streamed to."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A stream from its source to its sink: by the clock of its stamps, or by that of the wall."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable, Iterator
 

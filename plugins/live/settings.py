@@ -1,7 +1,5 @@
 """How a stream is played, and what that leaves out for a robot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

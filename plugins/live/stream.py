@@ -1,7 +1,5 @@
 """From samples as they arrive to a motion of the motors at each tick that keeps their limits."""
 
-from __future__ import annotations
-
 from collections import Counter, deque
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A motion as a stream, and what its commands leave of the shake of the whole simulated robot."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

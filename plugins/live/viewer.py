@@ -1,7 +1,5 @@
 """What is played, in rerun: into a recording, or to a viewer that shows it as it happens."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Writes the mode shapes of flexible bodies: .vtu for ParaView, pictures, and a table."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A sheet of mode shapes: the deformed surface, colored by displacement, and the undeformed outline."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Mode shapes as files: `.vtu`, `.png` and `modes.csv`."""
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools

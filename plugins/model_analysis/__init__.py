@@ -1,7 +1,5 @@
 """Error control: simplifications of the model, the time step, and the measured error of a result."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

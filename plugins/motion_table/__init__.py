@@ -1,7 +1,5 @@
 """Joint trajectories from tables: `--motion FILE.csv` or `--motion FILE.npz`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

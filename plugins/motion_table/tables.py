@@ -1,7 +1,5 @@
 """Tables of motions: CSV with a head, NPZ of NumPy."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Units of the columns of a table: in brackets behind their names, or in a row below them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

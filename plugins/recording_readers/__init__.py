@@ -1,7 +1,5 @@
 """Readers of recordings: tables, motion captures in C3D, bags of ROS 2."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from calmotion.host import Property, PropertyValues, registration

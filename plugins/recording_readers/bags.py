@@ -1,7 +1,5 @@
 """Bags of ROS 2 (MCAP, SQLite): states of joints, inertial sensors, poses; on the clock of their headers."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Columns of a table of numbers, with missing cells; times that increase."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping
 

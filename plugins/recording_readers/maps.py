@@ -1,7 +1,5 @@
 """TOML maps beside recordings: what they have in common, whatever they are of."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Markers of a motion capture in C3D files."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.recordings import MARKER, Channel, RecordingRequest, SensorRecording, hash_of

@@ -1,7 +1,5 @@
 """Tables of recordings: named after prims, or with a TOML map of their columns."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import replace

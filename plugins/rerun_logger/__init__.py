@@ -1,7 +1,5 @@
 """Writes a result as a rerun recording (.rrd)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

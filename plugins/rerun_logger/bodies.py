@@ -1,7 +1,5 @@
 """Bodies in 3D: a transform a frame, each mesh once, and of its vertices and colors what changes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

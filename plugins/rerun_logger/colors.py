@@ -1,7 +1,5 @@
 """Colors of a recording: curves that can be read on the dark and on the light theme, and lines that fade."""
 
-from __future__ import annotations
-
 import colorsys
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Error against the intended motion as a color of the surfaces: the own color without error, vermillion at most."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.model import Character, Motion, Result

@@ -1,7 +1,5 @@
 """How a recording opens: two 3D views side by side, plots in tabs below, the summary beside them."""
 
-from __future__ import annotations
-
 import numpy as np
 import rerun.blueprint as rrb
 from calmotion.model import Animation, Character, Motor, Result, Simulation, measure_of

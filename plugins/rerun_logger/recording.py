@@ -3,8 +3,6 @@
 Only rerun's viewer binds sockets or reports on its use. It is never started here: a recording is a file.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from dataclasses import replace

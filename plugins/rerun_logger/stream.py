@@ -4,8 +4,6 @@ rerun writes in a thread, which ends when a write fails, as on a full disk. A la
 that thread for ever. A write into a pipe whose content is taken does not fail.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Iterator

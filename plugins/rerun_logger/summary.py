@@ -1,7 +1,5 @@
 """The text of a recording: errors before and after, sizes, and simplifications."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Trails of the targets: where each was in the last moments, fading and tapering towards the past."""
 
-from __future__ import annotations
-
 import numpy as np
 import rerun as rr
 from calmotion.arrays import Array

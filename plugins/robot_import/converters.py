@@ -1,7 +1,5 @@
 """The converters of URDF and MJCF, in an environment of their own: they bring a build of USD of their own."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

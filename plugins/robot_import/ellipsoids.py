@@ -1,7 +1,5 @@
 """Ellipsoids of an MJCF robot, which the converter leaves out: spheres that are scaled along their axes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

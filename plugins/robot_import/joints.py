@@ -1,8 +1,6 @@
 """Joints of an imported robot beside their motors: actuators and limits as MuJoCo compiles them, springs (`stiffness`,
 `springref`), those that an equality holds, free ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

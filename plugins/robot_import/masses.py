@@ -1,7 +1,5 @@
 """What the links of an imported robot weigh; those without mass are frames of cameras and sites, or mounts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 

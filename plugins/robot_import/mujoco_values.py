@@ -4,8 +4,6 @@ A converter writes what the file says. Masses that settings of the compiler chan
 (`springdamper`), damping ratios of actuators and limits that are inherited are known after compilation alone.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import sys

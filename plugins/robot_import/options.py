@@ -1,7 +1,5 @@
 """What becomes of a converted robot, and the prims of its links that are meant."""
 
-from __future__ import annotations
-
 import fnmatch
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

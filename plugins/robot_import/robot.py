@@ -1,7 +1,5 @@
 """`calmotion import`: a robot's URDF, MJCF or USD file becomes a shot."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The layer over a converted robot: its motors with their motion, flexible links, masses and targets."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 

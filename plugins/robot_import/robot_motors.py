@@ -1,7 +1,5 @@
 """Which joints of an imported robot get motors, and their drives."""
 
-from __future__ import annotations
-
 import fnmatch
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

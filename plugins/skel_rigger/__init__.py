@@ -1,7 +1,5 @@
 """Robots from skinned characters and animated parts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

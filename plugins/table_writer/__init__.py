@@ -1,7 +1,5 @@
 """Tables of a result: targets and motors at each time step."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Columns as a CSV file."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Shots from USD."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from calmotion.host import Operator, RunContext, registration

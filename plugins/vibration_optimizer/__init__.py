@@ -1,7 +1,5 @@
 """Simulates and retargets shots."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Shows a result as a video (.webp, or .mp4 by an installed ffmpeg)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

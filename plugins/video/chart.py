@@ -1,7 +1,5 @@
 """The error curve below the pictures of a video, and its texts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

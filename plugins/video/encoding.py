@@ -4,8 +4,6 @@ Pillow writes animated WebP, which browsers play. It comes under a permissive li
 whose wheels are all GPL, so it is run as a program of its own where the user has installed one.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A video of a result: its frames, composed of pictures, numbers and the error curve."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence

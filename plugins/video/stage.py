@@ -1,7 +1,5 @@
 """The pictures of the character in a video: cameras, trails, and the marks of the target that is farthest off."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

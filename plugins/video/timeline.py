@@ -1,7 +1,5 @@
 """What a video shows when: the shot in real time, then its worst moment in slow motion, seen from near."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Materials of links: the table that is shipped, and those of the user."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -3,8 +3,6 @@
 A motor of a table turns a joint, or moves it along its axis (`linear`). Tables have the units of data sheets.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Bars of a terminal: a line for each stage, and below them what the current stage does."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable
 

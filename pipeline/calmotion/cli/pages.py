@@ -1,7 +1,5 @@
 """The words of a page of `--html`: what reports print, kept in parts."""
 
-from __future__ import annotations
-
 import io
 import os
 from collections.abc import Callable, Mapping, Sequence

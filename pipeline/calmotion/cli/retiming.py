@@ -1,7 +1,5 @@
 """Options of a search that may change the tempo: how much, and what stays on its beat."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 

@@ -1,7 +1,5 @@
 """Signals that end a run, and streams that are closed: a farm's SIGTERM and a terminal's SIGHUP do what Ctrl-C does."""
 
-from __future__ import annotations
-
 import io
 import os
 import signal

@@ -1,7 +1,5 @@
 """Errors of the host: the same fields as `ShotError`, so that one place prints both."""
 
-from __future__ import annotations
-
 from calmotion.errors import ShotError
 
 

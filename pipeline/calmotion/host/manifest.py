@@ -1,7 +1,5 @@
 """The static description of a plugin, `plugin.toml`, read without importing anything of the plugin."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Ordering operators by what they require and provide; which run, and which would make the same value."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Typed properties of operators: quantities as people write them, ranges, descriptions, and values of a run."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Settings that a user gives, and which plugins the user has disabled."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 

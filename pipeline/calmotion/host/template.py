@@ -1,7 +1,5 @@
 """The beginning of a plugin: a folder that can be installed, with an operator, a manifest and a test that passes."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

@@ -5,8 +5,6 @@ cores: on two cores shared with other processes a product of 0.4 ms took 8 ms. O
 here and often ten times faster.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache

@@ -7,8 +7,6 @@ Source: Golub and Underwood, The Block Lanczos Method for Computing Eigenvalues,
 Shifted Block Lanczos Algorithm, SIAM Journal on Matrix Analysis and Applications 15(1), 1994.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -8,8 +8,6 @@ Source: Duff and Reid, The Multifrontal Solution of Indefinite Sparse Symmetric 
 Mathematical Software 9(3), 1983; Liu, The Multifrontal Method for Sparse Matrix Solution, SIAM Review 34(1), 1992.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -6,8 +6,6 @@ Each piece becomes one dense block of the factor, so the tree of pieces is also 
 Source: George, Nested Dissection of a Regular Finite Element Mesh, SIAM Journal on Numerical Analysis 10(2), 1973.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

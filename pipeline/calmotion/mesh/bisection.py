@@ -1,7 +1,5 @@
 """Local refinement of tetrahedra by longest-edge bisection."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array, Indices, IntArray

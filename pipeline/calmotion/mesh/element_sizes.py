@@ -1,7 +1,5 @@
 """How fine a mesh has to be for a wanted accuracy, and how closely it follows the surface."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

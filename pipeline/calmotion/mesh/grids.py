@@ -1,7 +1,5 @@
 """Solids on grids: how often a surface winds around their corners, level sets, and narrow slits that are closed."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.ndimage import binary_closing
 

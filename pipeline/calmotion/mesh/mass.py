@@ -1,7 +1,5 @@
 """Mass of a body filled with linear tetrahedra, or bounded by a closed surface."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

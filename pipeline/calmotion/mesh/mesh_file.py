@@ -1,7 +1,5 @@
 """Reading of external meshes with meshio."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

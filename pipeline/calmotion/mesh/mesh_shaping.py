@@ -1,7 +1,5 @@
 """Tetrahedra that follow the surface in the mean, cut along the rims of the interface patches."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """What the tetrahedra of a body are made of: skin and core of a printed part, or parts with their own materials."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

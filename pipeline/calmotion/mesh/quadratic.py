@@ -1,7 +1,5 @@
 """Ten-node tetrahedra of a linear mesh, with scikit-fem's element, and elements of all kinds cut into tetrahedra."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Linear tetrahedra: volumes, orientation, dihedral angles, boundary."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """The animation of a shot: a sampled track for each motor, and the frames."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -4,8 +4,6 @@ Rotations are unit quaternions `(w, x, y, z)` that turn body axes into the axes 
 Indices point into the character's tuples; body index -1 is the world.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """Motor tracks as smooth curves, C2 cubic interpolants through their samples; curves of a result, and at a tempo."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar

@@ -1,7 +1,5 @@
 """Finite-element meshes of the flexible bodies, and what these are made of: a printed part, an assembly."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a shot needs of all that could be simulated, decided before anything heavy is loaded or computed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any

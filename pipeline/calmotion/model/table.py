@@ -1,7 +1,5 @@
 """The columns of a result's table: targets, motors and joints at each time step, named as the USD contract does."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

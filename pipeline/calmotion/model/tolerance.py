@@ -1,7 +1,5 @@
 """The tolerance and the goal of a shot, and the error budget of a result."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What is not known exactly of a robot, robots that differ from the model, and how motor curves do on them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

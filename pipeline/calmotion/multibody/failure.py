@@ -1,7 +1,5 @@
 """The exception of a simulation that cannot continue."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A robot from Python alone: bodies, joints, motors and targets by their numbers, compiled to a `Model`."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

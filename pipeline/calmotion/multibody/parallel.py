@@ -1,7 +1,5 @@
 """Independent pieces of work in threads: compiled kernels and products of NumPy run without the interpreter's lock."""
 
-from __future__ import annotations
-
 import os
 import threading
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Simulations of a model by motor inputs as arrays, and their derivatives: for who has no USD."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Readers of recordings: operators of plugins that read what sensors recorded of a robot."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from abc import ABC, abstractmethod

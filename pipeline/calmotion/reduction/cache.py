@@ -4,8 +4,6 @@ A file has no pickled objects: the arrays of a value, and its structure as JSON.
 replaced atomically, see `support.caches`. What cannot be read is computed and written again.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

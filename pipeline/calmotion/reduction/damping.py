@@ -5,8 +5,6 @@ other bodies vibrates at a much lower frequency than the same link alone. With t
 link, the robot would have a tenth of it or less. The ratio therefore applies to the modes of the whole character.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Discretisation error of a mesh: the error of its frequencies, estimated by recovered strains."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

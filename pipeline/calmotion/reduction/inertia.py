@@ -3,8 +3,6 @@
 Each integral is int rho A B^T = A^T m B for nodal fields A, B of shape [n, 3].
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Load envelopes: the largest loads on a body over a shot, from a simulation of the rigid robot."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -11,8 +11,6 @@ times that is claimed, all of it.
 Source: Richardson's extrapolation; Doerfler 1996, A Convergent Adaptive Algorithm for Poisson's Equation, for marking.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

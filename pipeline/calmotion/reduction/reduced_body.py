@@ -1,7 +1,5 @@
 """Reduced flexible bodies as multibody dynamics takes them; a rigid body has no elastic coordinates."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A reduced body of another stiffness, or of another density."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Flexible bodies that are too soft for their own weight, from their size alone, before they are meshed."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.errors import ShotError, raise_all

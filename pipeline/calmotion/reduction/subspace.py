@@ -4,8 +4,6 @@ Every term of a reduced body is a polynomial in its coordinates, or a sum over p
 projection u = T w therefore approximates the motion only.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

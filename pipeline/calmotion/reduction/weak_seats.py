@@ -4,8 +4,6 @@ A patch turns on the ground under it, the more the smaller it is. Where this is 
 frequencies are those of the patch: with half the radius the first one is up to 2.8 times lower.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

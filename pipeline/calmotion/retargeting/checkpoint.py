@@ -3,8 +3,6 @@
 A search that resumes begins at the point. What the file says of it is simulated again; nothing else is believed.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import logging

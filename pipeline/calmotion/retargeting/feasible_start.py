@@ -5,8 +5,6 @@ order: the nearest curves within the limits are the minimum of a quadratic progr
 leave no such curves, the limits are widened to what is exceeded least, so that the search has something to keep.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The motor curves of a point of a search."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The input of a search, simulated anew: a search needs a rough model of the shake only, its report more."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from calmotion.errors import ShotError

@@ -1,7 +1,5 @@
 """What a search leaves out: motors that do nothing, and how a report tells it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

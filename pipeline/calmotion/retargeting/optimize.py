@@ -1,7 +1,5 @@
 """Retarget a shot: motor curves under which the flexible robot performs the intended motion."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a search would refuse, from the shot's input alone: before meshes and finite elements are made."""
 
-from __future__ import annotations
-
 from calmotion.model import Animation, Character
 from calmotion.model.run import RunSettings
 from calmotion.retargeting.optimize import refuse_other_integrators

@@ -1,7 +1,5 @@
 """The search for offsets: Gauss-Newton on adaptive knots."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Residuals and limits that plugins add to a search."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace

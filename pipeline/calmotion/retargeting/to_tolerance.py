@@ -1,7 +1,5 @@
 """Retarget a shot to a tolerance: the time step and the subspace of the bodies follow from the errors they cause."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

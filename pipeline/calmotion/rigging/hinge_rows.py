@@ -4,8 +4,6 @@ The rotations D(t) of a body relative to the previous one, the identity in the r
 product exp(a_1 q_1) exp(a_2 q_2) ... of rotations about axes a_k, which are given in the reference pose.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

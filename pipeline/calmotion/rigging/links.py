@@ -1,7 +1,5 @@
 """Links of a robot from the joints of a skeleton, their hinges, and the targets among them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

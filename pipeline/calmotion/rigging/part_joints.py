@@ -5,8 +5,6 @@ displaced by u + (D - I) (c - p). A hinge holds the points of a line, a ball one
 squares over all samples.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Parts that a program exports side by side, each with its motion in the world, ar
 relative to which they have the fewest freedoms.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

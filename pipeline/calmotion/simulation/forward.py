@@ -1,7 +1,5 @@
 """One forward simulation of a character's motor curves, and what its targets do in it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """What the targets should do: the animation on a rigid robot, or with the sag of each pose."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray

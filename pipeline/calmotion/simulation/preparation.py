@@ -1,7 +1,5 @@
 """A compiled shot on its time grid, and failures of its simulation in the user's words."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Runs of the engine as the values that plugins write: motions by body, simulations with errors, what was left out."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

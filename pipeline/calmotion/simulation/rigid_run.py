@@ -1,7 +1,5 @@
 """What a shot does to each body, from a simulation of the rigid robot: it decides which modes the bodies need."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

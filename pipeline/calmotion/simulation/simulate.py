@@ -1,7 +1,5 @@
 """Simulate a shot as animated."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

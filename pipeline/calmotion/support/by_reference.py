@@ -13,8 +13,6 @@ The block is written once, when an object first reaches a kernel. `references` t
 does without numba, so that a shot without flexible bodies does as well.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any, TypeVar

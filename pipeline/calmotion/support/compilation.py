@@ -8,8 +8,6 @@ Private interfaces of numba make a first run several times as fast (`numba_inter
 and with a version of numba that is not known, kernels are compiled by `numba.njit` alone: they compute the same.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import os

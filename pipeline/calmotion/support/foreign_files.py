@@ -1,7 +1,5 @@
 """Texts that users name: never a file for whose content a reader would wait for ever."""
 
-from __future__ import annotations
-
 import os
 import tomllib
 from collections.abc import Iterable

@@ -5,8 +5,6 @@ of it. The handler of the signal therefore also sets a request, which stands unt
 checks it between its steps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

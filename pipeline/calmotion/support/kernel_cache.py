@@ -6,8 +6,6 @@ again. A file that another user can write is never unpickled, and machine code i
 function.
 """
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable
 from itertools import count, filterfalse

@@ -1,7 +1,5 @@
 """Names for people: short ones for prim paths (files keep the paths), and right ones that are like a wrong one."""
 
-from __future__ import annotations
-
 import posixpath
 import re
 from collections.abc import Iterable, Mapping, Sequence

@@ -8,8 +8,6 @@ With it a first run compiles in a fifth of the time (docs/decisions/0009-kernel-
 - `compiled`: what other kernels call is compiled once, and kept in verified files.
 """
 
-from __future__ import annotations
-
 import contextlib
 import gc
 import hashlib

@@ -3,8 +3,6 @@
 Where a system lacks something, the way that all have is taken, or nothing happens, as each function says.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import os

@@ -1,7 +1,5 @@
 """Rotations as matrices and as unit quaternions (w, x, y, z)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

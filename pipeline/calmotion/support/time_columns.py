@@ -1,7 +1,5 @@
 """Tables of text: their cells, and which columns are times, by names: `time_s`, `Time (ms)`, `header.stamp.secs`."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Work in processes of its own, so that one that crashes, hangs or takes all memory costs its own result only."""
 
-from __future__ import annotations
-
 import multiprocessing
 import signal
 import time

@@ -1,7 +1,5 @@
 """Synthetic arms of prismatic beams: no shot and no mesher, so results are the same on every machine."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Callable, Iterator

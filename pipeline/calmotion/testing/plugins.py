@@ -1,7 +1,5 @@
 """A host with only the plugins of an author, one of their operators alone, and a check of the rules."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Derivatives of a residual or limit that a plugin adds to a search, against differences."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A small arm and a motion of it, with which plugins are tested."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array, IntArray

@@ -1,7 +1,5 @@
 """The time and memory that a run will take, estimated from the size of the shot before anything is spent."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The error budget of a result, from what was chosen for it and the errors that were estimated on the way."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from calmotion.model import Character, Result, Simplification

@@ -1,7 +1,5 @@
 """The integrator that needs the fewest steps, where it does."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar

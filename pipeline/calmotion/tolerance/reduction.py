@@ -4,8 +4,6 @@ What a reduction leaves out is estimated for each body by itself, at rest. In a 
 frequencies, and a small shift makes the motions part in time; only the simulation itself tells by how much.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

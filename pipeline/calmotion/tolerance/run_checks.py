@@ -1,7 +1,5 @@
 """What a simulation would refuse, from the shot's input alone: before meshes and finite elements are made."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from calmotion.errors import ShotError

@@ -4,8 +4,6 @@ The last run's time step and subspaces cost six simulations, one of them with al
 still do: one with twice the step, and one with more directions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

@@ -3,8 +3,6 @@
 A step that the user or the shot gives is not changed; its error is estimated all the same, by one more simulation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial

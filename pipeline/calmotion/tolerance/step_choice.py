@@ -1,7 +1,5 @@
 """The longest time step that keeps the tolerance, and its error, confirmed by a run with half of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

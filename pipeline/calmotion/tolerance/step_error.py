@@ -1,7 +1,5 @@
 """The error of the time step at the targets and in the joints, from simulations of the same curves by two steps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

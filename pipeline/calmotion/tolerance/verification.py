@@ -1,7 +1,5 @@
 """The error of a result, measured against a finer run of the same curves on finer meshes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from calmotion.model import Result

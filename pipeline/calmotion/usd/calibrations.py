@@ -1,7 +1,5 @@
 """What calibrations of a shot tell of its robot, from the metadata of their layers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

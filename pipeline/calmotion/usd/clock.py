@@ -1,7 +1,5 @@
 """Conversion between time codes of a stage and seconds after the first frame of the shot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

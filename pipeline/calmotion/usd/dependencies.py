@@ -1,7 +1,5 @@
 """Value clips of a layer: the files that they name, which USD opens while it composes a stage."""
 
-from __future__ import annotations
-
 import glob
 import math
 import os

@@ -1,7 +1,5 @@
 """Messages of USD: none reaches stderr; those that say something about the shot become notes that name the prim."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager

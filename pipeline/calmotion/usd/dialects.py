@@ -4,8 +4,6 @@ For each quantity the first authored name counts: Calmotion, UsdPhysics, Newton,
 mujoco-usd-converter), PhysX. usd-core does not define the schemas of the last three, so all are read by name.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -4,8 +4,6 @@ Gf multiplies row vectors from the left; here a matrix maps column vectors, `x -
 the engine. Quaternions are (w, x, y, z).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Atomic writing of USD layers."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable
 

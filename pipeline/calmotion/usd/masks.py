@@ -4,8 +4,6 @@ Reading looks at all prims several times. In a large stage it looks at those wit
 what they refer to: one pass finds them.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from functools import cache, lru_cache

@@ -1,7 +1,5 @@
 """Calmotion's codeless schemas: their folder, and their registration in USD."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

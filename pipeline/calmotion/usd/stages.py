@@ -1,7 +1,5 @@
 """Opening a shot: composition errors become ShotErrors, and layers that Calmotion wrote are recognised."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re

@@ -1,7 +1,5 @@
 """Rigid poses of affine transforms, and conversions of rotations. Lengths may be in stage units or SI."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Conversion between stage units and SI; seconds are the same in both."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Calmotion's rules: functions from a stage to findings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeAlias
 

@@ -1,7 +1,5 @@
 """The tempo of a performance for pictures, videos and recordings: how fast it is, and what makes it slower."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

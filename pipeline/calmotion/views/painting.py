@@ -1,7 +1,5 @@
 """Kernels that make a picture of the visible triangles: light, shadow, the marks of another pose, and its pixels."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Playback of a computed motion: at any times, and as points of the moving surfaces."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

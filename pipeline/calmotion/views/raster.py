@@ -1,7 +1,5 @@
 """A depth-buffered renderer of triangles, which needs neither a screen nor a graphics card, and their normals."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

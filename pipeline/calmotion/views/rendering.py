@@ -1,7 +1,5 @@
 """A picture of a character at one instant: camera, light, shadow, and the outline of the intended motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache
 

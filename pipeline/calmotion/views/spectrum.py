@@ -1,7 +1,5 @@
 """Amplitude spectrum of the error of a target."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

@@ -1,7 +1,5 @@
 """Style and saving of figures, without changes of the global state of matplotlib."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

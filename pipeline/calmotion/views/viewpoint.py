@@ -1,7 +1,5 @@
 """Viewpoint for a character: in front of its motion, slightly to the side and above."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

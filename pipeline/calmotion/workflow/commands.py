@@ -1,7 +1,5 @@
 """The commands as functions: simulate, optimise, verify, inspect, rig."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

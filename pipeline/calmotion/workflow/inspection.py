@@ -1,7 +1,5 @@
 """The content of a shot: the object of `inspect --json`, from the values of a run."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Files that a run writes: never over what it reads, and refused before the long work where they cannot be written."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from pathlib import Path

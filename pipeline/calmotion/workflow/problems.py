@@ -1,7 +1,5 @@
 """What went wrong in a run: the errors, the operators that raised them, and how they reach the caller."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar

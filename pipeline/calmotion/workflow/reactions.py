@@ -1,7 +1,5 @@
 """What the world does to the robot: reactions at its bases and feet, and whether what only stands would tip over."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One run of the plugins on a shot: what is wanted, where files go, progress, interruption."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Sequence

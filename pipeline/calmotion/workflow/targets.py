@@ -1,7 +1,5 @@
 """What a report tells of the targets: their errors, which counts most, which stand still, and why errors remain."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ A first run without it lets another process do so meanwhile. The two agree on wh
 (`Compilation.claimed`), so that both processors compile.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import subprocess

@@ -12,8 +12,6 @@ goes on with the trials that the CSV file does not have: 100 trials may take sev
 fewer than 85% of the intervals cover the truth.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ each by turns: encoders of 12 bits and an accelerometer at the hand. The table c
 for each fault. Seeds below 100000 were used while the explanations were written; the table begins above.
 """
 
-from __future__ import annotations
-
 import time
 from collections import Counter
 from dataclasses import dataclass

@@ -11,8 +11,6 @@ error and half of the estimate decides nothing, and its shot is counted apart. T
 one and a half times its estimate.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

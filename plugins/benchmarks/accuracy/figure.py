@@ -1,7 +1,5 @@
 """The figure of `work_precision`: error against run time, the Pareto front, and the choices of the program."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -12,8 +12,6 @@ Source: Khalil, Dombre, Modeling, Identification and Control of Robots, 2002, ch
 calculation of minimum set of inertial parameters of serial robots, 1990.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

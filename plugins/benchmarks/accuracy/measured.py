@@ -15,8 +15,6 @@ models: of the shots without a recording, else of the largest motion that the fi
 ideal motors get the error of classic identification, a linear regression of efforts.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Commands that were optimised for a calibrated machine, replayed in an independent model that fits its recordings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 

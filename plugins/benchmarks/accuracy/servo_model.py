@@ -7,8 +7,6 @@ Source: Duclusaud, Passault, Padois, Ly, Extended Friction Models for the Physic
 arXiv 2410.08650.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any

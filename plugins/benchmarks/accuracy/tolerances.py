@@ -7,8 +7,6 @@ optimised curves again. The error is the largest distance of any target, at any 
 reductions of references stay in the cache. The command fails where a tolerance is not kept.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, replace
 

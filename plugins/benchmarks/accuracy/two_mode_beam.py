@@ -12,8 +12,6 @@ linear, and are fitted with every modulus, damping, and corner and damping of th
 Source: Meirovitch, Fundamentals of Vibrations, 2001, section 8.10 (assumed modes of a beam with a tip mass).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 

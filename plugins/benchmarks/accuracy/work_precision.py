@@ -8,8 +8,6 @@ of the simulation. The choices for each tolerance are compared with the fastest 
 All settings have the first meshes of the shot: what meshes cost is measured by `calmotion bench tolerances`.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace

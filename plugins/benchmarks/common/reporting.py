@@ -1,7 +1,5 @@
 """What every benchmark does beside its measurement: arguments, rows that are kept as they come, tables, one object."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 import json

@@ -1,7 +1,5 @@
 """Shots by the names of their files, as far as a benchmark needs them processed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

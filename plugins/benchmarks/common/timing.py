@@ -1,7 +1,5 @@
 """Time that something takes, and where."""
 
-from __future__ import annotations
-
 import os
 import platform
 import time

@@ -4,8 +4,6 @@
 driven joint, against RK4 at a fine step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

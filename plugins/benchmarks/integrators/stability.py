@@ -6,8 +6,6 @@ afford; a cell that takes longer than a minute has failed. The table has, for ea
 all smaller ones run. It ends with exit status 1 when a cell fails.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections import Counter

@@ -7,8 +7,6 @@ Each link is meshed in a process of its own (`--jobs`): where that crashes or ha
 With `--resume` links that the CSV file has are not meshed again. The command fails where no link could be meshed.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 

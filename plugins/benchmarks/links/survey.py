@@ -1,7 +1,5 @@
 """What becomes of every link of robots: one row each, from its geometry to its first frequencies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -13,8 +13,6 @@ what friction may hold.
 python samples/real/compose.py samples/real/iiwa_reach.usda KUKA.usda build/iiwa.usda
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -10,8 +10,6 @@ With `--mujoco` the robot has rigid bodies, and MuJoCo plays the commands. Ticks
 own thread, since others may use the machine; another thread renews the gains.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

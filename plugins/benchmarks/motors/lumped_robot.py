@@ -7,8 +7,6 @@ of it a `velocity` actuator, which is commanded theta_c'. Coulomb friction is ap
 has it.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as xml
 from dataclasses import dataclass
 from typing import Any

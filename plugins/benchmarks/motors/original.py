@@ -4,8 +4,6 @@ Masses, armature, friction, limits of force, contacts and the integrator are tho
 the commands, whatever they then do with them; joints and bodies are found by their names.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

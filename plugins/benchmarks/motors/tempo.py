@@ -8,8 +8,6 @@ step. The command fails where a limit is exceeded by more than a thousandth, or 
 was not at full tempo.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ and for its lowest two, through a low-pass filter, and optimised. Errors are tho
 animation and, since shapers delay the motion, against the animation with the delay that is best for each method.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ directions, at the same step (error of the discrete objective) and at a quarter 
 continuous objective).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial

@@ -5,8 +5,6 @@ gradient, and reports the time until each is within 1% of the converged objectiv
 same shot in the same run.
 """
 
-from __future__ import annotations
-
 import time
 from contextlib import suppress
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Random arms with a known fault, as their model has them, and what is wrong with the real ones."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

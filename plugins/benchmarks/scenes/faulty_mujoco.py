@@ -1,7 +1,5 @@
 """A faulty arm in MuJoCo, whose fore link is a chain of rigid segments, and what its sensors record."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.arrays import Array
 from calmotion.recordings import ACCELEROMETER, ANGLE, Channel, SensorRecording

@@ -1,7 +1,5 @@
 """A faulty arm in our own simulator, with another mesh, step and integrator than those of its model."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Links of robots as bodies to be meshed, from any USD file with rigid bodies: no animation or motors are needed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Random arms whose parameters are not those of their model, and what sensors record of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

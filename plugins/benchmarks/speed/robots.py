@@ -6,8 +6,6 @@ last link is the target. The caches of meshes and reductions are empty, kernels 
 no tolerance is asked for. The table has processor seconds by stage, the memory, and the verdict.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -7,8 +7,6 @@
 - a step of a tree of 14 flexible bodies of 10 modes.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass

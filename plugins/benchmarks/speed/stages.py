@@ -5,8 +5,6 @@ process and those that it started, as other work on the machine changes them lea
 `single simulations` is the time of the search over that of one simulation by the same step.
 """
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """Which further measurement would tell a parameter that the recordings do not tell."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Parameters of a robot from recordings of its performance, with their standard deviations."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence

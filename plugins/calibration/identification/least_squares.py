@@ -10,8 +10,6 @@ leave it are held there.
 Source: Nocedal, Wright, Numerical Optimization, 2006, section 10.3; Huber, Robust Statistics, 1981.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Protocol
 

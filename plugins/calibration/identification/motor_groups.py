@@ -1,7 +1,5 @@
 """Parameters that motors of one type share: they are estimated once, and belong to each of these motors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

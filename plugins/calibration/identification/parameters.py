@@ -4,8 +4,6 @@ A parameter is searched as x, in standard deviations of its prior: value = nomin
 sense, nominal + spread x otherwise. The prior of x is the standard normal distribution.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase

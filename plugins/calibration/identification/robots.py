@@ -1,7 +1,5 @@
 """The robot of a shot with other parameters: reduced bodies are scaled, never reduced anew."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """What the sensors of a simulated robot would measure: its motion and efforts as functions of the robot's time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Parameters of a robot as they were estimated from recordings."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

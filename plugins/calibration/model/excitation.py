@@ -1,7 +1,5 @@
 """A test motion that makes parameters of a robot identifiable."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from calmotion.arrays import Array

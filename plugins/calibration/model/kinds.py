@@ -1,7 +1,5 @@
 """Kinds of parameters that recordings tell: their names, groups and priors."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Calibrate the robot of a shot: the command as a function."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence

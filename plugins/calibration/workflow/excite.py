@@ -1,7 +1,5 @@
 """Find a test motion for a robot: the command as a function."""
 
-from __future__ import annotations
-
 import os
 import re
 import time

@@ -1,7 +1,5 @@
 """A recorded take improves the model of the robot and the curves of the next take: the command as a function."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The JSON report of a calibration."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -4,8 +4,6 @@
 of the motor's range, control points relative to their ends (Bottango's protocol, its commands "Set Curve").
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

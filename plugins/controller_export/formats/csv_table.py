@@ -1,7 +1,5 @@
 """A table of commands: comment lines that a person and a program read, then the columns."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Iterator, Sequence

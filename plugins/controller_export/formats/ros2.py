@@ -1,7 +1,5 @@
 """JointTrajectory messages of ROS 2 as YAML: trajectory_msgs/msg/JointTrajectory."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Servos: how the ticks of each motor are read from a TOML file."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Commands in the ticks of servos, as JSON and as a header for C."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Programs in URScript: a stream of servoj commands for a robot of Universal Robots."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

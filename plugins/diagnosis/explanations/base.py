@@ -1,7 +1,5 @@
 """Bases of the explanations: those that change the loops of joints, and those that add to what sensors show."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar

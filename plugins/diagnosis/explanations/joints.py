@@ -1,7 +1,5 @@
 """Backlash and ripple: what moves a joint beside its loop."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

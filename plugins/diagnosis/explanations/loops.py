@@ -1,7 +1,5 @@
 """Gains, friction and delay: what changes how a joint follows its command."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A stream of commands with gaps, repeated ticks or a coarse rate."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Links and base: what swings although its joints do as they should."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 

@@ -4,8 +4,6 @@ Where limits keep some motors from what the regulator asks, it may turn in circl
 then finds a larger error than where the intended motion passes through as it is, and the deviations glide to zero.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.arrays import Array
 

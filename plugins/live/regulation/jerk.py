@@ -4,8 +4,6 @@ Whether a motor can still keep its limits is found by braking it, tick by tick: 
 lets go such that acceleration and speed are gone together. A change that leaves such a way to rest is allowed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.arrays import Array, IntArray
 from numba import njit

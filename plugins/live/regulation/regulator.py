@@ -1,7 +1,5 @@
 """Commands whose motion follows a delayed intended motion: the state of the robot, and one step a tick."""
 
-from __future__ import annotations
-
 import numpy as np
 from calmotion.arrays import Array, IntArray
 from calmotion.multibody import VelocityForces

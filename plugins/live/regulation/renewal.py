@@ -1,7 +1,5 @@
 """New gains as the pose moves."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 

@@ -4,8 +4,6 @@ What the commands leave on a slower and a faster robot falls at once as these be
 robot of the model grows by the square, from next to nothing where there are motors enough and the look-ahead is long.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

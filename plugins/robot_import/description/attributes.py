@@ -1,7 +1,5 @@
 """What becomes of each attribute of URDF and MJCF: the table `attributes.toml`, and what it says of a robot."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

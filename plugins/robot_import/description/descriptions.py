@@ -1,7 +1,5 @@
 """URDF and MJCF files before they are converted: what a converter would leave out silently is refused here."""
 
-from __future__ import annotations
-
 import os
 import xml.etree.ElementTree as xml
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The elements of an MJCF robot: those of the files that it includes too, each with what its default class gives it."""
 
-from __future__ import annotations
-
 import os
 import xml.etree.ElementTree as xml
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Files that a robot names by the ROS package that holds them."""
 
-from __future__ import annotations
-
 import os
 import xml.etree.ElementTree as xml
 from collections.abc import Mapping

@@ -6,8 +6,6 @@ or slides on a plane, becomes fixed: a shot moves a root by its transform. Capsu
 meshes.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """One attempt at a job, on any worker: a process of its own runs the command line."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

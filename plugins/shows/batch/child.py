@@ -4,8 +4,6 @@ The worker holds the other end of its standard input: where that is closed, the 
 worker has taken over must write nothing any more.
 """
 
-from __future__ import annotations
-
 import os
 import runpy
 import sys

@@ -1,7 +1,5 @@
 """The jobs of a batch: which command makes which files of which shot, and whether that is done already."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

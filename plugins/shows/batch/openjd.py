@@ -4,8 +4,6 @@ A task is one shot; it runs the same command line as a job of `calmotion batch`,
 Open Job Description.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from pathlib import Path

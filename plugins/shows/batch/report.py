@@ -1,7 +1,5 @@
 """What came of a batch, as an object for programs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

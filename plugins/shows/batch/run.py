@@ -1,7 +1,5 @@
 """Runs the jobs of a batch: what is done is kept, what dies is tried again, what fails for a reason is not."""
 
-from __future__ import annotations
-
 import json
 import os
 import time

@@ -4,8 +4,6 @@ Both are executors of `concurrent.futures`. Here, jobs are processes that thread
 worker that dies to another one.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait

@@ -1,7 +1,5 @@
 """Options of `simulate` and `optimize` that a command on many shots passes on to each of them."""
 
-from __future__ import annotations
-
 import argparse
 import os
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The clips of a repertoire, and the motions that lead from the end of one to the start of another."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """Makes a repertoire: its clips and all transitions between them, each retargeted from rest to rest, and checked."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """`calmotion cache`: size of the caches, and their removal."""
 
-from __future__ import annotations
-
 import argparse
 import re
 from typing import Any

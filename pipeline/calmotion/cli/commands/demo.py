@@ -1,7 +1,5 @@
 """`calmotion demo`: optimise the bartender sample, which every installation holds."""
 
-from __future__ import annotations
-
 import argparse
 import shutil
 from pathlib import Path

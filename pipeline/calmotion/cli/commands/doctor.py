@@ -1,7 +1,5 @@
 """`calmotion doctor`: what is wrong with this installation and this machine, and what to do."""
 
-from __future__ import annotations
-
 import argparse
 import platform
 import shutil

@@ -1,7 +1,5 @@
 """`calmotion inspect`: the content of a shot, and how its model is simplified."""
 
-from __future__ import annotations
-
 import argparse
 from functools import partial
 

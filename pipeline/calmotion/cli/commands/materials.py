@@ -1,7 +1,5 @@
 """`calmotion materials`: the table of materials for flexible links."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import asdict
 from typing import Any

@@ -1,7 +1,5 @@
 """`calmotion optimize`: motor curves with which the robot does not shake."""
 
-from __future__ import annotations
-
 import argparse
 
 from calmotion.cli import Output, quantity, run_options, shot_arguments, simulation_options

@@ -1,7 +1,5 @@
 """`calmotion simulate`: the shot as animated."""
 
-from __future__ import annotations
-
 import argparse
 
 from calmotion.cli import Output, run_options, shot_arguments, simulation_options

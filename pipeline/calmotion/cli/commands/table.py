@@ -3,8 +3,6 @@
 The module of a command has `add_arguments(parser)` and `run(arguments, output)`, and may have `EXAMPLES`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module

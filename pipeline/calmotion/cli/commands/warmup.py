@@ -1,7 +1,5 @@
 """`calmotion warmup`: compile the kernels ahead of the first shot."""
 
-from __future__ import annotations
-
 import argparse
 
 from calmotion.cli import Output, json_option

@@ -1,7 +1,5 @@
 """What a robot stands on, as text: bases that nothing joins to the world, and feet while they are held."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The simplifications of a report: a line, or all."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

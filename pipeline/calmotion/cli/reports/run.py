@@ -1,7 +1,5 @@
 """The report of `simulate` and `optimize` for a person."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a report of `simulate` and `optimize` says first: the error of each target, how accurate it is, what remains."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Size of an interface patch that is not authored: the end face below the attachment frame, else a measured radius."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Messages about joints that do not hold a flexible body where their frames are: off its surface, or too near to each
 other for a patch each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -5,8 +5,6 @@ is then the nearest part of the surface that goes around its axis: a bore or a b
 or a flange. Without one, it is the nearest place of the surface.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Meshes cut along the rims of their interface patches, so that patches do not depend on the elements."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

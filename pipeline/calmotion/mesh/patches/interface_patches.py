@@ -1,7 +1,5 @@
 """Interface patches of a flexible body: parts of its surface to which joints are attached, and which stay rigid."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """How near joints of a body may be to hold a part of its surface each, and what is left between two such parts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The interface patch on a part of the surface that the shot names."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array, IntArray, box_diagonal

@@ -1,7 +1,5 @@
 """Interfaces that a shot names on the surface of a flexible body: what is wrong with them on any mesh."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -4,8 +4,6 @@ Its edge is where the part that is screwed to it ends, so a joint holds all of i
 does not end at one distance from the axis.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ An interface patch is the part of a surface within a sphere. A patch of whole el
 or too late, by another distance for each mesh; after the cut its rim is a line of edges.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray, Indices, IntArray

@@ -1,7 +1,5 @@
 """One closed solid from the surfaces of a body: parts are closed one by one, manifold3d computes their union."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Closed parts of a surface: welded, consistently oriented, without sheets, with capped holes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

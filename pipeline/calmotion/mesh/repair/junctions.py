@@ -1,7 +1,5 @@
 """T-junctions: corners of triangles on open edges of other triangles, which leave invisible slits."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 

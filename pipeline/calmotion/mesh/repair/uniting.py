@@ -1,7 +1,5 @@
 """Unions of solids with manifold3d."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

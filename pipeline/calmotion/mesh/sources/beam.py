@@ -5,8 +5,6 @@ of mass where there is none. Length and density give the area of the section, th
 and the center of mass the taper of a single bar.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import manifold3d

@@ -1,7 +1,5 @@
 """Bridges across gaps between solids, such as those between parts of a CAD assembly."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

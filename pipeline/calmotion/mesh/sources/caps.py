@@ -1,7 +1,5 @@
 """Caps of the holes of open surfaces, of any size: flat where the edge of a hole is flat."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import manifold3d

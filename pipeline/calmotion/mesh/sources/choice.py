@@ -6,8 +6,6 @@ itself, all that it winds around is solid. A collision surface is mostly a conve
 another section, and so another stiffness. It comes last, or when the shot asks for it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

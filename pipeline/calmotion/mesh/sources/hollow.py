@@ -1,7 +1,5 @@
 """Hollow parts that a shot models by their outer surfaces: the solid without a cavity at the depth of the wall."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Places spread evenly over a surface."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.mesh.repair.closing import Part

@@ -5,8 +5,6 @@ tetrahedra may have to the surface, it is chance whether they close a slit: an e
 thread or was lost, with 56 or 360 Hz, where points were moved by 2 nm.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import manifold3d

@@ -1,7 +1,5 @@
 """Links that are meshed once: the left arm of a robot is mostly its mirrored right one, and its fingers are alike."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Triangulated surfaces as oriented chains: boundaries, closing of small holes, inside and outside."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The motion or reflection that takes one surface to another: a left arm is mostly the mirrored right one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product

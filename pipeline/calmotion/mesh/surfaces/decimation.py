@@ -12,8 +12,6 @@ Source: Garland and Heckbert 1997, Surface Simplification Using Quadric Error Me
 Edelsbrunner, Guha and Nekhayev 1999 keeps the surface closed.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

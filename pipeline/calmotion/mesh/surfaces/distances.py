@@ -1,7 +1,5 @@
 """Distances between points and triangles: closest points and rays; solid angles of triangles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray, Indices

@@ -1,7 +1,5 @@
 """What of a surface is near many points, by a grid of cells that name the triangles close to them."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

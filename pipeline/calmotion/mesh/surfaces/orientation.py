@@ -1,7 +1,5 @@
 """Consistent orientation of triangles: patches between non-manifold edges, each of which is flipped as a whole."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

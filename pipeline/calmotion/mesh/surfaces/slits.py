@@ -1,7 +1,5 @@
 """Slits of a solid: thin gaps between two sides of its surface that face each other, and bodies that fill them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tetrahedra that fill a solid, within a limit of processor time."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ fTetWild draws the order of the triangles from the operating system's random num
 fixed ones, so that a surface has one mesh, whenever and wherever it is made.
 """
 
-from __future__ import annotations
-
 import ctypes
 import importlib.util
 import mmap

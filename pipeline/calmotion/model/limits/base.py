@@ -1,7 +1,5 @@
 """A kind of limit of the motors: what is limited, by how much, and what the user would raise."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from typing import ClassVar, Protocol
 

@@ -1,7 +1,5 @@
 """The torque or force that a motor has."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

@@ -1,7 +1,5 @@
 """How fast the acceleration of a motor may change."""
 
-from __future__ import annotations
-
 from calmotion.model.limits.base import SymmetricLimit
 from calmotion.model.motor import Motor
 

@@ -1,7 +1,5 @@
 """All kinds of limits of the motors."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from importlib import import_module

@@ -1,7 +1,5 @@
 """The range of a joint."""
 
-from __future__ import annotations
-
 from calmotion.model.character import Joint
 from calmotion.model.limits.base import CurveLimit
 from calmotion.model.motor import Motor

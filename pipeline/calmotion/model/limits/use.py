@@ -1,7 +1,5 @@
 """How far motors go within their limits."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

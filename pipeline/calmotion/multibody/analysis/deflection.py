@@ -1,7 +1,5 @@
 """Deflection of bodies: a cause of failed simulations, and the sag of a robot."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

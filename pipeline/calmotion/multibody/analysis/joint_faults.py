@@ -1,7 +1,5 @@
 """Where joints come apart, where a linkage may branch, and free joints that nothing holds where they stand."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

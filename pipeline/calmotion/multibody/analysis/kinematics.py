@@ -1,7 +1,5 @@
 """Rigid kinematics: poses and target motions of the undeformed character from joint angles."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

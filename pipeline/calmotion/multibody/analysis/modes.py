@@ -1,7 +1,5 @@
 """Natural modes of the whole character, joints locked by their motors."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

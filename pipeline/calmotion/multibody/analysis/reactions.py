@@ -1,7 +1,5 @@
 """Forces and moments that joints transmit, and efforts of motors, from the multipliers of a simulation."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Centrifugal and Coriolis forces, and Coulomb friction, of a robot that follows its inputs without vibration."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

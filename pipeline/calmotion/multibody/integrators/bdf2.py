@@ -10,8 +10,6 @@ mechanical systems on Lie groups, 2021). Before the first instant the system res
 backwards as constant, velocities as zero.
 """
 
-from __future__ import annotations
-
 from calmotion.arrays import Array
 from calmotion.multibody.kernels.so3 import inverse_right_jacobian, right_jacobian, right_jacobian_derivative
 from calmotion.multibody.model.system import Instants, System

@@ -1,7 +1,5 @@
 """Coefficients of the integrators, and the predictor of their steps."""
 
-from __future__ import annotations
-
 from calmotion.arrays import Array
 from calmotion.multibody.kernels.so3 import turn
 from calmotion.multibody.model.system import NEWMARK, Integrator, State, System

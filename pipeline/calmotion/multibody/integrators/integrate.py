@@ -4,8 +4,6 @@
 `rk4` is explicit, on the index-1 form.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

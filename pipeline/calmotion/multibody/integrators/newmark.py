@@ -12,8 +12,6 @@ Hulbert, A time integration algorithm for structural dynamics, 1993; Bruels, Car
 integrators in multibody dynamics, 2010.
 """
 
-from __future__ import annotations
-
 from calmotion.arrays import Array
 from calmotion.multibody.kernels.so3 import inverse_right_jacobian
 from calmotion.multibody.model.system import Instants, Integrator, State, System

@@ -9,8 +9,6 @@ one, by the same factors, does not confirm (the natural monotonicity test: Deufl
 Problems, 2004, section 2.1.3) is taken back and halved.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

@@ -10,8 +10,6 @@ of the motion: of a hobby servo by 2 ms steps 0.065 or -0.02 rad where it is 0.0
 and a division of the steps in which friction turns.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -6,8 +6,6 @@ A step integrates (c, theta, u, V), theta being the rotation vector from the ste
 (H. Munthe-Kaas, Runge-Kutta methods on Lie groups, 1998).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A forward simulation: static equilibrium at the start, then an implicit integrator over given joint angles."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 

@@ -1,7 +1,5 @@
 """The states of all instants of a simulation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Residual and tangent of the whole system at one instant; compiled. The joint rows are in `joints`."""
 
-from __future__ import annotations
-
 from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import ComponentMotion, component_of, law_of, marker_of
 from calmotion.multibody.kernels.constant_inertia import (

@@ -1,7 +1,5 @@
 """What the kernels of one component read: its constants, its motion, its elastic law and its markers; compiled."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from calmotion.arrays import Array

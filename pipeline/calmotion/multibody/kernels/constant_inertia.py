@@ -14,8 +14,6 @@ weight deflects the component that carries it. The vector a combines gravity and
 same s and the mass matrix is symmetric.
 """
 
-from __future__ import annotations
-
 from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import Component, ComponentMotion
 from calmotion.multibody.kernels.inertia import rigid_mass_matrix

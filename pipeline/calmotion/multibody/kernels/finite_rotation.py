@@ -11,8 +11,6 @@ and psi is the axial vector of its skew part: psi = sin(a) n for a rotation by a
 up to (not including) a rotation by 90 degrees, where it is not a number and the step fails.
 """
 
-from __future__ import annotations
-
 import math
 
 from calmotion.arrays import Array

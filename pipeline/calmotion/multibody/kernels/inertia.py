@@ -11,8 +11,6 @@ with m_j = 1, or 0 for the deflection of a drive: formulation, section 1 (Seed (
 and omega that the seed omits).
 """
 
-from __future__ import annotations
-
 from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import Component, ComponentMotion
 from calmotion.multibody.kernels.work import Work

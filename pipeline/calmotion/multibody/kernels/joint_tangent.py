@@ -1,7 +1,5 @@
 """Derivatives of a joint's constraint rows and of the forces through it; compiled. See `joints` for the rows."""
 
-from __future__ import annotations
-
 from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import marker_of
 from calmotion.multibody.kernels.joints import add_skew, firmness, is_hinge

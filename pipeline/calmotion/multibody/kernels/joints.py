@@ -16,8 +16,6 @@ constraint manifold these rows are C_t + C_U T V + alpha C of Seed (31); the mul
 transpose of their velocity Jacobian, so they do no work there.
 """
 
-from __future__ import annotations
-
 import math
 
 from calmotion.arrays import Array

@@ -12,8 +12,6 @@ do the virtual work f . dp + t . dphi_m, hence the generalised force (R^T f, y x
 Phi^T R^T f + Psi^T J_r^T R_0 t) on (R^T dc, dphi, du).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -12,8 +12,6 @@ Source: Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysi
 for Efficient Integration of Subspace Deformations, 2008.
 """
 
-from __future__ import annotations
-
 import math
 
 from calmotion.arrays import Array

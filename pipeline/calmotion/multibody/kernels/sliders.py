@@ -10,8 +10,6 @@ taken by the length as an unknown: its row is its definition, and its column the
 by the length, which no other term of the tree's equations contains.
 """
 
-from __future__ import annotations
-
 from calmotion.arrays import Array
 from calmotion.multibody.kernels.markers import MarkerWork
 from calmotion.multibody.model.system import JOINT_ROWS, System

@@ -4,8 +4,6 @@
 near zero, where those cancel. Source: Sola, Deray, Atchuthan, A micro Lie theory for state estimation (2018).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -13,8 +13,6 @@ Both are exact: the force is a cubic polynomial, and a rigid rotation of the bod
 energy. As pairs are bilinear, J + b dz'/du is J at u + b v.
 """
 
-from __future__ import annotations
-
 from calmotion.arrays import Array
 from calmotion.multibody.kernels.components import ElasticLaw
 from calmotion.multibody.kernels.work import LawWork

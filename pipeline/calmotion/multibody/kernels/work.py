@@ -1,7 +1,5 @@
 """Scratch of the kernels that assemble the equations of one instant."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ Right-hand sides stand last in all arrays, so that the innermost loops are over 
 those of `elimination` and `closed_chains`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -11,8 +11,6 @@ three) leave S without full rank: its pseudo-inverse gives the motion, which is 
 least norm. The transposed system uses the same matrices.
 """
 
-from __future__ import annotations
-
 from calmotion.arrays import Array
 from calmotion.multibody.kernels.sliders import has_row
 from calmotion.multibody.linear_solver.block_solution import closing_rows, solve_tree, subtract_border

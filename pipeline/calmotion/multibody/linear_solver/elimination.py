@@ -9,8 +9,6 @@ Within a block the elastic coordinates come first, then those of the rigid body,
 frame is fixed to it at its joint, so that the joint's rows are zero at the elastic coordinates, and so are the factors.
 """
 
-from __future__ import annotations
-
 from calmotion.arrays import Array, IntArray
 from calmotion.multibody.kernels.sliders import has_row
 from calmotion.multibody.linear_solver.step_matrix import StepMatrix

@@ -6,8 +6,6 @@ with Baumgarte's coefficient a, which holds positions and velocities to the cons
 without them (J. Baumgarte, Stabilization of constraints and integrals of motion, 1972).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

@@ -1,7 +1,5 @@
 """Multipliers of least norm where constraints are redundant; compiled."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

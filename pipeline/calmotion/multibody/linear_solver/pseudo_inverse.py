@@ -5,8 +5,6 @@ left and, where the rank falls short, further ones from the right. Source: Golub
 sections 5.4-5.5.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

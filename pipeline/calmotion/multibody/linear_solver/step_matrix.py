@@ -1,7 +1,5 @@
 """The eliminated step matrix, the border of closed chains, and the scratch of solutions; compiled."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

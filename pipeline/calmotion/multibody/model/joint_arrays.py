@@ -1,7 +1,5 @@
 """The joints of a character as flat arrays: those of the tree, by component, then those that close chains."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

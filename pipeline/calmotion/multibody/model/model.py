@@ -1,7 +1,5 @@
 """From a character and its reduced bodies to the compiled system, its motors and its targets."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

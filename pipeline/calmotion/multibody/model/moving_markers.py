@@ -4,8 +4,6 @@ A marker at an instant is a row of 18 numbers: position [m], velocity [m/s], ang
 [rad/s], rotation matrix by rows.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

@@ -15,8 +15,6 @@ A servo that is switched off exerts no torque, not even that of the voltage whic
 a row of the moving markers as well, of zeros while it is off. Accelerations jump there, so steps do not reach back.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

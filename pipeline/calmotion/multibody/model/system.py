@@ -5,8 +5,6 @@ number B on, close chains. Arrays are padded to the largest number of elastic co
 parent, side 1 on the component; a joint that closes a chain may have the world on side 0, never on side 1.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

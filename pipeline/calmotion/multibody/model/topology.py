@@ -1,7 +1,5 @@
 """The spanning tree of a character's bodies and joints, rooted at the world."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Motor inputs between instants, for integrators that evaluate them there."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -8,8 +8,6 @@ coordinates of motor j. Of ideal motors, the constraints' efforts tau' give tau_
 Source: Siciliano, Sciavicco, Villani, Oriolo, Robotics, 2009, section 8.1 (kinematic coupling of motors and joints).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -17,8 +17,6 @@ without inertia, on the gear's spring and damper; the marker is held at zero, th
 the torque of the gear, and the command acts on the row of phi (`servos`). Without psi the gear is rigid.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

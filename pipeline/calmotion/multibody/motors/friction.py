@@ -14,8 +14,6 @@ As t = y - f, with y = m less what accelerates and brakes the rotor, f is the so
 it is unique while k_t + k_ts < 1.
 """
 
-from __future__ import annotations
-
 import math
 
 from calmotion.arrays import Array

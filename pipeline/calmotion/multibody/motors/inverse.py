@@ -3,8 +3,6 @@
 They are exact on rigid links, but for damping in gears, and limits that a torque would exceed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

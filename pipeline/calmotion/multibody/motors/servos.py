@@ -15,8 +15,6 @@ s(x) = x / (1 + x^16)^(1/16), which is x to 1e-6 up to x = 0.5 and never exceeds
     tau_m = middle + half s((e - middle) / half),   middle, half = (upper + lower) / 2, (upper - lower) / 2
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ It is the exact transpose of the tangent's recursion, the static start included,
 rounding: Seed (39) for the discretised system.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

@@ -5,8 +5,6 @@ a block of directions, which stand last in all arrays, so that the innermost loo
 time for each direction falls to a tenth. The equations are those of `tangent`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -15,8 +15,6 @@ matrix whose velocities follow positions by 3/2h alone. At the start the system 
 right-hand side of the transposed static equations.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

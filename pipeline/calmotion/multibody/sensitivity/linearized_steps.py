@@ -1,7 +1,5 @@
 """Arrays of the linearised equations of consecutive instants."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Windows of instants, efforts and motors in sweeps: the common part of tangent and adjoints; compiled."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ A linearisation that begins later does not contain the instants before: nothing 
 starts from zero.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

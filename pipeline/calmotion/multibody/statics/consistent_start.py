@@ -5,8 +5,6 @@ continued backwards to second order, x(-h) = x - h V + h^2/2 a, V(-h) = V - h a,
 follows from the equations of motion with the constraints differentiated once more.
 """
 
-from __future__ import annotations
-
 from calmotion.arrays import Array
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace

@@ -1,7 +1,5 @@
 """Static equilibrium under gravity at given joint angles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

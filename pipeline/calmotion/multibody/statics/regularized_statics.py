@@ -14,8 +14,6 @@ closed chains or nothing support it. Weaker springs would converge faster, but a
 so much farther than others that redundant constraints could not be detected.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

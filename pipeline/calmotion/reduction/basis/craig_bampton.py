@@ -4,8 +4,6 @@ Source: Craig and Bampton, Coupling of Substructures for Dynamic Analyses, AIAA 
 in Seed, Sec. 2 (components are coupled at rigid interfaces).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Natural frequencies and modes of the full model."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

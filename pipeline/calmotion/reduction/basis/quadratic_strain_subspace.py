@@ -6,8 +6,6 @@ restricted to this subspace the quadratic strain is accurate but for G^T dG, dG 
 linear strain is exact, and the energy is still given by a Gram matrix.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ Source: MacNeal, A Hybrid Method of Component Mode Synthesis, Computers and Stru
 Craig-Bampton Method for Dynamic Substructuring, Journal of Computational and Applied Mathematics 168, 2004.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Static loads of a body: inertial forces in an accelerated frame, and wrenches on its interfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

@@ -9,8 +9,6 @@ grow in different ways as the bending goes on: K^-1 f3 as one vector left 9.0 of
 iterations K^-1 (residual) 8.1%. The normal modes in K^-1 f3, taken one by one, leave 0.2 to 0.9%.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

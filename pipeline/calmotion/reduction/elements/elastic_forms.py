@@ -4,8 +4,6 @@ With displacement gradient G of the body (F = E + G), the first Piola-Kirchhoff 
 the undeformed state as P = C:sym(G) + P''[G, G]/2 + ..., where P''[A, B] is symmetric in A and B.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg.blas import dsyrk
 

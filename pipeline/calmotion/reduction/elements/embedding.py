@@ -1,7 +1,5 @@
 """Displacement and small rotation of arbitrary points of a body by its nodal displacements."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

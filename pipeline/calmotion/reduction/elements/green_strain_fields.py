@@ -1,7 +1,5 @@
 """Green strain fields of modes and of pairs of directions at quadrature points; compiled."""
 
-from __future__ import annotations
-
 from calmotion.arrays import Array
 from calmotion.support.compilation import kernel
 

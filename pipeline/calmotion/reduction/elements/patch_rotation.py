@@ -9,8 +9,6 @@ displacement, keep the patch rigid at any rotation. This strain is linear in z(u
 body is, so the springs are additional rows of the Gram matrix and cost nothing in a simulation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

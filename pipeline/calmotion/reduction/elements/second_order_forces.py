@@ -1,7 +1,5 @@
 """Nodal forces of the second-order stress of a hyperelastic material; compiled."""
 
-from __future__ import annotations
-
 from calmotion.arrays import Array, IntArray
 from calmotion.support.compilation import inlined_kernel, kernel
 

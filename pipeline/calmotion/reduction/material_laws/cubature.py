@@ -6,8 +6,6 @@ force that is linear in the coordinates is exact (a constant matrix), so the poi
 The poses are equilibria under random loads, because a random sum of modes stretches a link more than any load does.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import lsq_linear, nnls
 

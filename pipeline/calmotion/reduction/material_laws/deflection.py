@@ -8,8 +8,6 @@ deflection and theta_ij the modal derivatives:
   deflection by this share of itself.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

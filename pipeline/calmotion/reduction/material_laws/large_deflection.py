@@ -1,7 +1,5 @@
 """The reduced elastic law of a body of large deflection: its basis and its energy."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

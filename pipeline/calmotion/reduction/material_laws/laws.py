@@ -1,7 +1,5 @@
 """The elastic laws of a body, cheapest first, and the one that a shot needs."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar

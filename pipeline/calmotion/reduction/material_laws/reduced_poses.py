@@ -1,7 +1,5 @@
 """Equilibrium poses of a body under loads, in reduced coordinates."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

@@ -4,8 +4,6 @@ A band that falls into several parts has several sections: branches, the cheeks 
 centers are the nodes of a frame, whose beams join sections of neighbouring bands that touch.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

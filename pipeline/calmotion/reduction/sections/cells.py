@@ -4,8 +4,6 @@ The cells are those of a box along the main axes of the surface, at least some a
 each axis count how often the surface winds around a cell, so that it may be open, in several parts, or inside out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ docs/evidence/meshing.md. Not seen are walls that bend by themselves, sections t
 and detail below a cell.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Which cells of a body its joints hold: those that the patches of a mesh would be made of."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ in which its functions act. After the search, knots at which the offsets have no
 removed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cost of a limit: the decrease of the error that it prevents, estimated by one Gauss-Newton step without it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import BoolArray

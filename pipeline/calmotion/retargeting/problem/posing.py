@@ -1,7 +1,5 @@
 """The retargeting problem of a shot: its unknowns, objective and limits."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

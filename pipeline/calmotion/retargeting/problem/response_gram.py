@@ -8,8 +8,6 @@ Of a long shot the matrix of all unknowns with all others would be too large. Wh
 response is followed for some seconds alone, and the matrix of these has a band of entries.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ A product with it takes a hundredth of the time of sweeps over all robots. The m
 products of one model, and so does a step under limits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 

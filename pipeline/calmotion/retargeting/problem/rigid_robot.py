@@ -1,7 +1,5 @@
 """The rigid robot as an approximation of the flexible one: gradient and preconditioner without a simulation."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

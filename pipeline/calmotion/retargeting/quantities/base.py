@@ -1,8 +1,6 @@
 """What follows from the motion of one robot: residuals, of which a search makes the squares small, and quantities that
 it keeps within limits. A new kind is a new module beside this one, with a test of its derivatives by differences."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, Protocol

@@ -1,7 +1,5 @@
 """The search with feet that ask of the ground only what it can do."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from calmotion.model.limits.bounds import Bounds

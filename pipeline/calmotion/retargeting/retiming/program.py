@@ -5,8 +5,6 @@ theta''/sigma^2 - theta' sigma'/sigma^3, jerks their derivative, and efforts g +
 linearised, and quadratic programs are solved one after the other within a trust region.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property

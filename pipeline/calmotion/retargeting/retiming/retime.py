@@ -4,8 +4,6 @@ A search finds the offsets that calm the robot at the tempo of its rigid robot, 
 Where its curves exceed them, further searches begin from these and keep them.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

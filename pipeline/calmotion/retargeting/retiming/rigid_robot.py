@@ -1,7 +1,5 @@
 """What limits the tempo of a compiled shot: its curves, and the efforts of its rigid robot."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How the tempo of a shot may change: what the user asks for, and what cannot be."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.errors import ShotError

@@ -1,7 +1,5 @@
 """The tempo of a shot: from the motion of its rigid robot, the limits of its motors, and its pinned times."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Motor curves on a set of robots: how far their targets are from where they should be."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

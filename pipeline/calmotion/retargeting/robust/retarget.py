@@ -1,7 +1,5 @@
 """Curves for a set of robots: the sum of their objectives, or the largest of their errors."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace

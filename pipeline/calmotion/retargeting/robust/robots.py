@@ -1,7 +1,5 @@
 """The robots for which curves are optimised, and their places in a retargeting problem."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ A factor of a modulus, a damping or a payload scales the matrices of a reduced b
 reduction is made anew (docs/formulation.md, "Robust retargeting").
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

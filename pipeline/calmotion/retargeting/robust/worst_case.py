@@ -3,8 +3,6 @@
 The largest error is made smooth by a power mean (`solver.norm`), which the search minimises as it does the squares.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar

@@ -6,8 +6,6 @@ solution is the start of the next problem. The search of the soft linkage of `te
 without it; on the six samples and a KUKA it changes nothing.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A dense approximation of the Gauss-Newton matrix as a preconditioner."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_matrix, identity, kron

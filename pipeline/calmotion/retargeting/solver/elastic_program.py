@@ -6,8 +6,6 @@ by a primal-dual interior-point method (Wright, Primal-Dual Interior-Point Metho
 constraints hold exactly where that is possible (Fletcher, Practical Methods of Optimization, 1987, section 14.3).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

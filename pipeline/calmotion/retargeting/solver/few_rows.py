@@ -1,7 +1,5 @@
 """A preconditioner with a few more rows, each of which may be far stiffer than all else."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -8,8 +8,6 @@ for p to infinity. With s_i = u_i^2 / T, F_2 is half the sum of the squares. F_p
 smallest, a sum of squares is stationary too, whose weights are w_i = (m_i / M_p)^(p - 2) (Lawson 1961).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

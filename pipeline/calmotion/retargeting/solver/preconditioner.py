@@ -1,7 +1,5 @@
 """Gauss-Newton matrices that are banded in time, such as that of the rigid robot, as preconditioners."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """Truncated conjugate gradients in a trust region; all iterates are kept, so that a smaller region costs no product."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

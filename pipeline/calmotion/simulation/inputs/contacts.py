@@ -1,8 +1,6 @@
 """What comes and goes: when and where feet are held, which motors are on, at the instants of a simulation; what does
 not support that."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray

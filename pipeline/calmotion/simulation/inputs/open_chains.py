@@ -1,7 +1,5 @@
 """Closed chains whose joints do not meet: motors that contradict each other, in the user's words."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

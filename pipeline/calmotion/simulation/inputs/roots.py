@@ -1,7 +1,5 @@
 """Moving roots over time: the frames that a shot moves, at the instants of a simulation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -8,8 +8,6 @@ inputs, 1994); MZV, of the printers' firmware Klipper, takes three quarters of a
 shaper delays the motion and knows nothing of the targets.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt

@@ -1,7 +1,5 @@
 """Settings and motions that no simulation of a shot supports; they follow from its input alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

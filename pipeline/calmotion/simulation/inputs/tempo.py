@@ -6,8 +6,6 @@ is the fastest performance (Verscheure et al., Time-optimal path tracking for ro
 2018), found by a linear programme, and a lower bound of the time that any performance of these curves takes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

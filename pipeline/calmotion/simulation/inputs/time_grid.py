@@ -1,7 +1,5 @@
 """The time grid of a shot: its frames in steps, the pre-roll before them, and parts of a shot in time."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

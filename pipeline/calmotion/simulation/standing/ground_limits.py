@@ -10,8 +10,6 @@ where f and M act on the frame, z above the ground. What the rigid robot needs i
 no faster than the rigid robot's or that of the input.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The sole of a body that stands on level ground, and how far a centre of pressure stays inside of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -4,8 +4,6 @@ Rigid legs with ideal motors between two held feet are a closed chain that their
 what is left. Contacts are no balance either: a robot on points falls over at rest.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

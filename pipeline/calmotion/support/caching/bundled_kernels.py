@@ -1,7 +1,5 @@
 """Compiled kernels that a platform wheel brings, and hashes of the sources that they must not outlive."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import pickle

@@ -1,7 +1,5 @@
 """The user's caches, which there are and their folder, and the folder of the user's choices."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Mapping

@@ -5,8 +5,6 @@ folder of the kernels of one version of the sources. The least recently used ent
 user can write are read, since kernels are unpickled and run.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import hashlib

@@ -6,8 +6,6 @@ body would change its results unseen. Files are read whole, and only if they are
 their place stops nobody. What is unpickled or run must also be the user's own, see `read_verified`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import os

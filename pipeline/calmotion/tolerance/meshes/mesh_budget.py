@@ -4,8 +4,6 @@ A coarse mesh makes a body too stiff. What that costs is the difference to a sim
 the estimated error of their stiffness. Where the shake will be removed, only the deflection is left.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What the mesher of a body is told: settings of the user, and the solid."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from calmotion.mesh.element_sizes import Shape

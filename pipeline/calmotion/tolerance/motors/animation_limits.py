@@ -1,7 +1,5 @@
 """Limits of the motors that an animation exceeds, before anything is meshed: what `inspect` tells."""
 
-from __future__ import annotations
-
 import contextlib
 
 import numpy as np

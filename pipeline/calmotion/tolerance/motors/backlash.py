@@ -9,8 +9,6 @@ and a target by the sum over the motors of what this angle moves it, on rigid li
 gear's largest torque does not change its side.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

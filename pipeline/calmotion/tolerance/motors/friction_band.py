@@ -5,8 +5,6 @@ nothing; the simulation has it in the middle, since friction is smooth there. A 
 the motors of what these angles move it, on rigid links.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How far compliant motors move the targets: by the gains that a shot carries, and their part of its error."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

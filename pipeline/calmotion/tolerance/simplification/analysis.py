@@ -1,7 +1,5 @@
 """What a shot needs, from its geometry and one simulation of the rigid robot: before meshes and finite elements."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """What a shot needs of its bodies, closed chains and motors, from the poses of the rigid robot."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

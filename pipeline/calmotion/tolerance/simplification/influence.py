@@ -1,7 +1,5 @@
 """Which motors can move the targets: those of a rigid robot that do, at some time of the shot."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array, IntArray

@@ -1,7 +1,5 @@
 """Closed loops: how many rows of their joints are redundant, and which joints hold nothing that others do not."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

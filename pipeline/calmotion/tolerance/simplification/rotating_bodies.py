@@ -4,8 +4,6 @@ Such a body needs no Coriolis, centrifugal and gyroscopic terms, and its inertia
 1; the seed's M2 and M5). What a flexible body carries rotates with its deflection.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

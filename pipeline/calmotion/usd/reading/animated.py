@@ -1,7 +1,5 @@
 """What a shot animates by time samples or splines: transforms, values that are held constant, the tempo."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A Character of bodies, joints, motors and targets."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace

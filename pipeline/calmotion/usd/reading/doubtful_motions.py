@@ -1,7 +1,5 @@
 """Animations and limits in other units: degrees taken for radians, millimetres for metres, milliseconds for seconds."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Robots in other units than their stage says: sizes, weights, densities and inertias that no robot has."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Provenance of a shot: its layers, their hashes, the units of its stage, and the results that it carries."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 

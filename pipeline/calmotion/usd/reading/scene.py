@@ -1,7 +1,5 @@
 """Gravity, and the shot's settings of the optimisation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import fields
 

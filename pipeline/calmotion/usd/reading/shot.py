@@ -1,7 +1,5 @@
 """Reading a shot: a file becomes a Character, an Animation and a Provenance."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """UsdSkel skeletons: their joints, poses at rest, and the animation that is bound to them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any

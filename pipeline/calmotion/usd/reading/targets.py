@@ -1,7 +1,5 @@
 """Targets: the frames whose errors are measured, authored or chosen."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

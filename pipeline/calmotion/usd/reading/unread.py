@@ -1,7 +1,5 @@
 """What is authored and has no effect: misspelt attributes, misplaced schemas, physics that is not simulated."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 

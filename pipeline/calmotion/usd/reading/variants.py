@@ -1,7 +1,5 @@
 """Why a shot has no bodies, and which variant has physics: robots come with and without it, or for several engines."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

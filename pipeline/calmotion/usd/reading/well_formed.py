@@ -1,7 +1,5 @@
 """Checks before reading: types of authored properties, and orders of transform operations. Readers rely on them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

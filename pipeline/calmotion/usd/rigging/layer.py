@@ -1,7 +1,5 @@
 """The layer of a robot: its prims for materials and joints, and what is authored on bodies."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 

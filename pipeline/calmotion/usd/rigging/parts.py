@@ -1,7 +1,5 @@
 """The parts of a shot that move as rigid bodies: Xforms with keys, and where they are."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

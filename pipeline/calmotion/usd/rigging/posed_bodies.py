@@ -1,7 +1,5 @@
 """Which animated parts of a shot become bodies of a robot, and the joints between them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

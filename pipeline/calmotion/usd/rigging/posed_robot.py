@@ -1,7 +1,5 @@
 """The robot of a shot whose rigid parts are animated: these are its bodies, and their motion is that of its motors."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 

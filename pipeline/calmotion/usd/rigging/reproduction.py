@@ -1,7 +1,5 @@
 """How well the robot that was written does what the parts do."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rigging: a file with a skinned character or animated parts becomes a layer with a robot."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """The robot of a skinned character: bodies of their own, cut from the skin, that stand as its skeleton does."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

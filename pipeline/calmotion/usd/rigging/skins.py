@@ -1,7 +1,5 @@
 """The skin of a skeleton at a time: points, triangles, and the weight of each joint at each point."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The motion that is baked: the predicted one at the frames, or that of a rigid robot with the written curves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Motor curves as time samples of the attributes that they came from."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Metadata of a layer: that of the stage, and the origin in `customLayerData["calmotion"]`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

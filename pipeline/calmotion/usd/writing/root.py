@@ -1,7 +1,5 @@
 """The small layer that opens a result with its shot."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The tempo of a performance in USD: the map of times, and what else moves in the stage at the same tempo."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

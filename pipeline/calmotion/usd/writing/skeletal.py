@@ -1,7 +1,5 @@
 """Motor curves as joint rotations of the UsdSkel animation that they came from."""
 
-from __future__ import annotations
-
 import numpy as np
 from pxr import Sdf, Usd, UsdSkel, Vt
 

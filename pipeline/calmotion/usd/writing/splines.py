@@ -1,7 +1,5 @@
 """Motor curves as splines: the animator's curve and the optimiser's offset in one, exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 from pxr import Sdf, Ts
 

@@ -1,7 +1,5 @@
 """The point with the least value of a function that costs little: an evolution strategy of one parent and one child."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -6,8 +6,6 @@ simulated. Friction, motors at their limits and large turns make a difference to
 that it excites no more than tones do: what commands have at more than a third of the frame rate is left out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Test motions: sums of tones about a pose, from rest to rest, within bounds of range, velocity and acceleration."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

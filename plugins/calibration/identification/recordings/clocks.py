@@ -1,7 +1,5 @@
 """What the clock of a recording reads at the first frame of the shot, to begin with."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

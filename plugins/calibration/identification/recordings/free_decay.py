@@ -5,8 +5,6 @@ matrix has the z_k as eigenvalues (ESPRIT; Roy and Kailath 1989). The same estim
 what the simulated robot does, so that its error is much the same in both: only their ratio is used.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The noise of a sensor: from its samples alone, and from the residuals of a fit."""
 
-from __future__ import annotations
-
 from math import comb
 
 import numpy as np

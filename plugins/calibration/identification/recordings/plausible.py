@@ -1,7 +1,5 @@
 """Recordings that cannot be of the shot: in other units, in another frame, or of a robot that rests."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

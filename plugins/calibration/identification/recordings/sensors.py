@@ -1,7 +1,5 @@
 """Sensors of recordings: what they have to do with the robot, and the parameters of their own."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

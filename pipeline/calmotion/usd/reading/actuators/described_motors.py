@@ -1,7 +1,5 @@
 """What a shot says of the motor of one joint: its model, the real motor that it names, and actuators beside it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Actuators of MuJoCo conversions and of Newton: prims beside the joints."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The gains of a motor's drive in any supported dialect."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ Each value is the one that is authored in Calmotion's attribute, else that of th
 dialect.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import fields, replace
 

@@ -1,7 +1,5 @@
 """Flexible bodies: which they are, their materials, and how to mesh and reduce them."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import replace

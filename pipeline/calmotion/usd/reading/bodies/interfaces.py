@@ -1,7 +1,5 @@
 """Parts of a body's surface that name the joint attached to them: GeomSubsets of family `calmInterface`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Mass, centre and inertia of a body with the precedence and the "not authored" conventions of UsdPhysics."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Triangulation of polygons: fans for convex polygons, ear clipping for others."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array, BoolArray, IntArray

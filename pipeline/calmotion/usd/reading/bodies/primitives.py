@@ -2,8 +2,6 @@
 
 Cylinders and capsules also of two radii (`Cylinder_1`, `Capsule_1`)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

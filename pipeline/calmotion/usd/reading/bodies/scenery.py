@@ -1,7 +1,5 @@
 """The scenery: still geometry near the robot that belongs to no body. It is drawn, and has no part in the physics."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

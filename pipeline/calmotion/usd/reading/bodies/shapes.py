@@ -1,7 +1,5 @@
 """The geometry of a body: triangulated surfaces in its frame, tetrahedra, and the solids for its mass."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

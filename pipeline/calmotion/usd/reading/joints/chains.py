@@ -5,8 +5,6 @@ them: each slider and hinge acts in the frame that those before it have moved. A
 ball joint three. Between them are parts that are no prims; they have the frame of the joint where they stand.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Contacts: frames on bodies that the world holds while the shot says so (`CalmContactAPI`)."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 from pxr import Usd

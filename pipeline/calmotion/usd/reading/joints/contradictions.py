@@ -1,7 +1,5 @@
 """Robots whose joints, transforms and schemas contradict each other."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ A `PhysicsJoint` moves along and about all axes of its frames, except where a Ph
 exceeds the upper one, or both are nothing that can be seen.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Roots that the shot moves: kinematic bodies, and joints on animated prims that are not bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which bodies belong to the character, in what order, and how far each is from the world."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 

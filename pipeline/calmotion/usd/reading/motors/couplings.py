@@ -3,8 +3,6 @@
 usd-core does not know their types, so that their attributes have no fallbacks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Motors: which joints are driven, and where the track of each is."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

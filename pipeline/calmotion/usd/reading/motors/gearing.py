@@ -1,7 +1,5 @@
 """Joints that are geared to others: mimic joints of several dialects."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 

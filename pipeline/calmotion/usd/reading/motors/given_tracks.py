@@ -1,7 +1,5 @@
 """Tracks that are given in addition to the shot, by the names or paths of joints."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

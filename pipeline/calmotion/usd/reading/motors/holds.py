@@ -5,8 +5,6 @@ two holds, so that the cubic through all of them stands still in the holds and d
 and the search and the writer treat it as any other track.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 

@@ -1,7 +1,5 @@
 """Limits of a motor in any supported dialect, when it may be changed, and when it is on."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Tracks of motors from the animated transforms of their bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ its axis; two or three that name the same joint, one carrying the next, take a p
 (`calmotion.rigging.hinge_rows`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

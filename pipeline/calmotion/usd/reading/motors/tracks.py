@@ -1,7 +1,5 @@
 """The samples or the spline of a drive as a track in seconds, and radians or metres."""
 
-from __future__ import annotations
-
 import numpy as np
 from pxr import Gf, Sdf, Ts, Usd
 

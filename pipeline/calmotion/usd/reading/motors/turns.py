@@ -1,7 +1,5 @@
 """Tracks of joints that turn on, written between -180 and 180 degrees, so that they jump by a turn."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from calmotion.arrays import Array

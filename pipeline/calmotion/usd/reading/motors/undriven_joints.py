@@ -1,7 +1,5 @@
 """Joints without a motor, which swing, and animated drives that move nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from typing import Any
 
