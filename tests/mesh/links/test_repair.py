@@ -101,6 +101,21 @@ def test_solids_a_hair_apart_are_bridged_and_not_thickened():
         solid(parts[0], surface(box((0.1, 0.02, 0.02), at=(0.02, 0, 0.021)), "/b"))
 
 
+def test_a_pin_in_a_hole_is_bridged_without_voids_and_slivers():
+    # with a prism for each triangle the solid had 21,700 triangles and 313 voids
+    pin, ring = (
+        trimesh.creation.cylinder(0.0099, 0.06, sections=48),
+        trimesh.creation.annulus(0.00995, 0.05, 0.02, sections=58),
+    )
+    pin, ring = (part.subdivide().subdivide() for part in (pin, ring))
+    made = solid(surface(pin, "/pin"), surface(ring, "/ring"))
+    assert any("bridged gaps of up to 0.07 mm" in repair for repair in made.repairs)
+    gap = np.pi * (0.00995**2 - 0.0099**2) * 0.02
+    assert pin.volume + ring.volume < made.volume < pin.volume + ring.volume + 2.0 * gap
+    assert len(made.triangles) < 1.2 * (len(pin.faces) + len(ring.faces))
+    assert trimesh.Trimesh(made.points, made.triangles).body_count == 1
+
+
 def test_detail_below_the_tolerance_is_removed_and_the_shape_kept():
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
     made = solid(surface(ball))

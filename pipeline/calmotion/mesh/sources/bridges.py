@@ -6,15 +6,18 @@ from typing import Any
 import manifold3d
 import numpy as np
 from scipy.spatial import cKDTree
+from trimesh.graph import connected_components, face_adjacency
 
-from calmotion.arrays import box_diagonal
-from calmotion.mesh.repair.closing import Part, connected_pieces
-from calmotion.mesh.repair.uniting import manifold_of, part_of
+from calmotion.arrays import Array, Indices, box_diagonal
+from calmotion.mesh.repair.closing import Part, concatenated, connected_pieces
+from calmotion.mesh.repair.uniting import NotManifold, manifold_of, part_of
 from calmotion.mesh.sources.sampling import sampled
 from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles, unit_normals
 
 NARROW = 2e-3  # gap across which triangles that face each other are joined, of the size of the body
 _SINK = 0.05  # overlap of a bridge with both sides, of the gap
+_FLAT = 1.0 - 1e-6  # product of the normals of triangles of one flat patch
+_VOID = 1e-4  # of the volume, smallest void between solids that stays
 _SAMPLES = 4_000  # places on a solid between which a strut is sought
 _RADIUS, _SLENDER = 0.02, 0.3  # least radius of a strut, of the size and of the gap
 _APART, _REACH = 0.5, 0.1  # how far a second strut is from the first, of the extent; widest gap there, of the size
@@ -23,7 +26,7 @@ _APART, _REACH = 0.5, 0.1  # how far a second strut is from the first, of the ex
 def bridged(solids: Sequence[Part]) -> tuple[Part | None, float]:
     """The union of solids across narrow gaps, and the widest of these gaps.
 
-    Each triangle that faces another solid across a narrow gap is extruded to a prism up to that solid.
+    Each flat patch that faces another solid across a narrow gap is extruded up to that solid.
 
     Args:
         solids: Disjoint, outward, in units of the size of the body.
@@ -31,24 +34,52 @@ def bridged(solids: Sequence[Part]) -> tuple[Part | None, float]:
     Returns:
         None instead of the union where it is not connected.
     """
-    prisms: list[np.ndarray] = []
+    made: list[Any] = []
     widest = 0.0
     for k, solid in enumerate(solids):
         x = solid.points[solid.triangles]
         normals, _ = unit_normals(x)
         for other in [other for i, other in enumerate(solids) if i != k]:
             gaps, _ = NearbyTriangles(other.points, other.triangles, NARROW).faced(x.mean(axis=1), normals, 1e-7)
-            for i in np.flatnonzero(gaps <= NARROW):
-                gap, normal = float(gaps[i]), normals[i]
+            facing = np.flatnonzero(gaps <= NARROW)
+            for flat in _flat_patches(solid.triangles[facing], normals[facing]):
+                patch = facing[flat]
+                gap, normal = float(gaps[patch].max()), normals[patch[0]]
                 widest = max(widest, gap)
-                sink = _SINK * gap + 1e-7
-                prisms.append(np.vstack([x[i] - sink * normal, x[i] + (gap + sink) * normal]))
-    if not prisms:
+                made += _extruded(solid.points, solid.triangles[patch], normal, gap)
+    if not made:
         return None, 0.0
-    made = [manifold3d.Manifold.hull_points(np.ascontiguousarray(prism)) for prism in prisms]
     whole = manifold3d.Manifold.batch_boolean([*(manifold_of(s) for s in solids), *made], manifold3d.OpType.Add)
-    part = part_of(whole)
-    return (part if len(_solids(part)) == 1 else None), widest
+    united = part_of(whole)
+    pieces = connected_pieces(united.points, united.triangles)
+    if sum(piece.volume > 1e-12 for piece in pieces) != 1:
+        return None, widest
+    # what bridges shut in beside each other is no cavity of the robot
+    return concatenated([piece for piece in pieces if abs(piece.volume) > _VOID * pieces[0].volume]), widest
+
+
+def _flat_patches(triangles: Indices, normals: Array) -> list[Indices]:
+    """The sets of triangles that edges connect and that have one normal."""
+    pairs = face_adjacency(triangles)
+    pairs = pairs[np.einsum("ij,ij->i", normals[pairs[:, 0]], normals[pairs[:, 1]]) > _FLAT]
+    return list(connected_components(pairs, nodes=np.arange(len(triangles))))
+
+
+def _extruded(points: Array, triangles: Indices, normal: Array, gap: float) -> list[Any]:
+    """A flat patch extruded across a gap, and a little into the solids on both sides."""
+    used, corners = np.unique(triangles, return_inverse=True)
+    below, above = corners.reshape(-1, 3)[:, ::-1], corners.reshape(-1, 3) + len(used)
+    edges = above[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
+    a, b = edges[first[count == 1]].T
+    sides = np.concatenate([np.stack([b, a, a - len(used)], 1), np.stack([b, a - len(used), b - len(used)], 1)])
+    sink = _SINK * gap + 1e-7
+    places = np.concatenate([points[used] - sink * normal, points[used] + (gap + sink) * normal])
+    try:
+        return [manifold_of(Part(places, np.concatenate([below, above, sides])))]
+    except NotManifold:  # more than two triangles at an edge
+        prisms = places[np.concatenate([below, above], axis=1)]
+        return [manifold3d.Manifold.hull_points(np.ascontiguousarray(prism)) for prism in prisms]
 
 
 def strutted(solids: Sequence[Part]) -> tuple[Part, float]:
@@ -99,7 +130,3 @@ def _strut(near: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], gap: float
         inside = np.linalg.norm(points - center, axis=1) <= radius
         corners += [points[inside], points[inside] - (_SINK * gap + 1e-4) * outward[inside]]
     return manifold3d.Manifold.hull_points(np.ascontiguousarray(np.vstack(corners)))
-
-
-def _solids(part: Part) -> list[Part]:
-    return [piece for piece in connected_pieces(part.points, part.triangles) if piece.volume > 1e-12]
