@@ -78,6 +78,7 @@ class MeshQuality:
         deflection_error: Estimated relative error of deflections, to which stiff modes add little; None: twice that of
             frequencies.
         error_of_source: Relative error of the compliance, since the solid is not that of the body's visual surface.
+        factor_of_source: Of the stiffness of that surface over that of the solid.
     """
 
     min_dihedral_deg: float
@@ -89,6 +90,12 @@ class MeshQuality:
     source: str = ""
     deflection_error: float | None = None
     error_of_source: float = 0.0
+    factor_of_source: float = 1.0
+
+    @property
+    def factor(self) -> float:
+        """By which the elements are softer than the material."""
+        return self.stiffness_factor * self.factor_of_source
 
     @property
     def error_of_solid(self) -> float:

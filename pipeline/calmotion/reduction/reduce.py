@@ -173,7 +173,7 @@ def _radius_of(mesh: QuadraticMesh, patch: InterfacePatch) -> float:
 
 def _material(mesh: FEMesh, material: ElasticMaterial) -> ElasticMaterial:
     """The material with which the elements of a mesh are as stiff as those of a finer one."""
-    return replace(material, youngs_modulus=mesh.quality.stiffness_factor * material.youngs_modulus)
+    return replace(material, youngs_modulus=mesh.quality.factor * material.youngs_modulus)
 
 
 @dataclass(frozen=True, eq=False)

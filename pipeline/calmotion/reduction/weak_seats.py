@@ -84,7 +84,7 @@ def weak_seat_note(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFra
     patches = interface_patches(model.mesh, attachments, settings.interface_radius, body.path, mesh.patches)
     held = next(patch.nodes for patch in patches if weak in patch.attachments)
     half = _inner_half(model.mesh.nodes, held, at.frame.position)
-    stiffness = np.sqrt(mesh.quality.stiffness_factor)
+    stiffness = np.sqrt(mesh.quality.factor)
     own, less = (float(stiffness * clamped_modes(model, 1, nodes)[0][0]) for nodes in (held, half))
     if own <= _FALLS * less:
         return ""

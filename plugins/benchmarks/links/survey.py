@@ -163,7 +163,7 @@ def _frequencies(mesh: FEMesh, link: Link) -> Array:
     model = assemble(mesh.points, mesh.tets, settings.material)
     held = interface_patches(model.mesh, attachments_of(link), settings.interface_radius, link.body.path, mesh.patches)
     clamped = held[0].nodes if link.carrier is not None else None
-    return np.asarray(np.sqrt(mesh.quality.stiffness_factor) * clamped_modes(model, 3, clamped)[0])
+    return np.asarray(np.sqrt(mesh.quality.factor) * clamped_modes(model, 3, clamped)[0])
 
 
 def _with_reference(row: LinkRow, volume: Volume, body: Body, link: Link) -> LinkRow:

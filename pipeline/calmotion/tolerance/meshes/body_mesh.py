@@ -46,6 +46,7 @@ from calmotion.tolerance.meshes.options import MeshOptions, Volume
 if TYPE_CHECKING:
     from calmotion.mesh.patches.interface_patches import AttachmentFrame
 
+SECTIONS = 1.0  # of a first frequency: what is not known of it by beams and sections, for nine of ten links
 FAR = 5.0  # distance of a mesh from all joints of its body, over its size, that nobody means
 _SIMPLE = ("collision surface", "wrapped collision surface", "equivalent beam")
 _WELD = 1e-6  # distance of coincident points, of the diagonal
@@ -104,13 +105,18 @@ def _in_its_place(
     if root is None or mesh.quality.frequency_error is None:  # nothing holds it, or the reduction refuses it
         return mesh
     stiffer = _first_frequency(body, given, attachments, root) / _first_frequency(body, wanted, attachments, root)
-    quality, off = mesh.quality, abs(stiffer**2 - 1.0)
-    told = f"its first frequency is about {stiffer:.2g} times that of the visual surface, by beams and sections"
+    quality, factor = mesh.quality, stiffer**-2.0
+    off = min(2.0 * abs(stiffer - 1.0), SECTIONS)  # a factor close to 1 may be off by as much
+    told = (
+        f"its modulus is {factor:.2g} of that of its material, with which its first frequency is that of the visual "
+        "surface by beams and sections"
+    )
     quality = replace(
         quality,
-        error_of_source=off,
-        frequency_error=mesh.quality.frequency_error + abs(stiffer - 1.0),
-        deflection_error=(quality.deflection_error or 0.0) + off,
+        error_of_source=2.0 * off,
+        factor_of_source=factor,
+        frequency_error=mesh.quality.frequency_error + off,
+        deflection_error=(quality.deflection_error or 0.0) + 2.0 * off,
         repairs=(*quality.repairs, told),
     )
     return replace(mesh, quality=quality)
@@ -171,7 +177,8 @@ def _simpler(
                 f"meshed the {found.solid.source}, with {ratio:.2g} of the volume of the visual surface, which takes "
                 f"too long ({reason.found}): its stiffness differs; give a TetMesh or a simpler mesh file"
             )
-            yield replace(found, solid=replace(found.solid, repairs=(note, *found.solid.repairs)))
+            own = () if source == "beam" else found.solid.repairs  # how exact a beam is that nothing is known beside
+            yield replace(found, solid=replace(found.solid, repairs=(note, *own)))
 
 
 def _meshed(
