@@ -6,7 +6,6 @@ from typing import Any
 import manifold3d
 import numpy as np
 from scipy.spatial import cKDTree
-from trimesh.graph import connected_components, face_adjacency
 
 from calmotion.arrays import Array, Indices, box_diagonal
 from calmotion.mesh.repair.closing import Part, concatenated, connected_pieces
@@ -60,6 +59,8 @@ def bridged(solids: Sequence[Part]) -> tuple[Part | None, float]:
 
 def _flat_patches(triangles: Indices, normals: Array) -> list[Indices]:
     """The sets of triangles that edges connect and that have one normal."""
+    from trimesh.graph import connected_components, face_adjacency  # takes half a second, and most links have no gaps
+
     pairs = face_adjacency(triangles)
     pairs = pairs[np.einsum("ij,ij->i", normals[pairs[:, 0]], normals[pairs[:, 1]]) > _FLAT]
     return list(connected_components(pairs, nodes=np.arange(len(triangles))))
