@@ -23,7 +23,7 @@ _LIGHTEST = 1e-9  # mass of what is no frame [kg]
 _FIXED = "PhysicsFixedJoint"
 
 
-def author_masses(stage: Usd.Stage, units: StageUnits, options: RobotOptions) -> list[str]:
+def author_masses(stage: Usd.Stage, units: StageUnits, options: RobotOptions) -> tuple[list[str], list[Usd.Prim]]:
     """Author masses: those of MuJoCo, of frames, and of links without inertia.
 
     Args:
@@ -32,14 +32,14 @@ def author_masses(stage: Usd.Stage, units: StageUnits, options: RobotOptions) ->
         options: What the user and the robot's file say.
 
     Returns:
-        Notes for the user.
+        Notes for the user, and the links that are frames.
 
     Raises:
         ShotError: A link that has geometry and no mass, or one without mass that moves by itself.
     """
     author = _Author(stage, units, options)
     author.masses()
-    return author.notes
+    return author.notes, author.frames
 
 
 def too_heavy(character: Character) -> tuple[str, ...]:
@@ -129,13 +129,14 @@ class _Author:
         self._stage, self._units, self._options = stage, units, options
         self._bodies = [prim for prim in prims_of(stage) if is_rigid_body(prim)]
         self.notes: list[str] = []
+        self.frames: list[Usd.Prim] = []
 
     def masses(self) -> None:
         """Densities of the links that have no inertia, and a milligram for those that have no mass."""
         weightless: list[Usd.Prim] = []
         if self._options.compiled is not None:
             weightless = _author_values(self._stage, self._units, self._options.compiled, self._keeps_mass)
-        frames = [prim for prim in self._bodies if prim in weightless or self._is_frame(prim)]
+        self.frames = frames = [prim for prim in self._bodies if prim in weightless or self._is_frame(prim)]
         if self._options.mjcf:
             _refuse_moving_frames(self._stage, frames)
         for prim in frames:

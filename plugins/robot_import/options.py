@@ -61,8 +61,14 @@ class RobotOptions:
         return self.robot.kind == MJCF
 
     def is_flexible(self, body: Usd.Prim) -> bool:
-        """Whether a pattern of flexible links names a link, whose material then gives its mass."""
-        return any(is_named(body, given.pattern) for given in self.flexible)
+        """Whether a pattern of flexible links names a link with geometry, whose material may then give its mass."""
+        from pxr import UsdGeom
+
+        shaped = any(
+            (prim.IsA(UsdGeom.Gprim) and not is_applied(prim, "MjcSiteAPI")) or prim.IsInstance()
+            for prim in carried_by(body)
+        )
+        return shaped and any(is_named(body, given.pattern) for given in self.flexible)
 
 
 def is_named(prim: Usd.Prim, pattern: str) -> bool:

@@ -69,6 +69,7 @@ class _Author:
         self._stage, self._robot, self._options = stage, robot, options
         self._units: StageUnits = units_of(robot)
         self._bodies = [prim for prim in prims_of(stage) if is_rigid_body(prim)]
+        self._frames: list[Usd.Prim] = []
         self.notes: list[str] = []
 
     def metadata(self) -> None:
@@ -97,7 +98,8 @@ class _Author:
 
     def masses(self) -> None:
         """Masses of all links, see `masses`."""
-        self.notes += author_masses(self._stage, self._units, self._options)
+        notes, self._frames = author_masses(self._stage, self._units, self._options)
+        self.notes += notes
 
     def motors(self) -> None:
         """Drives, see `robot_motors`."""
@@ -121,7 +123,16 @@ class _Author:
         flexible: set[str] = set()
         for given in self._options.flexible:
             path = f"{root.GetPath()}/CalmMaterials/{given.name}"
-            bodies = self._matching(given.pattern, self._bodies, "--flexible")
+            meant = self._matching(given.pattern, self._bodies, "--flexible")
+            bodies = [prim for prim in meant if prim not in self._frames]
+            if not bodies:
+                raise ShotError(
+                    "a link without mass is a frame, which does not bend",
+                    path=str(meant[0].GetPath()),
+                    attribute="--flexible",
+                    found=given.pattern,
+                    remedy="Name a link that has mass, or write the <inertial> of this one",
+                )
             shader = author_material(self._stage, path, given.material, self._units)
             for prim in bodies:
                 if str(prim.GetPath()) in flexible:

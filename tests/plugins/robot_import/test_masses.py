@@ -49,6 +49,15 @@ def test_bodies_without_mass_are_frames_at_their_parents(tmp_path):
 
 
 @converts
+def test_frames_do_not_bend(tmp_path):
+    (tmp_path / "robot.xml").write_text(ROBOT.format(FRAMES["site"] + FRAMES["stated"]))
+    made = import_robot(tmp_path / "robot.xml", layer=tmp_path / "robot.usda", flexible=["*[ast]*=abs"])
+    assert [body.path.split("/")[-1] for body in made.character.bodies if body.flexible] == ["post", "arm"]
+    with pytest.raises(ShotError, match="frame, which does not bend"):
+        import_robot(tmp_path / "robot.xml", layer=tmp_path / "robot.usda", flexible=["s*=abs"])
+
+
+@converts
 def test_a_body_without_mass_that_moves_and_carries_none_is_refused_as_mujoco_does(tmp_path):
     (tmp_path / "robot.xml").write_text(
         ROBOT.format('<body name="wrist"><joint name="turn"/><body name="tip"><site/></body></body>')
