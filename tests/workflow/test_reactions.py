@@ -4,7 +4,7 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.workflow.reactions import reaction_rows
-from pxr import Gf, UsdGeom
+from pxr import Gf, UsdGeom, UsdPhysics
 from small_shots import BASE, TARGET_POSITION, write_arm
 
 HALF = 0.25  # of the plate that the base stands on [m]
@@ -55,6 +55,26 @@ def test_a_small_or_a_hasty_base_would_tip(tmp_path, calmotion):
     path = write_arm(tmp_path / "arm.usda", standing(0.02))
     done = calmotion("simulate", path, "--step", "10ms", "--pre-roll", "0")
     assert done.returncode == 0 and f"{BASE} would tip over" in done.stdout
+
+
+def test_a_base_stands_on_its_wheels_too(tmp_path):
+    def edit(stage):
+        standing(0.02)(stage)
+        for y in (-0.2, 0.2):
+            wheel = UsdGeom.Sphere.Define(stage, f"/Arm/wheel{'lr'[y > 0]}")
+            wheel.CreateRadiusAttr(0.1)
+            wheel.AddTranslateOp().Set(Gf.Vec3d(0.6, y, 0.1))
+            UsdPhysics.RigidBodyAPI.Apply(wheel.GetPrim())
+            UsdPhysics.MassAPI.Apply(wheel.GetPrim()).CreateMassAttr(1e-3)
+            joint = UsdPhysics.RevoluteJoint.Define(stage, f"{wheel.GetPath()}/axle")
+            joint.CreateBody0Rel().SetTargets([BASE])
+            joint.CreateBody1Rel().SetTargets([wheel.GetPath()])
+            joint.CreateAxisAttr("Y")
+            joint.CreateLocalPos0Attr(Gf.Vec3f(0.6, y, -0.9))
+            UsdPhysics.DriveAPI.Apply(joint.GetPrim(), "angular").CreateTargetPositionAttr(0.0)
+
+    row, _ = rows(tmp_path, edit)
+    assert row["body"] == BASE and row["support_margin_m"] > 0.0
 
 
 def test_a_base_that_a_joint_holds_does_not_tip(tmp_path):

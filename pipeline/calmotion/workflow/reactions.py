@@ -25,9 +25,9 @@ def reaction_rows(character: Character, motion: Motion) -> list[dict[str, Any]]:
     """For each joint to the world, the largest force and moment on the robot during the shot.
 
     A base that no joint of the shot holds, and that is the lowest part of the robot, may simply stand on the ground:
-    `support_margin_m` is then how far the centre of pressure stays inside of the convex outline on which it stands;
-    negative where the base tips over. The ground is level. It is None where the base does not stand, and
-    `center_of_pressure_m` is where it is least, in world axes.
+    `support_margin_m` is then how far the centre of pressure stays inside of the convex outline on which it stands,
+    with wheels and the like that stay in their places; negative where it tips over. The ground is level. It is None
+    where the base does not stand, and `center_of_pressure_m` is where it is least, in world axes.
     """
     if motion.joint_forces is None or motion.joint_moments is None:
         return []
@@ -54,17 +54,20 @@ def reaction_rows(character: Character, motion: Motion) -> list[dict[str, Any]]:
 def _standing(character: Character, motion: Motion, base: int, forces: Array, moments: Array) -> dict[str, Any]:
     """The last three entries of a row, of a base with the frame of its joint; forces and moments of shape [T, 3]."""
     weight = float(np.linalg.norm(character.gravity))
-    still = np.ptp(motion.positions[:, base], axis=0).max() < _STILL
-    if weight == 0.0 or not still or len(forces) == 0:
+    still = np.ptp(motion.positions, axis=0).max(axis=1) < _STILL
+    if weight == 0.0 or not still[base] or len(forces) == 0:
         return {}
     up = -character.gravity / weight
     clouds = [points_of(body, body.rest) for body in character.bodies]
     lowest, points = [float((cloud @ up).min()) for cloud in clouds if len(cloud)], clouds[base]
     if not len(points):
         return {}
-    sole, ground = sole_of(points, up)
-    if min(lowest) < ground - STANDS * float(np.ptp(points, axis=0).max()):
+    _, ground = sole_of(points, up)
+    slack = STANDS * float(np.ptp(points, axis=0).max())
+    if min(lowest) < ground - slack:
         return {}
+    points = np.concatenate([cloud for cloud, stays in zip(clouds, still, strict=True) if stays])
+    sole = points[points @ up <= ground + slack]
     lift = forces @ up
     if lift.min() <= 0.0:
         return {}  # it is pulled down, and nothing stands like this
