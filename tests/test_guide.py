@@ -6,7 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import calmotion.cli as shared
 import pytest
+from calmotion.host import Operator, Outcome, RunContext
+from calmotion.model import Result
+from calmotion.model.run import RunSettings, Source
+from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.testing import check_plugin, derivative_error, host_with, run_operator, small_shot
 
 GUIDE = Path(__file__).resolve().parents[1] / "docs" / "writing_a_plugin.md"
 INTERFACE = GUIDE.parent / "reference" / "plugins.md"
@@ -18,8 +24,6 @@ def commands() -> str:
 
 
 def test_the_guide_names_what_there_is(calmotion):
-    from calmotion.host import Operator, RunContext
-
     text = INTERFACE.read_text()
     for name in ("idname", "label", "requires", "uses", "provides", "properties", "poll", "execute"):
         assert f"`{name}" in text and hasattr(Operator, name)
@@ -32,8 +36,6 @@ def test_the_guide_names_what_there_is(calmotion):
 
 
 def test_the_command_of_the_guide_runs(calmotion, make_plugin, monkeypatch):
-    import calmotion.cli as shared
-
     page = INTERFACE.read_text().split("## A command of the command line")[1].split("\n## ")[0]
     names = re.findall(r"`(\w+)", page.split("| --- | --- |")[1].split("\n\n")[0])
     assert len(names) > 15 and set(names) - {"arguments", "console", "report"} <= set(shared.__all__) | {"show"}
@@ -48,12 +50,6 @@ def test_the_command_of_the_guide_runs(calmotion, make_plugin, monkeypatch):
 
 
 def test_limits_and_residuals_of_plugins_count_in_a_search(make_plugin, repository):
-    from calmotion.host import Outcome
-    from calmotion.model import Result
-    from calmotion.model.run import RunSettings, Source
-    from calmotion.simulation.compiled_shot import compile_shot
-    from calmotion.testing import check_plugin, derivative_error, host_with, run_operator, small_shot
-
     sources = re.findall(r"```python\n(.*?)```", (GUIDE.parent / "three_plugins.md").read_text(), re.DOTALL)
     folders = [make_plugin(*plugin) for plugin in zip(("soft_start", "slow_target"), sources, strict=False)]
     assert [check_plugin(folder) for folder in folders] == [[], []]

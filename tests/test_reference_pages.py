@@ -8,6 +8,9 @@ import tomllib
 
 import pytest
 import yaml
+from calmotion.cli.main import build_parser
+from calmotion.version import __version__
+from pxr import Sdf
 
 # exponents of mass, length and time of each row of the table of units
 DIMENSIONS = {
@@ -32,8 +35,6 @@ def test_the_factors_between_units_follow_from_their_dimensions(repository):
 
 
 def test_advice_on_attributes_is_about_attributes_there_are(repository):
-    from pxr import Sdf
-
     layer = Sdf.Layer.FindOrOpen(str(repository / "usd_schemas" / "calmotion" / "schema.usda"))
     there = {attribute.name for prim in layer.rootPrims for attribute in prim.attributes}
     advice = tomllib.loads((repository / "docs" / "reference" / "schema_use.toml").read_text())
@@ -51,8 +52,6 @@ def test_the_page_of_schemas_has_units_defaults_and_advice(repository):
 
 
 def test_every_file_that_names_the_version_names_this_one(repository):
-    from calmotion.version import __version__
-
     manifests = [*repository.glob("plugins/*/plugin.toml"), *repository.glob("plugins/*/blender_manifest.toml")]
     assert len(manifests) > 15
     named = {path.parent.name: tomllib.loads(path.read_text())["version"] for path in manifests}
@@ -79,8 +78,6 @@ def test_every_file_that_names_versions_of_python_names_the_supported_ones(repos
 
 
 def test_the_citation_names_this_version_and_the_paper(repository):
-    from calmotion.version import __version__
-
     citation = yaml.safe_load((repository / "CITATION.cff").read_text())
     assert citation["cff-version"] == "1.2.0" and citation["version"] == __version__
     assert {"title", "message", "authors", "license"} <= set(citation)
@@ -88,8 +85,6 @@ def test_the_citation_names_this_version_and_the_paper(repository):
 
 
 def test_the_container_runs_commands_and_extras_there_are(repository):
-    from calmotion.cli.main import build_parser
-
     text = (repository / "Containerfile").read_text().replace("\\\n", "")
     command = json.loads(re.search(r"^CMD (\[.*\])$", text, re.MULTILINE)[1])
     assert build_parser().parse_args(command[1:]).output == "build"

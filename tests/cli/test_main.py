@@ -12,7 +12,7 @@ import pytest
 import synthetic
 from calmotion.cli.main import main
 from calmotion.errors import ShotError
-from calmotion.host.discovery import find_in_folder
+from calmotion.host.discovery import Location, find_in_folder
 from calmotion.host.registry import Host
 from calmotion.model import Animation, Character, InputLayer, ModeTable, Provenance, Result
 from calmotion.model.outputs import WrittenLayer
@@ -374,8 +374,6 @@ def test_plugins_check_names_what_is_wrong(calmotion, make_plugin, repository):
 
 
 def test_a_host_without_a_reader_names_the_plugins_that_failed(make_plugin, run, monkeypatch):
-    from calmotion.host.discovery import Location
-
     host = Host()
     host.add(Location(make_plugin("reader", "", version="one"), "test"))
     monkeypatch.setattr(calmotion.workflow.shot, "open_host", lambda folders: host)

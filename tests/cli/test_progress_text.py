@@ -1,7 +1,12 @@
 """The remaining time in the display of progress."""
 
 import pytest
+from calmotion.cli import progress
 from calmotion.cli.bars import time_left
+from calmotion.cli.progress import ProgressDisplay
+from calmotion.host import OperatorResult, Outcome
+from calmotion.host.operators import Record
+from calmotion.workflow.run import Progress
 
 
 @pytest.mark.parametrize(
@@ -17,10 +22,6 @@ def test_the_remaining_time_has_the_unit_of_its_size(seconds, text):
 
 @pytest.mark.parametrize("verbose", [False, True])
 def test_details_are_for_those_who_ask(verbose, capsys):
-    from calmotion.cli.progress import ProgressDisplay
-    from calmotion.host import OperatorResult, Outcome
-    from calmotion.host.operators import Record
-
     records = (Record("detail", "413 points"), Record("info", "no target"))
     ProgressDisplay(False, verbose=verbose).done(OperatorResult("a.b", "Make it", "a", Outcome.DONE, records=records))
     told = capsys.readouterr().err
@@ -28,9 +29,6 @@ def test_details_are_for_those_who_ask(verbose, capsys):
 
 
 def test_a_log_tells_how_long_a_stage_takes_and_what_it_does_where_that_takes_long(capsys, monkeypatch):
-    from calmotion.cli import progress
-    from calmotion.workflow.run import Progress
-
     clock = iter([0.0, 1.0, 2.0, 30.0])
     monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
     with progress.ProgressDisplay(False) as display:

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from calmotion.workflow.results import SimulationResult
 from one_hinge import ONE_HINGE
 
 
@@ -40,8 +41,6 @@ def test_each_run_has_its_progress(calmotion, shot, command):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_strictly_a_missed_tolerance_is_a_failure(calmotion, shot, command, monkeypatch):
-    from calmotion.workflow.results import SimulationResult
-
     report = SimulationResult.report
     monkeypatch.setattr(SimulationResult, "report", lambda result: report(result) | {"tolerance_kept": False})
     words = (command, shot, "--step", "10ms", *COMMANDS[command], "--json")

@@ -6,6 +6,8 @@ import re
 import shlex
 
 import pytest
+from calmotion.cli.commands.table import Absent, all_commands
+from calmotion.cli.main import build_parser
 from floors import FLOORS, REQUIRED_PLUGINS
 from pages import PACKAGE, PAGES, REPOSITORY, name_of, needs_every_plugin
 
@@ -106,9 +108,6 @@ def test_every_operator_on_a_page_exists(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_calmotion_command_on_a_page_is_accepted(page, capsys):
-    from calmotion.cli.commands.table import Absent, all_commands
-    from calmotion.cli.main import build_parser
-
     parser, commands = build_parser(), all_commands()
     for line in re.findall(r"^ {4}(calmotion [a-z].+)$", page.read_text(), re.MULTILINE):
         if "  " in line:  # a table of commands, in columns

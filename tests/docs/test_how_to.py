@@ -5,9 +5,12 @@ import re
 import shutil
 import subprocess
 
+import calmotion as cm
 import numpy as np
 import pytest
+from calmotion.support import rotation_from_quaternion
 from followed import DOCS, blocks, follow, script
+from pxr import Usd
 
 
 @pytest.mark.long
@@ -138,9 +141,6 @@ def test_offline_and_live_play_the_same_robot(tmp_path):
 
 @pytest.mark.long
 def test_a_phone_shows_the_modulus_of_an_arm(tmp_path):
-    import calmotion as cm
-    from calmotion.support import rotation_from_quaternion
-
     work = tmp_path / "work"
     work.mkdir()
     robot, shot = re.findall(r"<<'END'\n(.*?)END\n", script("calibration"), re.DOTALL)[:2]
@@ -161,8 +161,6 @@ def test_a_phone_shows_the_modulus_of_an_arm(tmp_path):
     table = np.column_stack([times, own])[20:-20:5]
     np.savetxt(work / "take.csv", table, delimiter=",", header=",".join(f'"{name}"' for name in names), comments="")
     follow("how_to/phone", tmp_path)
-    from pxr import Usd
-
     stage = Usd.Stage.Open(str(work / "mine.usda"))
     assert not stage.GetPrimAtPath(path)
     modulus = stage.GetPrimAtPath("/Robot/ABS").GetAttribute("physics:youngsModulus").Get()

@@ -5,6 +5,8 @@ import shlex
 from pathlib import Path
 
 import pytest
+from calmotion.cli.commands.table import all_commands
+from calmotion.cli.main import build_parser
 from followed import DOCS, script
 from pages import REPOSITORY
 
@@ -57,9 +59,6 @@ def test_a_task_of_a_newcomer_is_found_in_two_clicks_and_followed(page, front):
 
 @pytest.mark.parametrize("page", [*FOLLOWED, *OTHERS, *(f"how_to/{page}" for page in HOW_TO)])
 def test_the_commands_of_a_page_are_accepted(page, capsys):
-    from calmotion.cli.commands.table import all_commands
-    from calmotion.cli.main import build_parser
-
     text = re.sub(r"<<'END'\n.*?\nEND\n", "\n", script(page), flags=re.DOTALL)
     lines = [line for line in text.splitlines() if line.startswith("calmotion ")]
     assert len(lines) >= 2

@@ -5,8 +5,10 @@ import re
 
 import numpy as np
 import pytest
+from calmotion.usd import read_shot
 from followed import begun, blocks, errors_of, follow, needs_converters, run
 from pages import REPOSITORY
+from pxr import Usd, UsdGeom
 
 
 @pytest.mark.long
@@ -25,8 +27,6 @@ def test_a_public_recording_sticks_as_its_authors_say(tmp_path, shared_data):
     record = shared_data / "measured" / "xl330_pendulum" / "sin_sin_kp100"
     if not record.with_suffix(".csv").is_file():
         pytest.skip("the records of real machines are not there")
-    from calmotion.usd import read_shot
-
     track = read_shot(str(record.with_suffix(".usda")))[1].tracks[0]
     times, angles = np.loadtxt(record.with_suffix(".csv"), delimiter=",", skiprows=1, unpack=True)
     asked = np.interp(times, track.times, track.values)
@@ -66,8 +66,6 @@ def test_a_robot_of_animated_parts(tmp_path):
     printed = follow("animated_parts", tmp_path)
     before, after = errors_of(printed)[0]
     assert after < 0.1 * before
-    from pxr import Usd, UsdGeom
-
     places = []
     for name in ("lamp.usda", "calm_root.usda"):
         stage = Usd.Stage.Open(str(tmp_path / "work" / name))
@@ -90,8 +88,6 @@ def test_a_calibration(tmp_path):
     pytest.importorskip("calmotion_plugins.calibration")
     printed = follow("calibration", tmp_path)
     assert errors_of(printed)
-    from pxr import Usd
-
     stage = Usd.Stage.Open(str(tmp_path / "work" / "mine_root.usda"))
     modulus = stage.GetPrimAtPath("/Robot/ABS").GetAttribute("physics:youngsModulus").Get()
     assert modulus == pytest.approx(1.6e9, rel=0.01)  # three standard deviations

@@ -5,6 +5,7 @@ import ast
 import re
 
 import pytest
+from calmotion.cli.main import build_parser
 from pages import PACKAGE, PAGES, REPOSITORY, name_of, needs_every_plugin
 from prose import messages, sentences, sentences_through_code
 
@@ -63,8 +64,6 @@ def test_tables_and_lists_of_a_page_end_where_they_seem_to(page):
 
 
 def test_the_sentences_of_the_help_are_short():
-    from calmotion.cli.main import build_parser
-
     parsers, long = [build_parser()], []
     while parsers:
         parser = parsers.pop()
@@ -88,8 +87,6 @@ def test_the_messages_of_the_program_are_short_and_plain():
 
 def test_tolerance_is_the_accuracy_of_the_simulation_and_goal_the_error_that_is_accepted():
     """In every command: another word is needed for another thing (`--allowed-loss` of `export`)."""
-    from calmotion.cli.main import build_parser
-
     parsers, meanings = [build_parser()], {"--tolerance": set(), "--goal": set()}
     while parsers:
         for action in parsers.pop()._actions:

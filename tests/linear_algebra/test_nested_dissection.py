@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from calmotion.linear_algebra.nested_dissection import dissect
-from scipy.sparse import block_diag, csr_matrix
+from scipy.sparse import block_diag, csr_matrix, identity
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
 
 
 def grid_graph(*counts):
     """Neighbours in a box of points, diagonals included, and the points."""
     points = np.stack(np.meshgrid(*(np.arange(c) for c in counts), indexing="ij"), axis=-1).reshape(-1, len(counts))
-    from scipy.spatial import cKDTree
-
     pairs = cKDTree(points).query_pairs(1.01 * np.sqrt(len(counts)), output_type="ndarray")
     i, j = np.concatenate([pairs, pairs[:, ::-1]]).T
     return csr_matrix((np.ones(len(i)), (i, j)), shape=(len(points), len(points))), points.astype(float)
@@ -89,9 +89,6 @@ def test_fill_is_far_less_than_without_and_close_to_that_of_minimum_degree(with_
     cut = dissect(graph, points if with_points else None)
     n = graph.shape[0]
     plain = fill(graph, type(cut)(np.arange(n), np.array([0, n]), np.array([-1])))
-    from scipy.sparse import identity
-    from scipy.sparse.linalg import splu
-
     degree = splu(
         (graph * -1.0 + 50.0 * identity(n)).tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
     ).L.nnz

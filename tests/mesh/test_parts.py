@@ -13,6 +13,7 @@ from calmotion.reduction.damping import ratio_of_parts
 from calmotion.reduction.discretization_error import frequency_errors
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.elements.elastic_forms import LAW_ORDER, GradientRule, lame_constants, strain_gram
+from scipy.optimize import brentq
 
 
 def part(mesh, name):
@@ -193,8 +194,6 @@ def test_a_bar_of_two_lengths_vibrates_as_a_stepped_beam(helpers):
 
 def stepped_beam(step, stiff, heavy):
     """First frequency [Hz] of a clamped beam of two lengths: by Euler and Bernoulli, continuous at the step."""
-    from scipy.optimize import brentq
-
     bending, line = MODULUS * WIDTH**4 / 12.0, DENSITY * WIDTH**2
 
     def rows(x, k):

@@ -6,6 +6,8 @@ import calmotion.multibody as mb
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
+from calmotion.multibody.model.model import body_anchors, rigid_body
+from calmotion.multibody.model.topology import span_tree
 
 STEP = 2e-3
 
@@ -86,8 +88,6 @@ def test_a_body_that_no_joint_leads_to_is_refused():
 
 def test_a_reduced_body_with_missing_markers_is_refused():
     from arms import chain
-    from calmotion.multibody.model.model import body_anchors, rigid_body
-    from calmotion.multibody.model.topology import span_tree
 
     character = chain(1)
     tree = span_tree(character)

@@ -5,6 +5,7 @@ import pytest
 from boxes import quadratic_shapes
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.inertia import inertia_integrals
+from scipy.spatial.transform import Rotation
 
 RELATIVE = 1e-12
 
@@ -19,8 +20,6 @@ def axial(B):
 
 
 def rotation(vector):
-    from scipy.spatial.transform import Rotation
-
     return Rotation.from_rotvec(vector).as_matrix()
 
 

@@ -6,6 +6,8 @@ from calmotion.mesh.tetrahedra import oriented_tets
 from calmotion.model import ElasticMaterial
 from calmotion.reduction.basis.natural_modes import clamped_modes, vector_mass
 from calmotion.reduction.elements.assembly import assemble
+from scipy.sparse import coo_matrix
+from scipy.spatial import cKDTree
 
 STEEL = ElasticMaterial("/block", 2e11, 0.3, 2900.0)
 
@@ -22,8 +24,6 @@ def read_deck(path):
 
 
 def read_matrix(path, n):
-    from scipy.sparse import coo_matrix
-
     data = np.loadtxt(path)
     rows, columns = data[:, 0].astype(int) - 1, data[:, 1].astype(int) - 1
     return coo_matrix((data[:, 2], (rows, columns)), shape=(n, n)).tocsr()
@@ -35,8 +35,6 @@ def block(shared_data):
     folder = shared_data / "fem" / "exudyn_abaqus"
     if not folder.is_dir():
         pytest.skip("no Abaqus decks here")
-    from scipy.spatial import cKDTree
-
     nodes, elements = read_deck(folder / "blockC3D10.inp")
     corners, number = np.unique(elements[:, :4], return_inverse=True)
     points = nodes[corners]

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from boxes import box_tets
 from calmotion.model import ElasticMaterial
+from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.statics.equilibrium import equilibrium
 from full_order import FullOrder
 from turning_beam import TurningBeam
 
@@ -84,10 +87,6 @@ def test_a_tip_load_deflects_it_equally(law):
     tip = (arm.full.statics(arm.root, loads) - arm.full.nodes)[arm.tip]
     assert tip[2] > 0.2
     reduced = arm.reduced(law)
-    from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
-    from calmotion.multibody.integrators.workspace import Workspace
-    from calmotion.multibody.statics.equilibrium import equilibrium
-
     # the load as the weight of the payload, whose own inertia does not matter at rest; the arm weighs nothing
     system = reduced.model.system
     system.gravity[:] = (0.0, 0.0, 90.0 / PAYLOAD)

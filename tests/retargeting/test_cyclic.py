@@ -8,6 +8,7 @@ from calmotion import ShotError
 from calmotion.model import Animation, FreeTrack, Track
 from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
+from calmotion.multibody.sensitivity import periodic
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
@@ -119,8 +120,6 @@ def test_whole_revolutions_of_a_cyclic_shot_are_not_a_jump(looping, dance, bodie
 
 
 def test_a_periodic_motion_that_is_not_found_has_a_remedy(looping, dance, bodies, monkeypatch):
-    from calmotion.multibody.sensitivity import periodic
-
     monkeypatch.setattr(periodic, "LIMIT", 1)
     for job in (simulate_shot, optimize_shot):
         with pytest.raises(ShotError, match="no periodic motion") as error:

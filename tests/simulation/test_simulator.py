@@ -8,6 +8,7 @@ from arms import chain, compiled
 from calmotion.model.motor import Rotor
 from calmotion.model.run import RunSettings
 from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.model.model import with_damping
 from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
@@ -62,8 +63,6 @@ def test_derivatives_of_servos_with_delayed_commands_match_differences():
 
 
 def test_the_cycles_of_a_changed_robot_start_near_those_of_this_one(arm, animation, bodies):
-    from calmotion.multibody.model.model import with_damping
-
     character, animation = looped(arm, animation)
     prepared = prepare(compile_shot(character, animation, bodies), RunSettings(step=1 / 240))
     curves = sample_curves(animation.tracks, prepared.grid)

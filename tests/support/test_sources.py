@@ -1,5 +1,6 @@
 """Hashes of sources: they change with every module that is imported, directly or not."""
 
+import calmotion
 import pytest
 from calmotion.support.caching.bundled_kernels import PACKAGE, digest_of, source_digest, with_imports
 
@@ -41,8 +42,6 @@ def test_a_hash_changes_with_content_and_name(package):
 def test_the_digest_of_a_room_is_that_of_its_sources():
     """A digest of nothing would let caches outlive the code that made them."""
     from pathlib import Path
-
-    import calmotion
 
     package = Path(calmotion.__file__).parent
     assert PACKAGE == package

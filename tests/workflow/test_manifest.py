@@ -166,8 +166,6 @@ def test_findings_of_the_strict_inspection_are_refused(result):
     text = shot.read_text().replace("rel physics:body1 = </Robot/Link>", "rel physics:body1 = </Robot/Gone>")
     shot.write_text(text)
     manifest = json.loads(result.read_text())
-    from calmotion.workflow.manifest import sha256_of
-
     manifest["inputs"][0]["sha256"] = sha256_of(shot)
     result.write_text(json.dumps(manifest))
     assert any("Gone" in str(error) for error in cm.publishing_problems(result))

@@ -13,15 +13,20 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from calmotion.errors import ShotError
-from calmotion.model.outputs import ERROR
+from calmotion.model import Character, Provenance
+from calmotion.model.outputs import ERROR, CsvFile, Figures, Recording, Video, WrittenLayer
+from calmotion.model.run import OutputPaths, Source
 from calmotion.support.files import is_special, write_text
 from calmotion.version import __version__
-
-if TYPE_CHECKING:
-    from calmotion.workflow.results import SimulationResult
+from calmotion.workflow.commands import inspect
+from calmotion.workflow.outputs import refuse_overwriting
+from calmotion.workflow.report import plain
+from calmotion.workflow.results import SimulationResult
+from calmotion.workflow.run import no_input
+from calmotion.workflow.shot import Shot
 
 
 def publishing_problems(
@@ -71,9 +76,6 @@ def _of_verdict(verdict: dict[str, Any], manifest: dict[str, Any], path: str) ->
 
 def _of_shot(shot: str, plugins: Sequence[str]) -> list[ShotError]:
     """The errors that `inspect --strict` finds."""
-    from calmotion.workflow.commands import inspect
-    from calmotion.workflow.shot import Shot
-
     inspection = inspect(Shot(shot, plugins=plugins), strict=True)
     problems = [problem.error for problem in inspection.problems]
     findings = inspection.findings
@@ -103,9 +105,6 @@ def manifest_of(result: SimulationResult, folder: str | os.PathLike[str]) -> dic
     Args:
         result: Of `simulate` or `optimize`.
     """
-    from calmotion.model import Provenance
-    from calmotion.model.run import Source
-
     outcome = result.outcome
     source, provenance = outcome.require(Source), outcome.require(Provenance)
     return {
@@ -144,9 +143,6 @@ def origin_of_run(result: SimulationResult) -> dict[str, Any]:
 
 def _request(result: SimulationResult) -> dict[str, Any]:
     """What the user asked for."""
-    from calmotion.model.run import Source
-    from calmotion.workflow.report import plain
-
     source = result.outcome.require(Source)
     return {
         **{name: value for name, value in asdict(source.settings).items() if value is not None},
@@ -163,9 +159,6 @@ def write_manifest(result: SimulationResult, path: str | os.PathLike[str]) -> st
         SettingError: The file is read as the shot, or is another output of the result.
         ShotError: It cannot be written.
     """
-    from calmotion.workflow.outputs import refuse_overwriting
-    from calmotion.workflow.run import no_input
-
     no_input(result.outcome, path)
     refuse_overwriting({}, {role: file for file, role in _outputs(result)} | {"manifest": os.fspath(path)})
     content = json.dumps(manifest_of(result, Path(path).parent), indent=2, allow_nan=False) + "\n"
@@ -258,8 +251,6 @@ def _named(path: str, folder: str | os.PathLike[str]) -> str:
 
 def _inputs(result: SimulationResult) -> Iterator[tuple[str, str, str | None]]:
     """Path, role and hash of each file that the result depends on; layers were hashed when they were read."""
-    from calmotion.model import Character, Provenance
-
     provenance, character = result.outcome.require(Provenance), result.outcome.require(Character)
     folder = os.path.dirname(os.path.realpath(provenance.shot))
     for number, layer in enumerate(provenance.layers):
@@ -274,9 +265,6 @@ def _inputs(result: SimulationResult) -> Iterator[tuple[str, str, str | None]]:
 
 
 def _outputs(result: SimulationResult) -> Iterator[tuple[str, str]]:
-    from calmotion.model.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
-    from calmotion.model.run import OutputPaths
-
     get = result.outcome.run.get
     if (layer := get(WrittenLayer)) is not None:
         yield layer.layer, LAYER

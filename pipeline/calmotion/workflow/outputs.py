@@ -10,6 +10,7 @@ from calmotion.model import Character, Provenance
 from calmotion.model.outputs import CsvFile, Figures, HtmlPage, PageContent, Recording, Video, WrittenLayer
 from calmotion.model.run import OutputPaths
 from calmotion.support.files import try_writing
+from calmotion.usd.writing.root import root_path
 from calmotion.workflow.problems import value_of
 
 _NAMES = (("-o", "layer"), ("--csv", "csv"), ("--rrd", "rrd"), ("--figures", "figures"), ("--video", "video"),
@@ -62,8 +63,6 @@ def refuse_overwriting(inputs: Mapping[str, str], files: Mapping[str, str]) -> N
         inputs: Files that are read, by what they are: `the shot`.
         files: Files that are written, by their options.
     """
-    from calmotion.usd.writing.root import root_path
-
     options: dict[str, str] = {}
     if "-o" in files:
         options[_on_all_systems(root_path(files["-o"]))] = _ROOT

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,13 +22,12 @@ from calmotion.model.outputs import (
     Video,
     WrittenLayer,
 )
-from calmotion.model.run import OutputPaths
+from calmotion.model.run import OutputPaths, Source
 from calmotion.model.table import columns, read_only
+from calmotion.workflow.problems import Problem
+from calmotion.workflow.report import plain, run_report, verdict_of
 from calmotion.workflow.run import Outcome, again, no_input
-
-if TYPE_CHECKING:
-    from calmotion.workflow.problems import Problem
-    from calmotion.workflow.shot import Path, Shot
+from calmotion.workflow.shot import Path, Shot
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,14 +173,10 @@ class SimulationResult:
     @property
     def tolerance_kept(self) -> bool:
         """Whether the error of the simulation, estimated or measured by `verify`, is within the tolerance."""
-        from calmotion.workflow.report import verdict_of
-
         return verdict_of(self._outcome.run, self.result).kept
 
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints: plain values, keys as in the USD contract."""
-        from calmotion.workflow.report import plain, run_report
-
         report: dict[str, Any] = plain(
             run_report(self._outcome.run, self._character, self.result, self._command, self._outcome.total_wall_s)
         )
@@ -277,8 +272,6 @@ class SimulationResult:
             RunError: The finer run failed.
         """
         from dataclasses import replace
-
-        from calmotion.model.run import Source
 
         return again(self._outcome, Verification, replace(self._outcome.require(Source), verify=True))
 

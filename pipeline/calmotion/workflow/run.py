@@ -8,10 +8,12 @@ from typing import Any, TypeVar
 
 from calmotion.errors import ShotError
 from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, merge, nearest
-from calmotion.model import Animation, Character, Provenance
+from calmotion.model import Animation, Character, MotorTracks, Provenance
 from calmotion.model.run import INTEGRATORS, SHAPERS, OutputPaths, Source
+from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.support import interrupts
 from calmotion.support.foreign_files import remedy_for
+from calmotion.tolerance.reduced_bodies import ConvergedReduction
 from calmotion.workflow.outputs import (
     files_of,
     prepare_outputs,
@@ -189,9 +191,6 @@ def compiled_run(shot: Shot, source: Source, settings: Settings | None = None, h
     Raises:
         RunError: It cannot be compiled.
     """
-    from calmotion.simulation.compiled_shot import CompiledShot
-    from calmotion.tolerance.reduced_bodies import ConvergedReduction
-
     outcome = carry_out(
         shot, "simulate", wanted=(Character, Animation, Provenance, CompiledShot), optional=(ConvergedReduction,),
         source=source, settings=settings, hooks=hooks,
@@ -267,8 +266,6 @@ def _refuse_unknown_methods(source: Source) -> None:
 
 def _refuse_unreadable_motion(source: Source, host: Host) -> None:
     """Refuse a motion that no plugin reads, before anything costly."""
-    from calmotion.model import MotorTracks
-
     readers = host.providers(MotorTracks)
     if source.motion is not None and all(cls.poll({Source: source}) is not None for cls in readers):
         raise SettingError(

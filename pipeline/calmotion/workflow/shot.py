@@ -11,6 +11,8 @@ from typing import TypeVar
 from calmotion.host import Host, Reuse, Settings, merge, open_host, read_assignment, read_settings_file
 from calmotion.model import Animation, Character, Provenance
 from calmotion.model.run import OutputPaths, Source
+from calmotion.usd import stages
+from calmotion.usd.writing.root import root_path
 from calmotion.workflow.problems import problems_of, value_of
 
 T = TypeVar("T")
@@ -188,9 +190,6 @@ def read_settings(given: Given) -> Settings:
 
 def with_shot(path: str) -> str:
     """A USD file with the shot in it: of a layer of results, the root layer beside it."""
-    from calmotion.usd import stages
-    from calmotion.usd.writing.root import root_path
-
     if os.path.isfile(path) and stages.role_of(stages.open_layer(path)) in stages.RESULTS:
         root = root_path(path)
         if os.path.isfile(root):

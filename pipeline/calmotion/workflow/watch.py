@@ -6,18 +6,29 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from calmotion.host import Operator
 from calmotion.model import Animation, Character, FEMeshes, ModelChoices, Provenance, Result, Track
+from calmotion.model.curves import held_curve
 from calmotion.model.model_choice import run_settings, simplified_character
 from calmotion.model.run import Source
+from calmotion.model.tolerance import tolerance_of
+from calmotion.reduction.cache import cache_key
+from calmotion.reduction.load_envelope import LoadEnvelope
+from calmotion.simulation.body_reduction import load_envelopes
+from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
+from calmotion.tolerance.reduced_bodies import (
+    DIRECTIONS,
+    SUBSPACES,
+    TIME_STEP,
+    ConvergedReduction,
+    ReducedBodies,
+    RunMemory,
+)
+from calmotion.tolerance.reduction import SHARE
+from calmotion.workflow.results import SimulationResult
 from calmotion.workflow.shot import Shot
-
-if TYPE_CHECKING:
-    from calmotion.reduction.load_envelope import LoadEnvelope
-    from calmotion.tolerance.reduced_bodies import RunMemory
-    from calmotion.workflow.results import SimulationResult
 
 SMALL = 0.05  # of the largest component of a load: a component of that size may appear
 _POLL = 0.1  # time between two looks at the files [s]
@@ -97,9 +108,6 @@ class Watch:
 
     def _reuse(self, cls: type[Operator], data: Mapping[type, Any]) -> Sequence[object] | None:
         """What an operator would make, where it is known from the last run."""
-        from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
-        from calmotion.tolerance.reduced_bodies import ConvergedReduction, ReducedBodies
-
         last, made = self._last, cls.provides
         if not last or Character not in data or any(kind not in last for kind in made):
             return None
@@ -123,10 +131,6 @@ class Watch:
 
     def _bodies_do(self, character: Character, data: Mapping[type, Any], reduction: Any) -> bool:
         """Whether the reduced bodies of the last run do for the motion."""
-        from calmotion.model.tolerance import tolerance_of
-        from calmotion.simulation.body_reduction import load_envelopes
-        from calmotion.tolerance.reduction import SHARE
-
         if reduction is None or reduction.loads is None or data.get(FEMeshes) is not self._last.get(FEMeshes):
             return False
         options = run_settings(data.get(Source), data.get(ModelChoices))
@@ -138,8 +142,6 @@ class Watch:
 
     def _with_last_changes(self, animation: Animation) -> Animation:
         """The animation, whose current curves have the changes that the last search found."""
-        from calmotion.model.curves import held_curve
-
         result, before = self._last.get(Result), self._last[Animation]
         if result is None or result.after is None or result.retimed is not None or not _same_times(animation, before):
             return animation
@@ -171,23 +173,17 @@ def _growth(load: LoadEnvelope, reduced: LoadEnvelope) -> float:
 
 
 def _error_of_reduction(data: Mapping[type, Any]) -> float:
-    from calmotion.tolerance.reduced_bodies import ConvergedReduction
-
     return data[ConvergedReduction].error_m if ConvergedReduction in data else 0.0
 
 
 def _memory(data: Mapping[type, Any]) -> RunMemory | None:
     """What runs with the same bodies leave to each other."""
-    from calmotion.tolerance.reduced_bodies import ConvergedReduction
-
     found: ConvergedReduction | None = data.get(ConvergedReduction)
     return None if found is None else found.memory
 
 
 def _parts(data: Mapping[type, Any]) -> list[str]:
     """What a run of a shot could take over from the one before, of those that took time."""
-    from calmotion.tolerance.reduced_bodies import DIRECTIONS, SUBSPACES, TIME_STEP
-
     if FEMeshes not in data or not data[FEMeshes].meshes:
         return []
     memory, result = _memory(data), data.get(Result)
@@ -207,8 +203,6 @@ def _same_times(one: Animation, other: Animation) -> bool:
 
 def _key(character: Character) -> str:
     """Hash of a character and of the mesh files that it names."""
-    from calmotion.reduction.cache import cache_key
-
     files = [body.flexible.mesh_file for body in character.bodies if body.flexible and body.flexible.mesh_file]
     return cache_key((character, [repr(_state(path)) for path in files]))
 

@@ -8,6 +8,7 @@ from calmotion.model.motor import Quadratic, Rotor
 from calmotion.multibody.analysis.kinematics import set_rotors, system_poses
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.model.moving_markers import pack
 from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, allocate_state
 from calmotion.multibody.motors.drives import GivingMotor, add_motors
 from particles import nonlinear, particle_system, without_rotation
@@ -19,8 +20,6 @@ TIMES = np.arange(0.0, 0.3 + H / 2, H)
 
 def moving_marker():
     """A marker that sways and turns, at all instants, shape [T, 1, 18]."""
-    from calmotion.multibody.model.moving_markers import pack
-
     s, c = np.sin(4.0 * TIMES), np.cos(4.0 * TIMES)
     axis = np.array([0.6, 0.0, 0.8])
     position, velocity = np.outer(s, [0.1, 0.2, 0.0]), np.outer(4.0 * c, [0.1, 0.2, 0.0])

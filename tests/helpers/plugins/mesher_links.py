@@ -11,6 +11,9 @@ from calmotion.model import Body, Character, ElasticMaterial, FEMeshes, Flexible
 from calmotion.testing import run_operator
 from calmotion.tolerance.meshes import body_mesh
 from calmotion.tolerance.meshes.accurate_mesh import frames_of
+from calmotion.usd import schemas
+from calmotion.usd.reading import read_shot
+from pxr import Usd, UsdGeom
 
 PLUGIN = Path(__file__).resolve().parents[3] / "plugins" / "fe_mesher"
 REST = Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
@@ -54,11 +57,7 @@ def solid(*surfaces):
 
 def links_of(shared_data, *names):
     """Surfaces of links of a real robot, in their body frames, as the reader gives them."""
-    from calmotion.usd import schemas
-
     schemas.register()  # before USD is used, as it reads schemas once in a process
-    from pxr import Usd, UsdGeom
-
     file = shared_data / "converted" / "g1_dual_arm" / "g1_dual_arm.usda"
     if not file.is_file():
         pytest.skip("the robot is not here")
@@ -84,8 +83,6 @@ def links_of(shared_data, *names):
 
 def link_of(file, name):
     """The body of a link of a robot's file, with flexible settings, and the frames of its joints."""
-    from calmotion.usd.reading import read_shot
-
     if not file.is_file():
         pytest.skip("the robot is not here")
     character, _, _ = read_shot(str(file), still=True)

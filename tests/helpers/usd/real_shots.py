@@ -12,6 +12,7 @@ from calmotion.model.outputs import Rig
 from calmotion.model.run import OutputPaths, Source
 from calmotion.usd.dependencies import open_dependencies
 from calmotion.usd.diagnostics import quiet
+from pxr import Sdf, Tf
 
 LOADS, RIGGED, REFUSED = "loads", "loads as a robot", "refused"
 
@@ -37,8 +38,6 @@ def shots_in(folder: Path) -> list[Path]:
 
 def files_named_by(path: Path) -> list[Path]:
     """The files of the layers that a layer names, directly or not; none for one that cannot be opened."""
-    from pxr import Sdf, Tf
-
     try:
         with quiet():
             layer = Sdf.Layer.FindOrOpen(str(path))

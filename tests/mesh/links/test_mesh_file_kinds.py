@@ -6,6 +6,7 @@ import pytest
 from calmotion.errors import ShotError
 from calmotion.mesh import mesh_file as mesh_file_module
 from calmotion.mesh import quadratic as cells_module
+from calmotion.mesh.quadratic import quadratic_mesh
 from calmotion.mesh.repair import closed_solid
 from calmotion.mesh.tetrahedra import boundary_triangles, oriented_tets, surface_area, tet_volumes
 from calmotion.model import Body, ElasticMaterial, FlexibleSettings, Frame, TetGeometry
@@ -70,7 +71,6 @@ def test_volume_elements_are_cut_into_conforming_tetrahedra(tmp_path, kind, make
 
 def tets10(bulge=0.0):
     points, cells = bricks()
-    from calmotion.mesh.quadratic import quadratic_mesh
     from skfem import MeshHex
 
     cut = MeshHex(points.T, cells[:, [0, 4, 3, 1, 7, 5, 2, 6]].T).to_meshtet()

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from calmotion.mesh.tetrahedra import oriented_tets, without_unused_points
 from calmotion.model import Frame
 from calmotion.model.meshes import core_of
 from calmotion.reduction.discretization_error import frequency_errors
@@ -101,7 +102,6 @@ def test_a_printed_bar(helpers):
 
 def test_a_closed_box_of_plates(frequencies):
     """Against hexahedra of the walls, divided into tetrahedra: another mesh, of 40,000 elements in two layers."""
-    from calmotion.mesh.tetrahedra import oriented_tets, without_unused_points
     from skfem import MeshTet
 
     size, wall = np.array([0.2, 0.06, 0.04]), 2.5e-3

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from calmotion.mesh.patches import interface_patches as module
 from calmotion.mesh.patches.cut_patches import with_rims
 from calmotion.mesh.patches.interface_patches import AttachmentFrame, interface_patches
 from calmotion.mesh.patches.sphere_cut import just_reached
@@ -64,8 +65,6 @@ def test_a_measured_patch_holds_the_cheeks_and_a_given_one_what_is_within_its_ra
 def test_a_cut_patch_of_a_measured_radius_has_no_ground_and_the_area_of_the_cheeks(
     helpers, plastic, monkeypatch, cells, radius
 ):
-    from calmotion.mesh.patches import interface_patches as module
-
     monkeypatch.setattr(module, "automatic_radius", lambda *_: radius)
     across = Frame(np.zeros(3), np.array([1.0, 0.0, 1.0, 0.0]) / np.sqrt(2.0))  # its axis is x
     points, tets = fork(helpers, cells)

@@ -4,6 +4,7 @@ from calmotion.multibody.analysis.kinematics import rigid_poses, rigid_state, ta
 from calmotion.multibody.kernels.so3 import turn
 from calmotion.multibody.model.system import State
 from particles import particle_system, random_state
+from scipy.spatial.transform import Rotation
 
 
 def test_chain_reaches_where_plane_trigonometry_says():
@@ -48,7 +49,6 @@ def test_target_jacobian_matches_central_differences():
     model = dataclasses.replace(model, system=system, targets=targets)
     state = random_state(rng, system)
     J = target_jacobians(model, state.c[None], state.q[None], state.u[None])[0, 0]
-    from scipy.spatial.transform import Rotation
 
     def frames(z):
         moved = State(*[part.copy() for part in state])

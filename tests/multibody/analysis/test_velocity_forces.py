@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from calmotion.model import Rotor
 from calmotion.multibody import WORLD, Mechanism, VelocityForces, rigid_poses
+from scipy.spatial.transform import Rotation
 
 VALUES, RATES = np.array([0.3, -0.8]), np.array([1.7, -2.3])
 
@@ -22,8 +23,6 @@ def _arm(model, rotor=None):
 
 def _motion(model, values, rates):
     """Velocities of the bodies in their own axes, shape [12], by differences of poses."""
-    from scipy.spatial.transform import Rotation
-
     h = 1e-5
     c, q = rigid_poses(model, model.joint_angles(np.stack([values - h * rates, values, values + h * rates])))
     own = [Rotation.from_quat(rows, scalar_first=True) for rows in q]

@@ -5,6 +5,7 @@ import pytest
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.linear_solver.index1 import accelerations
 from calmotion.multibody.model.system import State, allocate_blocks
+from scipy.spatial.transform import Rotation
 
 
 @pytest.fixture(scope="module")
@@ -51,8 +52,6 @@ def test_baumgarte_pulls_a_gap_back(flexible_tree, moving):
 
 def gap_acceleration(system, state, b, p, change):
     """Change of the relative acceleration of a joint's markers by that of its components', positions unchanged."""
-    from scipy.spatial.transform import Rotation
-
     total = np.zeros(3)
     for sign, body, side in ((1.0, b, 1), (-1.0, p, 0)):
         R = Rotation.from_quat(np.roll(state.q[body], -1)).as_matrix()

@@ -12,6 +12,7 @@ from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import rigid_model
+from calmotion.multibody.model.system import STVK
 from calmotion.multibody.motors.drives import GivingMotor, add_motors, giving_motors
 from calmotion.multibody.runs import simulate
 from calmotion.multibody.statics.equilibrium import equilibrium
@@ -184,8 +185,6 @@ def test_ideal_motors_leave_the_system_as_it_is():
 
 
 def test_drive_that_closes_a_chain_on_a_body_of_large_deflection_is_refused():
-    from calmotion.multibody.model.system import STVK
-
     system, _ = particle_system(np.random.default_rng(0), [-1, 0], [2, 2], loops=((-1, 1, 6),))
     motors, number = [Motor(2, "/C/Loop", "angular", model="drive", position_gain=1.0)], np.array([-1, -1, 0])
     assert giving_motors(system, number, motors) == [GivingMotor(2, motors[0])]

@@ -8,6 +8,7 @@ import pytest
 import yaml
 from calmotion_plugins.controller_export import export, write_curves
 from one_hinge import HINGE, ONE_HINGE, TIP
+from scipy.interpolate import CubicSpline
 
 MOVING = "0: 0, 6: 10, 12: 30, 18: 20, 24: 0"
 
@@ -27,8 +28,6 @@ def positions(path):
 def test_the_loss_of_lines_is_the_distance_from_the_curve(shot_file, tmp_path):
     made = export(shot_file, tmp_path / "a.csv", to="csv", rate=30)
     track, times = cm.open_shot(shot_file).animation.tracks[0], np.linspace(0.0, 1.0, 3001)
-    from scipy.interpolate import CubicSpline
-
     curve, sent = CubicSpline(track.times, track.values), np.arange(31) / 30
     off = np.abs(np.interp(times, sent, curve(sent)) - curve(times)).max()
     # the tip is a tenth of a metre from the hinge

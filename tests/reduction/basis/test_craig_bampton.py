@@ -8,6 +8,7 @@ from calmotion.model import FlexibleSettings
 from calmotion.reduction.basis.craig_bampton import mode_signs, reduced_basis, rigid_patch
 from calmotion.reduction.basis.natural_modes import SparseSolver, clamped_modes, vector_mass
 from calmotion.reduction.elements.assembly import assemble
+from scipy.sparse import bmat, csr_matrix, identity
 
 TIP = np.array([0.6, 0.0, 0.0])
 
@@ -62,8 +63,6 @@ def test_a_force_at_a_patch_deflects_the_reduced_body_exactly_as_the_full_one(mo
     load = np.array([3.0, -1.0, 2.0, 0.1, 0.2, -0.3])
     reduced = basis.patch_motion[0] @ ((basis.patch_motion[0].T @ load) / basis.omega_squared)
     # the full model: nodes of the patch eliminated onto its six coordinates
-    from scipy.sparse import bmat, csr_matrix, identity
-
     inner = np.setdiff1d(np.arange(n), np.concatenate([root, tip]))
     dofs = (3 * inner[:, None] + np.arange(3)).ravel()
     T = np.zeros((n, 3, 6))

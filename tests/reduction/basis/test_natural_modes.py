@@ -6,6 +6,7 @@ from boxes import box_tets
 from calmotion.model import ElasticMaterial
 from calmotion.reduction.basis.natural_modes import clamped_modes, lowest_modes, vector_mass
 from calmotion.reduction.elements.assembly import assemble
+from scipy.linalg import eigh
 
 
 @pytest.fixture(scope="module")
@@ -23,8 +24,6 @@ def reduced_matrices(model):
 
 
 def test_the_sparse_modes_are_those_of_the_dense_solver(model):
-    from scipy.linalg import eigh
-
     K, M = reduced_matrices(model)
     values, vectors = lowest_modes(K, M, 8)
     dense = eigh(K.toarray(), M.toarray(), eigvals_only=True, subset_by_index=(0, 7))

@@ -9,6 +9,7 @@ from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.quadratic import quadratic_nodes
 from calmotion.mesh.tetrahedra import measure_quality
 from calmotion.model import Body, FEMesh, FlexibleSettings, MassProperties
+from calmotion.reduction import reduce
 from calmotion.reduction.cache import recomputed
 from calmotion.reduction.full_models import FullModels, Member, _Room, handed_on
 from calmotion.reduction.mesh_refinement import MeshController
@@ -58,8 +59,6 @@ def test_what_decides_a_model_tells_links_apart(member, helpers, plastic):
 
 
 def test_threads_that_need_one_model_make_it_once(member, monkeypatch):
-    from calmotion.reduction import reduce
-
     made, begun, own = [], threading.Event(), reduce.full_body
 
     def slow(*args):
@@ -84,8 +83,6 @@ def softer(member):
 
 
 def test_a_factor_of_the_stiffness_needs_no_factorisation(member, monkeypatch):
-    from calmotion.reduction import reduce
-
     models = FullModels(keeps=True)
     own, made = models.of(member), reduce.full_body
     monkeypatch.setattr(reduce, "full_body", None)
@@ -101,8 +98,6 @@ def test_a_factor_of_the_stiffness_needs_no_factorisation(member, monkeypatch):
 
 
 def test_models_of_other_bodies_are_let_go(member, monkeypatch):
-    from calmotion.reduction import reduce
-
     models, other = FullModels(keeps=True), replace(member, root=0)
     kept = models.of(member)
     models.of(other)
@@ -115,8 +110,6 @@ def test_models_of_other_bodies_are_let_go(member, monkeypatch):
 
 
 def test_the_model_of_a_mesh_that_was_judged_is_left_to_one_reduction(member, monkeypatch):
-    from calmotion.reduction import reduce
-
     handed_on.clear()
     with recomputed():
         mesh = MeshController(0.02, 15_000).refined(member.mesh, member.body, member.attachments, member.root)

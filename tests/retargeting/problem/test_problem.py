@@ -4,8 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.model import WeightTrack
 from calmotion.model.run import RunSettings
 from calmotion.multibody.model.topology import span_tree
+from calmotion.retargeting.solver.limited_step import LimitedModel, ModelPoint
 from calmotion.simulation.bodies import reduce_bodies, with_elasticity
 from calmotion.simulation.body_reduction import load_envelopes
 from linkage_arm import linkage_arm, performance
@@ -103,8 +105,6 @@ def test_model_is_the_merit_to_second_order(linearized):
     at, problem = linearized
     if problem.limits is None:
         pytest.skip("there are no limits")
-    from calmotion.retargeting.solver.limited_step import LimitedModel, ModelPoint
-
     d = np.random.default_rng(3).normal(size=len(at.x))
     residuals, values = problem.jvp(d)
     way = ModelPoint(d, residuals, values)
@@ -129,8 +129,6 @@ def test_static_start_follows_the_curves(arm, bodies, animation):
 
 
 def test_weights_that_change_in_time_weigh_each_instant(arm, bodies, animation):
-    from calmotion.model import WeightTrack
-
     track = WeightTrack(1, False, np.array([0.5, 1.0]), np.array([0.0, 2.0]))
     problem = make_problem(arm, bodies, dataclasses.replace(animation, weights=(track,)))
     weights, times = problem.objective.weights, problem.grid.times

@@ -10,6 +10,7 @@ from calmotion.retargeting.solver.gauss_newton import Ends, Search, minimize
 from calmotion.retargeting.solver.limited_step import LimitedStep
 from calmotion.retargeting.solver.preconditioner import Sharpened
 from calmotion.retargeting.solver.recycling import Recycled
+from calmotion.retargeting.solver.truncated_cg import conjugate_gradients
 
 
 class Problem:
@@ -208,8 +209,6 @@ def test_products_of_one_system_precondition_the_next():
     rng = np.random.default_rng(4)
     M = rng.normal(size=(30, 30))
     H = M @ M.T + 0.1 * np.eye(30)
-    from calmotion.retargeting.solver.truncated_cg import conjugate_gradients
-
     g = rng.normal(size=30)
     first = conjugate_gradients(lambda d: H @ d, g, lambda r: r, np.inf, 1e-12, 0.0, 40)
     learned = Recycled.none(30).followed_by(first.p, first.Hp, 24)

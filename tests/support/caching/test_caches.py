@@ -11,6 +11,7 @@ from calmotion.support.caching.cache_folder import CACHES, KERNELS, MESHES, REDU
 from calmotion.support.caching.caches import clear, entries, prune, store_arrays, stored_arrays
 from calmotion.support.caching.verified_files import sealed
 from calmotion.support.files import PREFIX, _machine
+from calmotion.support.kernel_cache import KernelCacheFile
 
 
 @pytest.fixture(autouse=True)
@@ -127,8 +128,6 @@ def test_files_are_read_whatever_the_umask_is(folder):
 @pytest.mark.posix
 @pytest.mark.posix
 def test_a_kernel_that_another_user_can_write_is_never_unpickled(tmp_path):
-    from calmotion.support.kernel_cache import KernelCacheFile
-
     path = tmp_path / "kernel.nbi"
     path.write_bytes(sealed(pickle.dumps("of an attacker"), name_of(path)))
     cache = KernelCacheFile(tmp_path, "module", "kernel", "stamp", pickle.dumps, bool)

@@ -12,6 +12,7 @@ from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.tolerance.motors.backlash import sides, transmitted_efforts, with_lost_motion
 from calmotion.tolerance.motors.friction_band import with_friction_band
+from calmotion.workflow.report import lost_motion
 from linkage_arm import FORE, linkage_arm, performance
 
 FRAMES = np.arange(61) / 30.0
@@ -102,8 +103,6 @@ def test_play_of_a_crank_moves_the_hand_through_its_linkage():
 
 
 def test_report_has_reversals_and_the_way_of_each_target():
-    from calmotion.workflow.report import lost_motion
-
     shot, result = simulated(pendulum(), slow(1.2, 2.0))
     result = with_lost_motion(shot, result, OPTIONS)
     told = lost_motion(shot.character, result)

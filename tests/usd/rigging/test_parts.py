@@ -8,6 +8,7 @@ import pytest
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
 from calmotion.usd.rigging import RigOptions, rig_shot
+from calmotion.usd.writing import WriteOptions, write_result
 from performing import result_with, worst_gap
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 
@@ -312,8 +313,6 @@ def test_the_distance_that_is_told_is_that_of_the_written_robot(tmp_path):
 
 
 def test_results_that_are_baked_move_the_parts(tmp_path):
-    from calmotion.usd.writing import WriteOptions, write_result
-
     _, output = rigged(Scene(tmp_path / "arm.usda", 0.01).arm(fore="mirrored").saved())
     character, animation, provenance = read_shot(str(output))
     result = result_with(character, animation, {1: 0.1, 3: 0.01})

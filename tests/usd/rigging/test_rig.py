@@ -9,6 +9,7 @@ from calmotion import ShotError
 from calmotion.usd import gf
 from calmotion.usd.reading import read_shot
 from calmotion.usd.rigging import RigOptions, rig_shot
+from calmotion.usd.writing import write_result
 from performing import followed, result_with
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
@@ -124,8 +125,6 @@ def test_the_requested_links_are_flexible(tmp_path):
 
 
 def test_results_go_back_to_the_skeleton(tmp_path):
-    from calmotion.usd.writing import write_result
-
     shot = skinned(tmp_path / "worm.usda")
     rig_shot(str(shot), str(tmp_path / "rig.usda"))
     before = {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in tmp_path.iterdir()}

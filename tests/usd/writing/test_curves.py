@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from calmotion.model import Animation, Motor, MotorCurve, Track
+from calmotion.model.curves import held_curve, interpolate
 from calmotion.usd.clock import Clock
 from calmotion.usd.writing.curves import NEAR, author_curves, curve_values, sample_times
 from pxr import Sdf
@@ -33,8 +34,6 @@ def test_samples_are_at_least_as_dense_as_requested_and_contain_the_frames(rate,
 
 
 def test_between_frames_a_curve_is_what_its_frames_are_read_back_as():
-    from calmotion.model.curves import interpolate
-
     times = sample_times(FRAMES, 240.0)
     read_back = interpolate(Track(FRAMES, CURVE.frame_values), 0.5)
     assert np.abs(curve_values(ANIMATION, CURVE, times, False) - read_back(times)).max() < 1e-14
@@ -43,8 +42,6 @@ def test_between_frames_a_curve_is_what_its_frames_are_read_back_as():
 
 def test_what_is_authored_between_frames_is_kept_where_the_frames_alone_would_lose_it():
     """The curvature of the track jumps at 0.1 s, between two frames, and in the rest it is smooth."""
-    from calmotion.model.curves import held_curve
-
     times = np.linspace(0.0, 0.5, 241)
     kinked = Track(times, 0.1 * times**2 + 20.0 * np.maximum(times - 0.1, 0.0) ** 2)
     smooth = Track(times, np.sin(times))

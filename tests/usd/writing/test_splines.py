@@ -12,6 +12,7 @@ from calmotion.usd.reading.motors.tracks import read_track
 from calmotion.usd.units import StageUnits
 from calmotion.usd.writing.splines import author_splines, hermite
 from pxr import Sdf, Usd
+from scipy.interpolate import CubicSpline
 
 FRAMES = np.arange(49) / 24.0
 FINE = np.linspace(0.0, 2.0, 997)
@@ -21,8 +22,6 @@ KNOTS = FRAMES[[0, 6, 10, 14, 30, 48]]
 
 def offset(cyclic):
     """A cubic spline with knots on a few frames."""
-    from scipy.interpolate import CubicSpline
-
     values = np.array([0.0, 0.03, -0.02, 0.05, 0.01, 0.0])
     return CubicSpline(KNOTS, values, bc_type="periodic" if cyclic else "clamped")
 

@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 
 from calmotion.arrays import Array, Indices, box_diagonal
+from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles
 from calmotion.mesh.tetrahedra import surface_area, surface_volume
 
 # Surfaces that are alike, whatever their triangles: largest relative difference of areas, volumes and moments; and
@@ -73,8 +74,6 @@ def _places(points: Array, triangles: Indices) -> Array:
 
 def _distances(places: Array, points: Array, triangles: Indices, reach: float) -> Array:
     """Distances of places to a surface [m]; infinite beyond the reach."""
-    from calmotion.mesh.surfaces.nearby_triangles import NearbyTriangles
-
     far = np.linalg.norm(NearbyTriangles(points, triangles, reach).closest(places) - places, axis=1)
     return np.where(np.isnan(far), np.inf, far)
 

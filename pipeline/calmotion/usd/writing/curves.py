@@ -7,6 +7,7 @@ from pxr import Sdf, Usd
 
 from calmotion.arrays import Array
 from calmotion.model import Animation, Character, Motor, MotorCurve, Track
+from calmotion.model.curves import held_curve, optimized_curve
 from calmotion.usd.clock import Clock
 from calmotion.usd.schemas import is_applied
 
@@ -39,8 +40,6 @@ def with_authored(times: Array, tracks: Iterable[Track]) -> Array:
         times: [s], ascending, shape [n].
         tracks: The animation of what is written.
     """
-    from calmotion.model.curves import held_curve
-
     end = float(times[-1])
     for track in tracks:
         inside = (track.times > times[0] + SAME) & (track.times < end - SAME)
@@ -65,8 +64,6 @@ def curve_values(animation: Animation, curve: MotorCurve, times: Array, cyclic: 
     """A motor's curve [rad or m] at times within the shot."""
     if times is animation.frame_times:
         return curve.frame_values
-    from calmotion.model.curves import optimized_curve
-
     return optimized_curve(animation, curve, cyclic)(times, 0)
 
 

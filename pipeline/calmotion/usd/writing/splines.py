@@ -5,6 +5,7 @@ from pxr import Sdf, Ts
 
 from calmotion.arrays import Array
 from calmotion.model import Animation, Character, MotorCurve
+from calmotion.model.curves import optimized_curve
 from calmotion.usd.clock import Clock
 from calmotion.usd.writing.curves import attribute_spec
 
@@ -17,8 +18,6 @@ def hermite(animation: Animation, curve: MotorCurve, cyclic: bool) -> tuple[Arra
 
     Knots are where the animation has samples and where the offset has knots; between them both are cubics.
     """
-    from calmotion.model.curves import optimized_curve
-
     track, end = animation.tracks[curve.motor], float(animation.frame_times[-1])
     whole = optimized_curve(animation, curve, cyclic)
     inner = track.times[(track.times > SAME) & (track.times < end - SAME)]

@@ -8,6 +8,7 @@ from calmotion import ShotError
 from calmotion_plugins.benchmarks.accuracy.measured import choices, covered, machine_in
 from calmotion_plugins.benchmarks.accuracy.two_mode_beam import Reading, Strip, fitted, predicted
 from calmotion_plugins.calibration import Calibration, Estimate
+from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 NAMES = ("sweep_100", "sweep_400", "hold_100", "hold_400")
@@ -49,8 +50,6 @@ def motion(turn, seconds):
 
 def recorded(turn, seconds, factor=0.7, damping=0.05, gain=1.2):
     """A strip of another modulus, by its equations of motion."""
-    from scipy.integrate import solve_ivp
-
     times, hub = motion(turn, seconds)
     spline = CubicSpline(times, hub)
     w, turned, strains, _ = dataclasses.replace(STRIP, modulus=factor * STRIP.modulus).modes()
@@ -74,8 +73,6 @@ def test_a_beam_of_two_modes_tells_modulus_damping_and_gain_of_a_strip_and_predi
 
 
 def test_the_end_of_a_beam_moves_as_its_equations_of_motion_say():
-    from scipy.integrate import solve_ivp
-
     times, hub = motion(0.5, 0.6)
     spline, (w, turned, _, deflections) = CubicSpline(times, hub), STRIP.modes()
 

@@ -101,8 +101,6 @@ def test_colliders_of_types_without_a_volume_are_named(tmp_path):
 
 def test_the_centre_of_mass_is_in_the_scaled_axes_of_the_body(tmp_path):
     def edit(stage):
-        from pxr import UsdGeom
-
         UsdGeom.Xformable(stage.GetPrimAtPath(FORE)).AddScaleOp().Set(Gf.Vec3f(2, 3, 4))
 
     assert np.allclose(body(tmp_path, FORE, edit)[0].mass.center, [0.4, 0, 0], atol=1e-7)
@@ -130,8 +128,6 @@ def test_a_mass_without_geometry_or_inertia_is_a_ball_and_a_note(tmp_path):
 
 def test_an_open_mesh_takes_the_volume_of_its_hull_and_a_note(tmp_path):
     def edit(stage):
-        from pxr import UsdGeom
-
         clear_mass(stage, FORE)
         UsdPhysics.MassAPI(stage.GetPrimAtPath(FORE)).CreateDensityAttr(1000.0)
         UsdGeom.Mesh(stage.GetPrimAtPath(f"{FORE}/skin")).CreateHoleIndicesAttr([0])

@@ -11,6 +11,7 @@ from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Track
 from calmotion.model.character import Frame
+from calmotion.rigging.hinge_rows import about
 from calmotion.support.rotations import rotation_from_quaternion
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
@@ -99,8 +100,6 @@ def _bodies(joints: Sequence[JointPrim]) -> list[str]:
 
 
 def _about_z(R: Array, x: Array, slides: bool) -> JointMotion:
-    from calmotion.rigging.hinge_rows import about
-
     turn = Rotation.from_matrix(R)
     if slides:
         return JointMotion(x[:, 2].copy(), turn.magnitude(), np.linalg.norm(x[:, :2], axis=1))

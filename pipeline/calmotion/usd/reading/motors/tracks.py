@@ -6,7 +6,7 @@ from pxr import Gf, Sdf, Ts, Usd
 from calmotion.arrays import Array
 from calmotion.errors import ShotError
 from calmotion.model import Track
-from calmotion.model.curves import interpolate
+from calmotion.model.curves import held_curve, interpolate
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading
 
@@ -73,8 +73,6 @@ def _refined_codes(
     spline: Ts.Spline, codes: Array, breaks: Array, lines: list[tuple[float, float]], clock: Clock, to_si: float
 ) -> Array:
     """Time codes, refined where the track would differ from the spline by more than the tolerance, except in steps."""
-    from calmotion.model.curves import held_curve
-
     end = float(clock.seconds(codes[-1]))
     for _ in range(_ROUNDS):
         middles = 0.5 * (codes[:-1] + codes[1:])
