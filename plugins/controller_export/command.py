@@ -97,7 +97,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], console: Console) -> None:
-
     allowed, kept, lowest = length(report["allowed_loss_m"]), report["loss_kept"], report["lowest_rate_hz"]
     say(
         console,

@@ -83,7 +83,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], console: Console) -> None:
-
     besides = " besides links whose material gives their mass" if report["mass_of_material"] else ""
     say(
         console,

@@ -95,7 +95,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], console: Console) -> None:
-
     told = sum(row["identifiable"] for row in report["parameters"])
     say(console, f"A recording of this motion identifies {told} of {counted(len(report['parameters']), 'parameter')}.")
     rows = [

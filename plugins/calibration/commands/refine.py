@@ -74,7 +74,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], console: Console) -> None:
-
     played, expected = (
         max((row[name] for row in report["targets"]), default=0.0)
         for name in ("max_error_played_m", "expected_max_error_m")

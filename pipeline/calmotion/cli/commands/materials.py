@@ -49,7 +49,6 @@ def _as_toml(name: str, row: dict[str, Any]) -> str:
 
 
 def _print(rows: dict[str, dict[str, Any]], sources: bool, output: Output) -> None:
-
     console = console_on(output.stream)
     cells = [
         [

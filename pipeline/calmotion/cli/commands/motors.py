@@ -93,7 +93,6 @@ def _speed_of(motor: MotorType) -> str:
 
 
 def _print(known: Mapping[str, MotorType], output: Output) -> None:
-
     console = console_on(output.stream)
     for group in dict.fromkeys(motor.group for motor in known.values()):
         cells = [

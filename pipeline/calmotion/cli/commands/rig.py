@@ -48,7 +48,6 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], console: Console) -> None:
-
     say(
         console,
         f"{report['robot']}: {report['bodies']} bodies, {report['motors']} motors, {report['mass_kg']:.4g} kg; "
