@@ -32,6 +32,7 @@ _REMEDY = (
     "Write a column time_s in seconds, and one for each joint, named after it, in rad (or with a comment "
     "'# units: angle deg') or m"
 )
+_MATRIX = "Name the array of all joints `positions`, and write joint_names, and time_s or fps, beside it"
 _DEGREES = re.compile(r"(angle|units?)\W+deg", re.IGNORECASE)
 _LONGEST = 1e5  # of a motion [s]: a day
 _UNITS = {"ms": "milliseconds (0.001 s)", "us": "microseconds (1e-6 s)", "ns": "nanoseconds (1e-9 s)"}
@@ -272,7 +273,7 @@ def _numbers(path: str, name: str, array: np.ndarray, axes: int) -> Array:
             path=path,
             attribute=name,
             found=f"shape {array.shape} of {array.dtype}",
-            remedy=_REMEDY,
+            remedy=_MATRIX if array.ndim == 2 and axes == 1 else _REMEDY,
         )
     return np.asarray(array, np.float64)
 

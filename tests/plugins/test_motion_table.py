@@ -173,6 +173,12 @@ def test_arrays_that_do_not_fit_are_refused(read, content):
         read("a.npz", content)
 
 
+def test_a_matrix_of_all_joints_under_another_name_is_refused_with_its_name(read):
+    with pytest.raises(ShotError) as refused:
+        read("a.npz", {"fps": 30, "dof_pos": np.zeros((3, 2))})
+    assert "`positions`" in refused.value.remedy and refused.value.attribute == "dof_pos"
+
+
 def test_a_file_that_is_no_npz_is_refused(read, tmp_path):
     with pytest.raises(ShotError, match="not an NPZ file"):
         read("a.npz", "hello")
