@@ -126,9 +126,13 @@ def test_weights_over_time_make_better_what_the_audience_looks_at(tmp_path):
 
 @pytest.mark.long
 def test_why_error_remains_is_answered_with_a_goal(tmp_path):
+    def rounded(text):
+        """To 0.01 mm: the last digit of a search is one of rounding."""
+        return re.sub(r"(\d\.\d\d)\d mm", r"\1 mm", text)
+
     printed = " ".join(follow("how_to/remaining_error", tmp_path).split())
     for line in re.findall(r"^ {4}(\S.*)", (DOCS / "how_to" / "remaining_error.md").read_text(), re.MULTILINE):
-        assert line.split(",")[0] in printed, line
+        assert rounded(line.split(",")[0]) in rounded(printed), line
     assert printed.endswith("[('/Bartender/UpperArm/ElbowTarget', ['motors'])]")
 
 

@@ -139,7 +139,7 @@ CASES: dict[str, Case] = {
     "figures in a file": simulated("--figures shot.usda", "shot.usda"),
     "baked without a layer": simulated("--bake", "-o", statuses=USAGE),
     "splines and samples": simulated("-o out.usda --splines --samples-per-second 100Hz", statuses=(0, 1, 2)),
-    "samples of zero hertz": simulated("-o out.usda --samples-per-second 0", "samples_per_second"),
+    "samples of zero hertz": simulated("-o out.usda --samples-per-second 0", "samples-per-second", statuses=USAGE),
     "a billion samples a second": optimized(
         "-o out.usda --samples-per-second 1e9", "samples-per-second", statuses=(0, 1, 2)
     ),

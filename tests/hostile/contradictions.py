@@ -54,7 +54,7 @@ CASES: dict[str, Case] = {
     "a table in degrees by its comment": table(
         "# Units: angle Deg\n" + TABLE.replace("0.2", "20"), statuses=DONE, judge=beyond_limits
     ),
-    "a table with decimal commas": table('time_s,shoulder\n0,"0"\n"0,5","0,2"\n', "line 3"),
+    "a table with decimal commas": table('time_s,shoulder\n0,"0"\n"0,5","0,2"\n', statuses=DONE),
     "a table of another coding": table(TABLE, "UTF-8", coding="utf-16"),
     "a table with its head twice": table(TABLE + TABLE, "line 5"),
     # robots

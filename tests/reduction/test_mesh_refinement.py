@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calmotion.errors import ShotError
 from calmotion.linear_algebra.multifrontal import FactorsTooLarge
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.quadratic import quadratic_nodes
@@ -160,3 +161,24 @@ def test_the_root_is_the_joint_at_the_frame_of_the_carrier(helpers, frames):
     assert root_at(frames, None) is None
     points = [replace(frames[0], kind="point"), *frames]
     assert root_at(points, helpers.frame(0.3, 0.0, 0.0)) == 1
+
+
+def test_a_mesh_whose_interface_is_all_of_it_is_refused(helpers, beam, frames):
+    held = replace(beam, flexible=replace(beam.flexible, interface_radius=1.0))
+    for use in (reduce_body, MeshController(0.02, 15_000).refined):
+        with pytest.raises(ShotError, match="nothing of it can bend") as caught:
+            use(mesh_of(helpers, (1, 1, 1)), held, frames[1:], 0)
+        assert caught.value.path == "/Arm/link"
+
+
+def test_the_error_of_a_given_mesh_is_no_less_where_a_finer_one_is_stiffer(helpers, beam, frames, monkeypatch):
+    coarse = mesh_of(helpers, (8, 2, 2))
+
+    def stiffer(mesh, *arguments, **named):
+        found = response(mesh, *arguments, **named)
+        return found if len(mesh.tets) == len(coarse.tets) else replace(found, compliances=0.97 * found.compliances)
+
+    monkeypatch.setattr(mesh_refinement, "response", stiffer)
+    with recomputed():
+        found = MeshController(0.002, 15_000, "given").refined(coarse, beam, frames, 1)
+    assert found.quality.frequency_error > 0.01

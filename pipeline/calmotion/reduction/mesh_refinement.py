@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.arrays import Array, Indices, box_diagonal
-from calmotion.errors import ShotError
 from calmotion.linear_algebra.multifrontal import FactorsTooLarge
 from calmotion.mesh.bisection import bisected
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
@@ -139,7 +138,7 @@ class MeshController:
         whole = fine.compliances / coarse.compliances * (1.0 + change) - 1.0
         every = np.ones_like(coarse.shares)
         if self.keeps == "given":
-            errors = (_largest_of(left, share) + _largest_of(whole, share) for share in (every, coarse.shares))
+            errors = (_largest_of(left, share) + _largest_of(np.abs(whole), share) for share in (every, coarse.shares))
             return _with_errors(mesh, 1.0, *errors)
         counted = every if loads is None else coarse.shares
         if self.keeps != "finer" and _deviation(whole, coarse.weights, counted) <= self.parted * self.wanted:
@@ -199,8 +198,6 @@ def response(
         columns = fixed.lowest(modes)
         squares, U = ritz_modes(model, columns)
         squares = squares[:modes]
-        if not len(squares):
-            raise _nothing_free(body, mesh)
         shapes = (columns @ U[:, : len(squares)]).reshape(len(model.mesh.nodes), 3, -1)
         moved = _moved_by_loads(full, attachments, loads)
     fields, by_each = moved
@@ -316,13 +313,3 @@ def _largest(indicators: Array, share: float) -> Indices:
     order = np.argsort(-indicators, kind="stable")
     summed = np.cumsum(indicators[order])
     return np.asarray(order[: 1 + int(np.searchsorted(summed, share * summed[-1]))])
-
-
-def _nothing_free(body: Body, mesh: FEMesh) -> ShotError:
-    return ShotError(
-        "its parent joint holds all of the mesh, so that nothing of it can bend",
-        path=body.path,
-        attribute="calm:flexible:interfaceRadius",
-        found=f"{len(mesh.tets)} tetrahedra",
-        remedy="Use a finer mesh or a smaller interface, or set calm:flexible:enabled to false.",
-    )

@@ -15,6 +15,7 @@ from calmotion.usd.calibrations import known_factors, predictions
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.units import EARTH_GRAVITY
 
+MOST_UNCERTAIN = 3.0  # a relative standard deviation: who writes 10 means 10%
 _SCHEMA = "CalmRetargetAPI"
 
 
@@ -126,8 +127,16 @@ def _positive(prim: Usd.Prim, name: str, *, zero: bool = False) -> float | None:
 
 
 def _uncertainty(prim: Usd.Prim) -> Uncertainty:
-    """The relative standard deviations of the robot's parameters."""
+    """The relative standard deviations of the robot's parameters.
+
+    Raises:
+        ShotError: One is as large as a percentage.
+    """
     names = [field.name for field in fields(Uncertainty) if field.name != "calibrated"]
     given = {name: _positive(prim, f"uncertainty:{name}", zero=True) for name in names}
     known = {name: value for name, value in given.items() if value is not None}
+    for name, value in known.items():
+        attribute = f"calm:retarget:uncertainty:{name}"
+        remedy = "Write it as a share: 0.1 is 10%."
+        schemas.require(value <= MOST_UNCERTAIN, prim, attribute, value, "the parameter is not known at all", remedy)
     return Uncertainty(**known, calibrated=known_factors(prim.GetStage()))

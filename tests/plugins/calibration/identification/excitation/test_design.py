@@ -65,7 +65,7 @@ def test_a_calibration_has_the_promised_standard_deviations(recorded_shot, found
         values = signals.at(sensor.kind, 0, times)
         values = values + sensor.sigma * random.standard_normal(values.shape)
         recordings.append(SensorRecording(sensor.kind, "", (Channel(sensor.kind, sensor.path, times, values),)))
-    made = calibrate_shot(shot, recordings, CalibrationSettings(validate=False, halvings=0), RunSettings(step=1 / 240))
+    made = calibrate_shot(shot, recordings, CalibrationSettings(validate=False, halvings=0), RunSettings(step=1 / 480))
     for row in found.predicted:
         item = made.estimate(row.name)
         assert item.standard_deviation == pytest.approx(row.excited, rel=0.3), row.name
