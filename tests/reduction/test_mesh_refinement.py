@@ -16,7 +16,7 @@ from calmotion.reduction.cache import recomputed
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.mesh_refinement import MeshController, bisected_to, response, root_at
-from calmotion.reduction.reduce import reduce_body
+from calmotion.reduction.reduce import full_body, reduce_body
 
 SIZE = (0.3, 0.04, 0.04)
 
@@ -165,10 +165,11 @@ def test_the_root_is_the_joint_at_the_frame_of_the_carrier(helpers, frames):
 
 def test_a_mesh_whose_interface_is_all_of_it_is_refused(helpers, beam, frames):
     held = replace(beam, flexible=replace(beam.flexible, interface_radius=1.0))
-    for use in (reduce_body, MeshController(0.02, 15_000).refined):
-        with pytest.raises(ShotError, match="nothing of it can bend") as caught:
-            use(mesh_of(helpers, (1, 1, 1)), held, frames[1:], 0)
-        assert caught.value.path == "/Arm/link"
+    with pytest.raises(ShotError, match="nothing of it can bend") as caught:
+        MeshController(0.02, 15_000).refined(mesh_of(helpers, (1, 1, 1)), held, frames[1:], 0)
+    assert caught.value.path == "/Arm/link"
+    with pytest.raises(ShotError, match="nothing of it can bend"):
+        full_body(mesh_of(helpers, (1, 1, 1)), held, frames[1:], 0)
 
 
 def test_the_error_of_a_given_mesh_is_no_less_where_a_finer_one_is_stiffer(helpers, beam, frames, monkeypatch):
@@ -181,4 +182,4 @@ def test_the_error_of_a_given_mesh_is_no_less_where_a_finer_one_is_stiffer(helpe
     monkeypatch.setattr(mesh_refinement, "response", stiffer)
     with recomputed():
         found = MeshController(0.002, 15_000, "given").refined(coarse, beam, frames, 1)
-    assert found.quality.frequency_error > 0.01
+    assert found.quality.frequency_error > 0.005
