@@ -162,9 +162,9 @@ def full_body(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], 
     moving = [patch for patch in patches if patch is not root_patch]
     centers = [attachments[patch.attachments[0]].frame.position for patch in moving]
     support = Support(root_patch.nodes, [patch.nodes for patch in moving], centers)
-    if len(np.unique(support.root)) == len(model.mesh.nodes):
+    if len(np.unique(np.concatenate([support.root, *support.patches]))) == len(model.mesh.nodes):
         raise ShotError(
-            "its parent joint holds all of the mesh, so that nothing of it can bend",
+            "its joints hold all of the mesh, so that nothing of it can bend",
             path=body.path,
             attribute="calm:flexible:interfaceRadius",
             found=f"{len(mesh.tets)} tetrahedra",
