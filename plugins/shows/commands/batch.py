@@ -10,6 +10,7 @@ from calmotion.cli import (
     INTERRUPTED,
     Output,
     conclude,
+    count_of,
     counted,
     html_option,
     length,
@@ -52,16 +53,10 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--workers",
         metavar="N",
-        type=worker_count,
+        type=count_of("workers"),
         help="largest number of jobs at once (default: one for each processor; on a cluster all)",
     )
     forwarded_options(command)
-
-
-def worker_count(text: str) -> int:
-    if not text.isdigit() or not int(text):
-        raise argparse.ArgumentTypeError(f"{text} is not a number of workers")
-    return int(text)
 
 
 def run(args: argparse.Namespace, output: Output) -> int:

@@ -6,9 +6,8 @@ import argparse
 import shlex
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli import FAILED, INTERRUPTED, Output, conclude, length, print_table, report_options, say
+from calmotion.cli import FAILED, INTERRUPTED, Output, conclude, count_of, length, print_table, report_options, say
 
-from .batch import worker_count
 from .forwarding import forwarded, forwarded_options
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     report_options(command)
     command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
     command.add_argument("--on", metavar="WHERE", default="local", help="as of `calmotion batch`")
-    command.add_argument("--workers", metavar="N", type=worker_count, help="largest number of jobs at once")
+    command.add_argument("--workers", metavar="N", type=count_of("workers"), help="largest number of jobs at once")
     forwarded_options(command, tempo=False)  # transitions begin and end where clips do
 
 
