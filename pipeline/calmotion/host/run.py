@@ -9,18 +9,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from calmotion.host.errors import PluginError
 from calmotion.host.operators import NotAsked, Operator, Record, RunContext
 from calmotion.host.plan import Plan, adds_up, can_check, find_rivals, poll, will_run
 from calmotion.host.properties import PropertyValues
+from calmotion.model import Simplification
 from calmotion.support import interrupts
 from calmotion.support.memory import RESERVE, peak_memory, require_address_space
 from calmotion.support.naming import as_written
-
-if TYPE_CHECKING:
-    from calmotion.model import Simplification
 
 T = TypeVar("T")
 Progress = Callable[[str, float, str], None]

@@ -1,16 +1,13 @@
 """Values that travel between the command line, the host and plugins, beside those of `calmotion.model`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from calmotion.arrays import Array
-    from calmotion.model.animation import Track
-    from calmotion.model.limits.use import LimitUse
-    from calmotion.model.result import Simplification
+from calmotion.arrays import Array
+from calmotion.model.animation import Track
+from calmotion.model.limits.use import LimitUse
+from calmotion.model.result import Simplification
 
 ERROR, WARNING = "error", "warning"  # levels of a `Finding`
 

@@ -1,17 +1,12 @@
 """Recordings of a performance on the real robot."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calmotion.arrays import Array
-
-if TYPE_CHECKING:
-    from calmotion.model.motor import Motor
+from calmotion.model.motor import Motor
 
 # kinds of channels
 MARKER, ACCELEROMETER, ANGLE, EFFORT, STRAIN = "marker", "accelerometer", "angle", "effort", "strain"

@@ -11,16 +11,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.model.character import Body
 from calmotion.model.meshes import FEMesh
 from calmotion.reduction.cache import cache_key
+from calmotion.reduction.reduce import FullBody
 from calmotion.support.operating_system import return_freed_memory
-
-if TYPE_CHECKING:
-    from calmotion.mesh.patches.interface_patches import AttachmentFrame
-    from calmotion.reduction.reduce import FullBody
 
 _KEPT = 60_000_000  # numbers in factors of full models, half a gigabyte
 _HANDED_ON = 20_000_000  # of those from a mesher to the reduction, while it makes others

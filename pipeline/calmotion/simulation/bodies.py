@@ -1,14 +1,13 @@
 """From a character and its finite-element meshes to reduced bodies, skins and frequencies."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from calmotion.errors import ShotError
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.model import Body, Character, FEMeshes, ModeTable, Skin
 from calmotion.model.character import ElasticMaterial, with_ideal_motors, with_settings
 from calmotion.model.meshes import FEMesh
@@ -17,13 +16,10 @@ from calmotion.model.tolerance import tolerance_of
 from calmotion.multibody.model.joint_arrays import BodyAnchors
 from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import Tree, span_tree
+from calmotion.reduction.full_models import FullModels, Member
 from calmotion.reduction.load_envelope import LoadEnvelope
+from calmotion.reduction.reduce import LinearModes
 from calmotion.reduction.reduced_body import ReducedBody
-
-if TYPE_CHECKING:
-    from calmotion.mesh.patches.interface_patches import AttachmentFrame
-    from calmotion.reduction.full_models import FullModels, Member
-    from calmotion.reduction.reduce import LinearModes
 
 Found = TypeVar("Found")
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from calmotion.model import Animation, Character, FEMeshes
 from calmotion.model.character import with_settings
@@ -13,14 +12,12 @@ from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import body_anchors
 from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.basis.static_loads import OVERSHOOT
+from calmotion.reduction.full_models import FullModels
 from calmotion.reduction.load_envelope import LoadEnvelope, directed_load_envelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.simulation.bodies import bodies_in_parallel, full_model_of, reduce_bodies
 from calmotion.simulation.preparation import grid_of
 from calmotion.simulation.rigid_run import shot_load_envelopes
-
-if TYPE_CHECKING:
-    from calmotion.reduction.full_models import FullModels
 
 
 class BodyReduction:

@@ -1,7 +1,5 @@
 """The manifest of a result: inputs, outputs, hashes, settings, verdict; what must hold before it is published."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Results of a run: arrays by prim path, the report, and the files that can be made of them."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass

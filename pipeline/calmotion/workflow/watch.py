@@ -1,7 +1,5 @@
 """A shot that is run again whenever it is saved; what its change leaves as it was is not made again."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence

@@ -21,7 +21,6 @@ Spiegelhalter, A re-evaluation of random-effects meta-analysis, 2009, section 3.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.arrays import Array, BoolArray
@@ -31,9 +30,7 @@ from scipy.stats import norm, t
 from .least_squares import HUBER, Solution, minimize, posterior, weights_of
 from .problem import Calibrated
 from .recordings.noise import noise_of
-
-if TYPE_CHECKING:
-    from .recordings.sensors import Sensor
+from .recordings.sensors import Sensor
 
 PIECES = 4  # of each shot
 MISSED, TOGETHER = 1.5, 3.0  # residuals over the noise, and samples that count as one: the model misses something

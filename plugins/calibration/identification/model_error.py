@@ -9,10 +9,7 @@ Jacobian J of the residuals by the parameters z, their weights W and the derivat
 Source: Tapley, Schutz, Born, Statistical Orbit Determination, 2004, section 6.3 (consider covariance).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.arrays import Array
@@ -20,8 +17,7 @@ from calmotion.errors import ShotError
 from calmotion.multibody import SimulationFailure, in_parallel
 from calmotion.reduction import ReducedBody, with_mode_stiffness, with_scaled_stiffness
 
-if TYPE_CHECKING:
-    from .problem import Calibrated
+from .problem import Calibrated
 
 MODES = 6  # lowest of a link, each of which has an error of its own
 OWN = 0.25  # of the error of the mesh: how much the errors of modes differ (beams of two meshes: 0.05 of 0.2%)

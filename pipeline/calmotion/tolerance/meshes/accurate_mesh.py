@@ -1,10 +1,7 @@
 """Meshes that are accurate enough for the first frequencies, and what is said about their accuracy."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,16 +9,14 @@ from calmotion.arrays import box_diagonal
 from calmotion.errors import ShotError
 from calmotion.mesh.element_sizes import envelope
 from calmotion.mesh.mass import balance_note, density_note, mass_of_tets
+from calmotion.mesh.parts import Makeup
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.tetrahedra import tet_volumes
 from calmotion.mesh.tetrahedralize.filling import INTERSECTS, MAX_VOLUME_ERROR, filled
 from calmotion.mesh.tetrahedralize.tetwild import SIMPLE, ProcessorTime
 from calmotion.model import Body, Character, FEMesh, Frame
 from calmotion.model.meshes import MeshQuality, Part
-
-if TYPE_CHECKING:
-    from calmotion.mesh.parts import Makeup
-    from calmotion.mesh.patches.interface_patches import AttachmentFrame
-    from calmotion.tolerance.meshes.options import MeshOptions, Volume
+from calmotion.tolerance.meshes.options import MeshOptions, Volume
 
 GOAL = 0.01  # error of the first frequencies: a fifth of what is known of a modulus to 10%
 # Nodes of the finer mesh at most: some five seconds

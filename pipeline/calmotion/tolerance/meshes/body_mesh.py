@@ -1,11 +1,8 @@
 """Tetrahedra of a flexible body."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +11,7 @@ from calmotion.errors import ShotError
 from calmotion.mesh.element_sizes import MAX_NODES, element_size, shape_of
 from calmotion.mesh.mass import mass_of_solid
 from calmotion.mesh.mesh_file import read_mesh_file
+from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.repair.closed_solid import Solid
 from calmotion.mesh.sources.beam import equivalent_beam
 from calmotion.mesh.sources.choice import solid_of
@@ -42,9 +40,6 @@ from calmotion.tolerance.meshes.accurate_mesh import (
     volume_note,
 )
 from calmotion.tolerance.meshes.options import MeshOptions, Volume
-
-if TYPE_CHECKING:
-    from calmotion.mesh.patches.interface_patches import AttachmentFrame
 
 SECTIONS = 1.0  # of a first frequency: what is not known of it by beams and sections, for nine of ten links
 FAR = 5.0  # distance of a mesh from all joints of its body, over its size, that nobody means
