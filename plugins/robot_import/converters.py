@@ -26,6 +26,7 @@ _READY = "ready"
 _SCRIPT = Path(__file__).with_name("mujoco_values.py")
 LONGEST = 1800.0  # time of a conversion [s]
 _BROKEN_OBJ = re.compile(r'Failed to convert mesh(?: "[^"]*" from|:) (.+?\.obj)(?=:|$)', re.IGNORECASE)
+_IN_PARTS = re.compile('"(.+?\\.obj)" contains multiple meshes', re.IGNORECASE)
 _PLACE = re.compile(r" \(line: \d+\)$")
 # of pictures and sensors, which change no motion, and of the converter's own code
 _NO_MATTER = re.compile("texture|was deprecated|(cameras|lights|sensors|keys) are not supported")
@@ -139,6 +140,8 @@ def convert(description: Description, output: str, python: str) -> tuple[str, tu
             found="; ".join(dict.fromkeys(lost[:3])) + (f"; {len(lost) - 3} more" if len(lost) > 3 else ""),
             remedy="Correct the file: meshes are .stl, .obj or .dae, and their names relative to it",
         )
+    if in_parts := [match.group(1) for line in warnings if (match := _IN_PARTS.match(line))]:
+        raise BrokenMeshes(description.shown, in_parts)
     told = Counter(_PLACE.sub("", line) for line in warnings)
     return str(files[0]), tuple(f"{line} ({count} times)" if count > 1 else line for line, count in told.items())
 

@@ -246,7 +246,7 @@ class _Import:
             shutil.rmtree(parts, ignore_errors=True)
             description = repaired(description, _folder(work, "cleaned"), broken.files)
             names = ", ".join(os.path.basename(file) for file in broken.files)
-            changes += (f"meshes with loose points or normals are converted without these: {names}",)
+            changes += (f"meshes are converted without loose points, normals and divisions into parts: {names}",)
             return *convert(description, parts, python), changes, description
 
     def _move(self, parts: str, draft: str) -> None:

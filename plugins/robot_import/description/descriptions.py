@@ -154,7 +154,7 @@ def repaired(description: Description, folder: str, broken_meshes: Sequence[str]
     root, _ = _root(description.path)
     given = description.shown
     if description.kind == MJCF:
-        copy = nested_copy(root, description.path, folder, lambda file: _root(file)[0])
+        copy = nested_copy(root, description.path, folder, lambda file: _root(file)[0], broken_meshes)
         return replace(description, path=copy, original=given)
 
     def file(name: str) -> str:

@@ -9,6 +9,7 @@ from calmotion.errors import ShotError
 from calmotion.support import is_special, refuse_lfs_pointers
 
 from .attributes import Element
+from .repairs import with_joined_meshes
 
 _JOINTS = ("joint", "freejoint")
 _PLACES = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
@@ -206,7 +207,9 @@ def several_joints(found: Sequence[Part]) -> list[str]:
     return names
 
 
-def nested_copy(root: xml.Element, path: str, folder: str, parse: Callable[[str], xml.Element]) -> str:
+def nested_copy(
+    root: xml.Element, path: str, folder: str, parse: Callable[[str], xml.Element], joined: Sequence[str]
+) -> str:
     """Write a copy of a robot in one file, in which no body has several joints.
 
     Args:
@@ -214,6 +217,7 @@ def nested_copy(root: xml.Element, path: str, folder: str, parse: Callable[[str]
         path: Its file.
         folder: Where the copy is written.
         parse: Gives the root of another file.
+        joined: OBJ meshes that are named by clean copies, see `with_joined_meshes`.
 
     Returns:
         The copy, which names folders by their whole paths.
@@ -232,13 +236,14 @@ def nested_copy(root: xml.Element, path: str, folder: str, parse: Callable[[str]
         within = parse(file)
         outermost |= {b.get("name", ""): _name(b, _joints_of(b)[0]) for b in within.iter("body") if _has_several(b)}
         os.mkdir(own)
-        model.set("file", nested_copy(within, file, own, parse))
+        model.set("file", nested_copy(within, file, own, parse, joined))
     for attached in root.iter("attach"):
         attached.set("body", outermost.get(attached.get("body", ""), attached.get("body", "")))
     for parent in list(root.iter()):
         for place, body in enumerate(parent):
             if body.tag == "body" and _has_several(body):
                 parent[place] = _nested(body)
+    with_joined_meshes(root, home, joined, folder)
     copy = os.path.join(folder, os.path.basename(path))
     xml.ElementTree(root).write(copy, encoding="utf-8")
     return copy

@@ -222,7 +222,30 @@ def _leaders_first(root: xml.Element) -> Iterator[xml.Element]:
         yield from reversed(chain)
 
 
-def with_clean_meshes(root: xml.Element, broken: Sequence[str], folder: str, mesh_file: Callable[[str], str]) -> None:
+def with_joined_meshes(root: xml.Element, home: str, names: Sequence[str], folder: str) -> None:
+    """Let an MJCF name clean copies of OBJ meshes, each in one part: of several, a converter takes the first.
+
+    Args:
+        root: Of the robot; it is changed.
+        home: The folder of its file.
+        names: Of these meshes, with or without folders.
+        folder: Where the copies are written.
+    """
+    given = [node.get(name, "") for node in root.iter("compiler") for name in ("meshdir", "assetdir") if node.get(name)]
+    meant, found = {os.path.basename(name) for name in names}, [node.get("file", "") for node in root.iter("mesh")]
+
+    def file(name: str) -> str:
+        return os.path.join(home, *given[:1], name)
+
+    with_clean_meshes(
+        root, [file(name) for name in found if os.path.basename(name) in meant], folder, file, "file", ("usemtl",)
+    )
+
+
+def with_clean_meshes(
+    root: xml.Element, broken: Sequence[str], folder: str, mesh_file: Callable[[str], str],
+    attribute: str = "filename", kept: Sequence[str] = _KEPT,
+) -> None:  # fmt: skip
     """Let a robot name clean copies of OBJ meshes.
 
     Args:
@@ -230,11 +253,13 @@ def with_clean_meshes(root: xml.Element, broken: Sequence[str], folder: str, mes
         broken: The meshes that cannot be converted, as files.
         folder: Where the copies are written.
         mesh_file: The file that the name of a mesh means.
+        attribute: That names it.
+        kept: Lines of a mesh that stay as they are.
     """
     wrong = {os.path.realpath(path) for path in broken}
     copies: dict[str, str] = {}
     for node in root.iter("mesh"):
-        source = os.path.realpath(mesh_file(node.get("filename", "")))
+        source = os.path.realpath(mesh_file(node.get(attribute, "")))
         if source not in wrong:
             continue
         if source not in copies:
@@ -243,15 +268,15 @@ def with_clean_meshes(root: xml.Element, broken: Sequence[str], folder: str, mes
             os.makedirs(place)
             copies[source] = os.path.join(place, os.path.basename(source))
             text = Path(source).read_text(encoding="utf-8", errors="replace")
-            Path(copies[source]).write_text(clean_obj(text), encoding="utf-8")
+            Path(copies[source]).write_text(clean_obj(text, kept), encoding="utf-8")
             for library in re.findall(r"^\s*mtllib\s+(.+?)\s*$", text, flags=re.MULTILINE):
                 materials = os.path.join(os.path.dirname(source), library)
                 if os.path.isfile(materials):
                     shutil.copy(materials, os.path.join(place, os.path.basename(library)))
-        node.set("filename", copies[source])
+        node.set(attribute, copies[source])
 
 
-def clean_obj(text: str) -> str:
+def clean_obj(text: str, kept: Sequence[str] = _KEPT) -> str:
     """An OBJ with the same faces and materials, whose points all belong to faces, without normals and textures."""
     points: list[str] = []
     numbers: dict[int, int] = {}
@@ -267,6 +292,6 @@ def clean_obj(text: str) -> str:
                 lines.append("f " + " ".join(str(numbers.setdefault(c, len(numbers) + 1)) for c in corners))
         elif kind == "mtllib":
             lines.insert(0, f"mtllib {os.path.basename(rest.strip())}")
-        elif kind in _KEPT:
+        elif kind in kept:
             lines.append(line.strip())
     return "\n".join([*(f"v {points[index]}" for index in numbers), *lines]) + "\n"

@@ -142,6 +142,23 @@ def test_a_stated_mass_of_a_flexible_link_is_that_of_mujoco(tmp_path, arm, head,
     assert link.mass.mass == pytest.approx(mass, rel=1e-6)
 
 
+@pytest.mark.parametrize("folder", ["", "meshes"])
+def test_a_mesh_in_several_parts_is_whole(tmp_path, folder):
+    solids = "".join(
+        f"o part{k}\nv {k} 0 0\nv {k} 0.1 0\nv {k} 0 0.1\nv {k + 0.1} 0 0\n"
+        f"f {n + 1} {n + 3} {n + 2}\nf {n + 1} {n + 2} {n + 4}\nf {n + 2} {n + 3} {n + 4}\nf {n + 3} {n + 1} {n + 4}\n"
+        for k, n in ((0, 0), (1, 4))
+    )
+    (tmp_path / folder).mkdir(exist_ok=True)
+    (tmp_path / folder / "parts.obj").write_text(solids)
+    head = f'<compiler meshdir="{folder}"/><asset><mesh file="parts.obj"/></asset>'
+    arm = '<geom type="mesh" mesh="parts" mass="0.3"/>'
+    made, model = imported(tmp_path, robot(arm=arm, head=head), flexible=["arm=abs"])
+    (link,) = (body for body in made.character.bodies if body.flexible is not None)
+    assert np.ptp(np.concatenate([surface.points for surface in link.surfaces])[:, 0]) == pytest.approx(1.1, rel=1e-5)
+    assert link.mass.mass == pytest.approx(0.3) and any("divisions into parts: parts.obj" in n for n in made.notes)
+
+
 POSITION = '<actuator><position name="p" joint="lift" kp="50" {}/></actuator>'
 SERVOS = {
     "dampratio": robot(tail=POSITION.format('dampratio="0.7"')),
