@@ -89,6 +89,8 @@ def test_legs_with_closed_chains_get_commands(tmp_path, shared_data):
     source = shared_data / "shots" / "dr_legs_walk.usda"
     if not source.exists():
         pytest.skip("the shared walk is not here")
+    shot_on(tmp_path / "stiff.usda", source, True, 60)
+    stiff = cm.simulate(tmp_path / "stiff.usda", pre_roll=0.0)
     stage = shot_on(tmp_path / "legs.usda", source, True, 60)
     for prim in stage.Traverse():
         if prim.GetAttribute("drive:angular:physics:targetPosition").GetNumTimeSamples():
@@ -99,8 +101,9 @@ def test_legs_with_closed_chains_get_commands(tmp_path, shared_data):
     stage.GetRootLayer().Save()
     animated, calm = found(tmp_path / "legs.usda", pre_roll=0.0)
     assert largest(animated) > 0.015 and largest(calm) < 0.15 * largest(animated)
-    was, now = (run.report()["contacts"][0]["min_normal_force_n"] for run in (animated, calm))
-    assert now > was - 0.3
+    # the foot asks of the ground no more than the animation does with motors that do not give (19.7 N at its end)
+    needed, was, now = (run.report()["contacts"][0]["min_normal_force_n"] for run in (stiff, animated, calm))
+    assert needed < now and needed < was < 0.0
 
 
 @pytest.fixture

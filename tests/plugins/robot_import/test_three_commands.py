@@ -66,7 +66,10 @@ def test_three_commands_lead_from_a_robot_and_a_table_to_ros_2(repository, share
         assert done.returncode == 0, f"{line}\n{done.stderr[-2000:]}"
         reports.append(done.stdout)
     optimized, exported = (json.loads(text) for text in reports[1:])
-    assert optimized["max_error_after_m"] <= optimized["max_error_before_m"] + 1e-4
+    # the file's limit of effort, which the motion exceeds by a factor of two, counts more than the error
+    exceeded = any(abs(row["before"]) > abs(row["limit"]) for row in optimized["limits"])
+    assert exceeded == (kind == "MJCF") and not any(row["exceeded"] for row in optimized["limits"])
+    assert exceeded or optimized["max_error_after_m"] <= optimized["max_error_before_m"] + 1e-4
     assert exported["tolerance_kept"] and exported["lowest_rate_hz"] <= 100
     message = yaml.safe_load((tmp_path / "trajectory.yaml").read_text())
     assert set(joints.values()) <= set(message["joint_names"])
