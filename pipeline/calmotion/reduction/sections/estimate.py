@@ -19,7 +19,6 @@ from calmotion.errors import ShotError
 from calmotion.mesh.mass import joined_surfaces
 from calmotion.mesh.mesh_file import read_mesh_file
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
-from calmotion.mesh.sources.beam import equivalent_beam
 from calmotion.mesh.tetrahedra import boundary_triangles
 from calmotion.model.character import Body, Frame, TetGeometry
 from calmotion.reduction.damping import damped
@@ -80,6 +79,8 @@ def _filled(body: Body, frames: Sequence[Frame]) -> tuple[Cells, Array, Indices]
         cells = cells_of(points, triangles, body.flexible)
         if cells is not None:
             return cells, points, triangles
+    from calmotion.mesh.sources.beam import equivalent_beam  # loads manifold3d, which surfaces do without
+
     solid = equivalent_beam(body, frames)
     cells = cells_of(solid.points, solid.triangles, body.flexible)
     if cells is None:
