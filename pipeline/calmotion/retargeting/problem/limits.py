@@ -124,13 +124,14 @@ class LimitTerms:
         stalled = self.stalled + 1 if excess > STALLED * self.reached else 0
         return replace(self, stalled=stalled, reached=excess).updated(values, objective) if stalled < PATIENCE else None
 
-    def updated(self, values: dict[str, Array], objective: float) -> LimitTerms | None:
+    def updated(self, values: dict[str, Array], objective: float, grows: bool = True) -> LimitTerms | None:
         """With new multipliers after a minimum of the model; None if all limits are kept.
 
         Args:
             values: Of the limited quantities there, by name, shape [T, M] each.
             objective: The objective there, without the terms. That of the input says little of the penalty that counts
                 beside it: a stiff robot has almost no error before limits bend its motion.
+            grows: Whether the penalty may.
         """
         excess = self.excess(values)
         if excess <= MARGIN:
@@ -139,7 +140,7 @@ class LimitTerms:
             name: np.maximum(0.0, self._sides(name, values[name]) + y) for name, y in self.multipliers.items()
         }
         first, rho = max(self.first or self.rho, self.penalty_beside(objective)), self.rho
-        if excess > SLOW * self.left and rho < MOST * first:
+        if grows and excess > SLOW * self.left and rho < MOST * first:
             rho *= GROWTH
             multipliers = {name: y / GROWTH for name, y in multipliers.items()}  # y rho stays the same
         return replace(self, multipliers=multipliers, first=first, rho=rho, left=excess)

@@ -58,8 +58,8 @@ class Limits(Protocol):
     def excess(self, values: Values) -> float:
         """Largest excess of a limit."""
 
-    def updated(self, values: Values, objective: float) -> Self | None:
-        """With new multipliers after a minimum; None where all limits are kept."""
+    def updated(self, values: Values, objective: float, grows: bool = True) -> Self | None:
+        """With new multipliers after a minimum, and a larger penalty if it may grow; None where all limits are kept."""
 
 
 class Regulariser(Protocol):
@@ -194,7 +194,8 @@ def limited_step(
         max_products: Most products of one solution.
         sharpened: Preconditioner; None for that of the problem.
         is_matrix: Whether derivatives are a matrix. Multipliers then wait until it is settled which limits act:
-            updates before that made the penalty grow until steps were short.
+            updates before that made the penalty grow until steps were short. Otherwise it does not grow here: what the
+            model leaves of an excess may be what its minimum was not solved to.
     """
     model = LimitedModel(linear)
     start = point = model.start
@@ -212,7 +213,7 @@ def limited_step(
             break
         if decrease <= max(enough, share * gained) and (not is_matrix or not used or model.acting(point) == acted):
             stalled = stalled + 1 if (excess := model.limits.excess(point.values)) > STALLED * left else 0
-            left, updated = excess, model.limits.updated(point.values, model.objective(point))
+            left, updated = excess, model.limits.updated(point.values, model.objective(point), is_matrix)
             if updated is None or stalled >= PATIENCE:
                 break
             model = LimitedModel(linear, updated)
