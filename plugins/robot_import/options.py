@@ -8,7 +8,7 @@ from typing import Any
 from calmotion.catalogs import Material
 from calmotion.model import MotorTracks
 from calmotion.usd import is_applied, is_rigid_body
-from pxr import Usd
+from pxr import Usd, UsdGeom
 
 from .description.descriptions import MJCF, Description
 from .robot_motors import named
@@ -62,8 +62,6 @@ class RobotOptions:
 
     def is_flexible(self, body: Usd.Prim) -> bool:
         """Whether a pattern of flexible links names a link with geometry, whose material may then give its mass."""
-        from pxr import UsdGeom
-
         shaped = any(
             (prim.IsA(UsdGeom.Gprim) and not is_applied(prim, "MjcSiteAPI")) or prim.IsInstance()
             for prim in carried_by(body)

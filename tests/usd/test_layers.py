@@ -16,6 +16,18 @@ def small_layer(name: str):
     return layer
 
 
+@pytest.mark.parametrize("lost", ["timeCodesPerSecond", "customLayerData"])
+def test_a_layer_that_is_opened_again_with_another_rate_or_origin_is_refused(tmp_path, monkeypatch, lost):
+    layer = small_layer("A")
+    layer.timeCodesPerSecond, layer.customLayerData = 30.0, {"calmotion": {"role": "curves"}}
+    write_layer(layer, str(tmp_path / "out.usda"))
+    opened = Sdf.Layer.OpenAsAnonymous(str(tmp_path / "out.usda"))
+    opened.pseudoRoot.ClearInfo(lost)
+    monkeypatch.setattr("pxr.Sdf.Layer.OpenAsAnonymous", lambda path: opened)
+    with pytest.raises(ShotError, match=f"{lost} is not what was written"):
+        write_layer(layer, str(tmp_path / "other.usda"))
+
+
 @pytest.mark.parametrize("name", ["out.usda", "out.usdc", "out.usd", "new/folder/out.usda"])
 def test_the_written_layer_opens_again_and_no_other_file_is_left(tmp_path, name):
     output = tmp_path / name

@@ -8,6 +8,7 @@ from pxr import Sdf, Tf
 from calmotion.errors import ShotError
 from calmotion.support.files import replaced
 from calmotion.usd.diagnostics import quiet
+from calmotion.usd.stages import role_of
 
 EXTENSIONS = (".usda", ".usdc", ".usd")
 
@@ -85,7 +86,12 @@ def write_layer(layer: Sdf.Layer, output: str, validate: Callable[[str], object]
 
 
 def _lost(layer: Sdf.Layer, written: Sdf.Layer) -> str:
-    """The first attribute that has another value, or number of samples or of knots, in a written copy; or empty."""
+    """What a written copy has otherwise: the rate, the role among the results, or the first attribute with
+    another value, or number of samples or of knots; or empty."""
+    if layer.timeCodesPerSecond != written.timeCodesPerSecond:
+        return "timeCodesPerSecond"
+    if role_of(layer) != role_of(written):
+        return "customLayerData"
     paths: list[Sdf.Path] = []
     layer.Traverse("/", paths.append)
     for path in paths:

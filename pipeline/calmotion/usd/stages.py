@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from pxr import Pcp, Sdf, Tf, Usd
+from pxr import Ar, Pcp, Sdf, Tf, Usd
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.model import InputLayer
@@ -287,8 +287,6 @@ def input_layers(stage: Usd.Stage, shot: str) -> tuple[InputLayer, ...]:
 
     Layers of earlier results are included unless they are muted.
     """
-    from pxr import Ar
-
     files = [os.path.realpath(shot)]
     for layer in stage.GetUsedLayers(True):
         name, _ = Ar.SplitPackageRelativePathOuter(layer.realPath)  # a layer inside a .usdz counts as the package
