@@ -39,15 +39,30 @@ def test_limits_are_si_and_the_smaller_torque_counts(tmp_path):
     assert shoulder.optimize and np.isinf([shoulder.max_velocity, shoulder.max_torque]).all()
 
 
-def test_a_drive_that_is_not_animated_holds_its_value(tmp_path):
+@pytest.mark.parametrize("schemas", [(), ("CalmMotorAPI",)], ids=["drive", "servo"])
+def test_a_drive_that_is_not_animated_holds_its_value(tmp_path, schemas):
     def edit(stage):
         clear(stage, ELBOW)
+        for schema in schemas:
+            stage.GetPrimAtPath(ELBOW).AddAppliedSchema(schema)
         stage.GetPrimAtPath(ELBOW).GetAttribute(TARGET_POSITION).Set(45.0)
 
     character, animation, _ = read(tmp_path, edit)
     assert len(character.motors) == 2
     assert np.allclose(animation.tracks[1].values, np.pi / 4)
     assert any("holds 45 degrees" in note for note in character.notes)
+
+
+def test_a_motor_of_ours_that_has_no_drive_and_no_animation_holds_the_pose_of_its_bodies(tmp_path):
+    def edit(stage):
+        prim = stage.GetPrimAtPath(ELBOW)
+        prim.RemoveAPI(UsdPhysics.DriveAPI, "angular")
+        prim.RemoveProperty(TARGET_POSITION)
+        prim.AddAppliedSchema("CalmMotorAPI")
+
+    character, animation, _ = read(tmp_path, edit)
+    assert len(character.motors) == 2 and np.ptp(animation.tracks[1].values) == 0.0
+    assert any(ELBOW in note and "holds the pose of its bodies" in note for note in character.notes)
 
 
 def test_a_drive_that_pulls_nowhere_leaves_its_joint_free(tmp_path):

@@ -133,7 +133,7 @@ def read_drives(
             gear = read_gear(joint, kinds, reading.units)
             if gear is not None:
                 gears[joint.path] = gear
-            drive = _drive(joint, actuated, reading, posed, given, still or rooted or gear is not None)
+            drive = _drive(joint, actuated, reading, posed, given)
             if drive is not None:
                 drives[joint.path] = replace(drive, actuator=actuated.get(joint.path, ""))
     with reading.collecting_problems():
@@ -255,9 +255,8 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
 
 
 def _drive(
-    joint: JointPrim, actuated: dict[str, str], reading: Reading, posed: Sequence[str], given: Sequence[str],
-    still: bool,
-) -> Drive | None:  # fmt: skip
+    joint: JointPrim, actuated: dict[str, str], reading: Reading, posed: Sequence[str], given: Sequence[str]
+) -> Drive | None:
     prim, name = joint.prim, target_attribute(joint)
     drive, unit = joint.drive, _UNITS[joint.kind]
     has_drive, ours = schemas.is_applied(prim, f"PhysicsDriveAPI:{drive}"), schemas.is_applied(prim, _SCHEMA)
@@ -287,19 +286,15 @@ def _drive(
     if posed:
         return Drive(joint, BODIES)
     constant = number_of(prim, _TARGET_POSITION, drive) if has_drive else None
-    holds = constant is not None and schemas.value(prim, _SCHEMA, "calm:motor:optimize") is False  # as a spring
-    if ours and not still and not holds:
-        raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint))
     if constant is not None:
         note = f"its drive is not animated and holds {constant:g} {unit}"
         return Drive(joint, CONSTANT, constant=constant * to_si(joint.kind, reading.units), note=note)
+    if joint.path not in actuated and prim.GetAttribute(f"drive:{drive}:physics:stiffness").Get():
+        note = f"its drive has a stiffness but no target position and holds 0 {unit}"
+        return Drive(joint, CONSTANT, constant=0.0, note=note)
     if ours or joint.path in actuated:
         what = "an actuator drives it" if joint.path in actuated else "it is a motor"
         return Drive(joint, CONSTANT, note=f"{what}, nothing animates it, and it holds the pose of its bodies")
-    stiffness = prim.GetAttribute(f"drive:{drive}:physics:stiffness").Get()
-    if stiffness:
-        note = f"its drive has a stiffness but no target position and holds 0 {unit}"
-        return Drive(joint, CONSTANT, constant=0.0, note=note)
     lost = ", without its damping" if prim.GetAttribute(f"drive:{drive}:physics:damping").Get() else ""
     reading.note(
         f"{joint.path}: its drive has neither a target position nor a stiffness, so the joint moves freely{lost}"
