@@ -43,7 +43,7 @@ class Rig:
         mass: Of all of them [kg].
         targets: Prim paths.
         flexible: Prim paths of the flexible bodies.
-        off: Largest distance of an animated part from where the joints have it [m].
+        off: Largest distance of an animated part, or of a skeleton's joint, from where the robot has it [m].
         notes: Sentences for the user.
     """
 

@@ -100,6 +100,88 @@ def test_the_robot_does_what_the_skeleton_does(tmp_path, options):
     assert far < 1e-6 and turned < 2e-6
 
 
+def _scaled(stage):
+    xform = UsdGeom.Xformable(stage.GetPrimAtPath("/Worm/Skeleton"))
+    xform.AddRotateXOp().Set(-90.0)
+    xform.AddScaleOp().Set(Gf.Vec3f(0.01))  # as Blender and Mixamo export characters
+
+
+def _mirrored(stage):
+    UsdGeom.Xformable(stage.GetPrimAtPath("/Worm")).AddScaleOp().Set(Gf.Vec3f(-1, 1, 1))
+
+
+def _large_joint(stage):
+    UsdSkel.Animation(stage.GetPrimAtPath("/Worm/Animation")).GetScalesAttr().Set(
+        [Gf.Vec3h(1, 1, 1), Gf.Vec3h(1.5, 1.5, 1.5), Gf.Vec3h(1, 1, 1)]
+    )
+
+
+@pytest.mark.parametrize("change", [_scaled, _mirrored, _large_joint])
+def test_the_robot_follows_a_skeleton_with_scales(tmp_path, change):
+    shot = skinned(tmp_path / "worm.usda")
+    stage = Usd.Stage.Open(str(shot))
+    change(stage)
+    stage.Save()
+    rig = rig_shot(str(shot), str(tmp_path / "rig.usda"), RigOptions(angle_tolerance=1e-6))
+    far, turned = followed(tmp_path / "rig.usda", rig.robot)
+    assert far < 1e-6 and turned < (2e-6 if change is not _mirrored else 3.0)  # a mirror image has no rotation
+    assert rig.off < 1e-6 and rig.notes == ()
+
+
+@pytest.mark.parametrize("turns", [True, False])
+@pytest.mark.parametrize("what", ["translations", "scales"])
+def test_joints_that_the_animation_moves_on_their_links_are_reported_with_the_distance(tmp_path, what, turns):
+    shot = skinned(tmp_path / "worm.usda")
+    stage = Usd.Stage.Open(str(shot))
+    animation = UsdSkel.Animation(stage.GetPrimAtPath("/Worm/Animation"))
+    for frame in range(FRAMES + 1):
+        grown = 1.0 + 0.2 * np.sin(np.pi * frame / FRAMES)
+        if what == "translations":
+            animation.GetTranslationsAttr().Set([Gf.Vec3f(0), Gf.Vec3f(1, 0, 0), Gf.Vec3f(grown, 0, 0)], frame)
+        else:
+            animation.GetScalesAttr().Set([Gf.Vec3h(1), Gf.Vec3h(grown), Gf.Vec3h(1)], frame)
+        if not turns:  # the hand is a part of the link of the arm
+            rotations = list(animation.GetRotationsAttr().Get(frame))
+            animation.GetRotationsAttr().Set(Vt.QuatfArray([*rotations[:2], Gf.Quatf(1)]), frame)
+    stage.Save()
+    rig = rig_shot(str(shot), str(tmp_path / "rig.usda"))
+    assert rig.off == pytest.approx(0.2, rel=2e-3)  # scales are half floats
+    (note,) = rig.notes
+    assert "/Worm/Skeleton" in note and "root/upper/hand by 200 mm at time code 12" in note
+    character, _, _ = read_shot(str(tmp_path / "rig.usda"))
+    assert any("is moved away from the joint above it" in told for told in character.notes) == turns
+
+
+@pytest.mark.parametrize("instanced", [False, True])
+def test_of_characters_side_by_side_the_one_that_moves_becomes_a_robot(tmp_path, instanced):
+    skinned(tmp_path / "worm.usda")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "scene.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    stage.SetStartTimeCode(0)
+    stage.SetEndTimeCode(FRAMES)
+    for name in ("Still", "Moving"):
+        prim = stage.DefinePrim(f"/{name}")
+        prim.GetReferences().AddReference("./worm.usda", "/Worm")
+        prim.SetInstanceable(instanced)
+    stage.GetPrimAtPath("/Still").GetRelationship("skel:animationSource").SetTargets([])
+    stage.SetDefaultPrim(stage.GetPrimAtPath("/Moving"))
+    stage.Save()
+    rig = rig_shot(str(tmp_path / "scene.usda"), str(tmp_path / "rig.usda"), RigOptions(angle_tolerance=1e-6))
+    assert rig.robot == ("/Robot" if instanced else "/Moving/Robot") and rig.off < 1e-6
+    assert {joint.joint: len(joint.motors) for joint in rig.joints} == {"root/upper": 1, "root/upper/hand": 2}
+
+
+def test_rotations_of_a_skeleton_are_not_said_to_be_degrees_taken_for_radians(tmp_path):
+    shot = skinned(tmp_path / "worm.usda")
+    stage = Usd.Stage.Open(str(shot))
+    stage.SetTimeCodesPerSecond(1000)
+    stage.Save()
+    rig_shot(str(shot), str(tmp_path / "rig.usda"))
+    character, _, _ = read_shot(str(tmp_path / "rig.usda"))
+    (told,) = (note for note in character.notes if "mean speed" in note)
+    assert "timeCodesPerSecond" in told and "radians" not in told
+
+
 def test_a_looser_tolerance_needs_fewer_hinges_and_reports_the_residual_angle(tmp_path):
     shot = skinned(tmp_path / "worm.usda")
     rig = rig_shot(str(shot), str(tmp_path / "rig.usda"), RigOptions(angle_tolerance=np.radians(80.0)))

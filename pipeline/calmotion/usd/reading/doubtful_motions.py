@@ -8,7 +8,9 @@ from calmotion.arrays import Array
 from calmotion.model import Character, Joint, Motor, Track
 
 _RADIANS = ((np.pi / 180.0, "degrees taken for radians"),)
+_POSES = "poses have no unit of angles; correct timeCodesPerSecond of the stage, the poses, or the limit"
 _METRES = ((1e-2, "centimetres taken for metres"), (1e-3, "millimetres taken for metres"))
+_POSED = ("bodies", "skeleton")  # sources of motors that have rotations in place of angles
 _FASTEST = 100.0  # mean speed of a joint without a limit of its speed [rad/s or m/s]: 955 turns a minute
 _OVER_LIMIT = 10.0  # mean speed of a joint, of its limit, at which the animation cannot be meant
 _SLOWEST = 0.01  # peak speed of the fastest motor of a robot that moves [rad/s or m/s]
@@ -38,8 +40,10 @@ def motion_doubts(character: Character, tracks: Sequence[Track]) -> tuple[str, .
         more = f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""
         if not name:
             notes.append(f"{texts[0]}{more}: in no usual unit would that be within; is it a track of another joint?")
-            continue
-        notes.append(f"{texts[0]}{more}; {factor:.4g} times that would be within ({name}?). {_remedy(name)}")
+        elif name == _POSES:
+            notes.append(f"{texts[0]}{more}; {name}")
+        else:
+            notes.append(f"{texts[0]}{more}; {factor:.4g} times that would be within ({name}?). {_remedy(name)}")
     still = _almost_still(led)
     return (*notes, *still, *(_in_radians(character, led) if not still else ()))
 
@@ -105,6 +109,8 @@ def _far_beyond(motor: Motor, joint: Joint, track: Track) -> list[tuple[tuple[fl
         kept = limit if np.isfinite(limit) else _FASTEST
         text = f"{motor.path}: its animation has a mean speed of {speed * shown:.4g} {unit}/s, where at most "
         text += f"{kept * shown:.4g} {unit}/s can be"
+    if motor.source in _POSED and not motor.linear:
+        return [((1.0, _POSES), text)]
     for factor, name in _METRES if motor.linear else _RADIANS:
         fits = joint.lower <= factor * low + 1e-3 and factor * high <= joint.upper + 1e-3
         if fits and not (fast and factor * speed > min(limit, _FASTEST)):
@@ -117,7 +123,7 @@ def _in_radians(character: Character, led: Sequence[tuple[Motor, Track]]) -> lis
     hinges = [(character.joints[motor.joint], motor, track) for motor, track in led if not motor.linear]
     moved = [(j, m, t) for j, m, t in hinges if np.ptp(t.values) > 0.0]
     factor = 180.0 / np.pi
-    if not moved or len(hinges) < len(led):
+    if not moved or len(hinges) < len(led) or any(m.source in _POSED for _, m, _ in moved):
         return []
     speeds = [float(np.abs(np.diff(t.values) / np.diff(t.times)).max()) for _, _, t in moved]
     largest = max(float(np.abs(t.values).max()) for _, _, t in hinges)

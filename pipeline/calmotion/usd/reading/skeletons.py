@@ -35,6 +35,7 @@ class BoundSkeleton:
     joints: tuple[str, ...]
     rest: Array
     _posed: dict[float, Array] = field(default_factory=dict)
+    _placed: dict[float, Array] = field(default_factory=dict)
 
     def parent(self, joint: int) -> int:
         """Index of the joint above one, -1 for none."""
@@ -50,6 +51,12 @@ class BoundSkeleton:
         if code not in self._posed:
             self._posed[code] = np.array([gf.matrix(m) for m in self._computed(code)])
         return self._posed[code]
+
+    def spaces_at(self, code: float) -> Array:
+        """Transforms of all joints in the skeleton's space, shape [j, 4, 4]."""
+        if code not in self._placed:
+            self._placed[code] = self.in_skeleton(self.locals_at(code))
+        return self._placed[code]
 
     def _computed(self, code: float) -> Sequence[Gf.Matrix4d]:
         try:
@@ -161,7 +168,8 @@ def skeleton_with(skeletons: list[BoundSkeleton], token: str, path: str, attribu
     """The skeleton that has a joint, and its index there.
 
     Args:
-        token: The joint, as the skeleton names it, or the last part of that where it is unique.
+        token: The joint, as the skeleton names it, or the last part of that where it is unique; of several skeletons
+            that have it, the one with an animation is meant.
         path, attribute: What names it, for the message.
 
     Raises:
@@ -170,6 +178,8 @@ def skeleton_with(skeletons: list[BoundSkeleton], token: str, path: str, attribu
     places = [(s, k) for s in skeletons for k, joint in enumerate(s.joints) if joint == token]
     if not places:
         places = [(s, k) for s in skeletons for k, joint in enumerate(s.joints) if joint.split("/")[-1] == token]
+    if len(places) > 1:  # of characters side by side, the one that moves
+        places = [(s, k) for s, k in places if len(s.codes())] or places
     if len(places) != 1:
         joints = [joint for s in skeletons for joint in s.joints]
         remedy = "Bind a Skeleton with an animation, or remove the attribute"

@@ -57,6 +57,8 @@ class RobotLayer:
     def __init__(self, stage: Usd.Stage, over: Usd.Stage, material: Material, name: str) -> None:
         self._stage, self._units, self._material = over, units_of(stage), material
         default = stage.GetDefaultPrim()
+        if default and default.IsInstance():  # below it nothing can be added
+            default = Usd.Prim()
         top = str(default.GetPath()) if default else ""
         taken = {str(child.GetName()) for child in (default or stage.GetPseudoRoot()).GetAllChildren()}
         self.robot = f"{top}/{next(n for n in _names('Robot') if n not in taken)}"

@@ -94,13 +94,19 @@ def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
 def _rig_skinned(stage: Usd.Stage, path: str, output: str, options: RigOptions) -> Rig:
     skeleton, clock = _animated_skeleton(stage, path)
     codes = clock.merged(skeleton.codes())
-    links = _links(stage, skeleton, codes, options.angle_tolerance)
+    links, moved = _links(stage, skeleton, codes, options.angle_tolerance)
     layer = SkinnedRobot(stage, skeleton, codes, links, MATERIALS[options.material], options.material)
     names = [link.name for link in links]
     flexible = _flexible(options, names)
     layer.author(options.servo_share, flexible, targets_of(links, skeleton.joints))
     written = layer.finish(provenance_of(path, stage, clock), output, "the skinned character")
-    write_layer(written, output, lambda temporary: _validate(temporary, len(layer.motors)))
+    times, given, marks = clock.seconds(codes), layer.motions(), layer.marks(moved)
+    off: list[float] = []
+    write_layer(
+        written,
+        output,
+        lambda temporary: off.append(largest_distance(*_validate(temporary, len(layer.motors)), times, given, marks)),
+    )
     joints = tuple(
         RiggedJoint(
             skeleton.joints[link.joint], layer.body(k), tuple(layer.motors_of[k]), float(link.hinges.residual.max())
@@ -109,7 +115,10 @@ def _rig_skinned(stage: Usd.Stage, path: str, output: str, options: RigOptions) 
         if link.parent >= 0
     )
     bending = tuple(layer.body(k) for k, name in enumerate(names) if name in flexible)
-    return Rig(output, layer.robot, joints, layer.body_count, layer.mass, tuple(layer.targets), bending)
+    return Rig(
+        output, layer.robot, joints, layer.body_count, layer.mass, tuple(layer.targets), bending, off[0],
+        layer.stretched(moved),
+    )  # fmt: skip
 
 
 def _rig_parts(parts: Parts, stage: Usd.Stage, path: str, output: str, options: RigOptions) -> Rig:
@@ -121,11 +130,13 @@ def _rig_parts(parts: Parts, stage: Usd.Stage, path: str, output: str, options: 
     flexible = _flexible(options, names)
     layer.author(options.servo_share, flexible)
     written = layer.finish(provenance_of(path, stage, parts.clock), output, "the animated parts")
+    times = parts.clock.seconds(parts.codes)
+    given = {body.path: (parts.rotations[body.part], parts.positions[body.part]) for body in bodies if body.part >= 0}
     off: list[float] = []
     write_layer(
         written,
         output,
-        lambda temporary: off.append(largest_distance(*_validate(temporary, len(layer.motors)), parts, bodies)),
+        lambda temporary: off.append(largest_distance(*_validate(temporary, len(layer.motors)), times, given)),
     )
     joints = tuple(
         RiggedJoint(body.path, body.path, tuple(layer.motors_of[k]), float(body.joint.tilt.max()))
@@ -179,7 +190,8 @@ def _animated_skeleton(stage: Usd.Stage, path: str) -> tuple[BoundSkeleton, Cloc
     return animated[0], shot_clock(stage, None)
 
 
-def _links(stage: Usd.Stage, skeleton: BoundSkeleton, codes: Array, tolerance: float) -> list[Link]:
+def _links(stage: Usd.Stage, skeleton: BoundSkeleton, codes: Array, tolerance: float) -> tuple[list[Link], list[int]]:
+    """The links, and the joints that move the skin."""
     skin = read_skin(stage, skeleton, float(codes[0]))
     if len(skin.triangles) == 0:
         raise ShotError(
@@ -201,7 +213,7 @@ def _links(stage: Usd.Stage, skeleton: BoundSkeleton, codes: Array, tolerance: f
             attribute="points",
             remedy="Bind a closed mesh to the skeleton",
         )
-    return links
+    return links, np.flatnonzero(skin.weights.max(axis=0) > 0.0).tolist()
 
 
 def _validate(temporary: str, motors: int) -> tuple[Character, Animation]:

@@ -1,6 +1,7 @@
 """The robot of a skinned character: bodies of their own, cut from the skin, that stand as its skeleton does."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, Vt
@@ -11,8 +12,10 @@ from calmotion.mesh.moments import surface_moments
 from calmotion.model import MassProperties
 from calmotion.rigging.links import Link, tip_of
 from calmotion.usd import gf
+from calmotion.usd.reading.motors.posed_motors import GAP_TOLERANCE
 from calmotion.usd.reading.skeletons import BoundSkeleton
 from calmotion.usd.rigging.layer import WORLD, RobotLayer, rigid
+from calmotion.usd.rigging.reproduction import Motion
 from calmotion.usd.transforms import Pose, pose_from_matrix
 
 _STILL = 1e-6  # a root whose matrix changes by less, relative to its size, does not move
@@ -39,9 +42,7 @@ class SkinnedRobot(RobotLayer):
         super().__init__(stage, Usd.Stage.CreateInMemory(), material, name)
         self._skeleton, self._codes, self._links = skeleton, codes, links
         # world matrices of the skeleton's joints at each time code
-        self._worlds: list[Array] = [
-            skeleton.placement(code) @ skeleton.in_skeleton(skeleton.locals_at(code)) for code in map(float, codes)
-        ]
+        self._worlds: list[Array] = [skeleton.placement(code) @ skeleton.spaces_at(code) for code in map(float, codes)]
         self._poses = [self._pose(link, 0) for link in links]
         self.motors_of: list[list[str]] = [[] for _ in links]
 
@@ -50,7 +51,54 @@ class SkinnedRobot(RobotLayer):
         return f"{self.robot}/{self._links[link].name}"
 
     def _pose(self, link: Link, n: int) -> Pose:
-        return pose_from_matrix(self._worlds[n][link.joint], str(self._skeleton.prim.GetPath()))
+        """That of the body, which has no scale: its skin is in the world's lengths."""
+        return replace(
+            pose_from_matrix(self._worlds[n][link.joint], str(self._skeleton.prim.GetPath())), scale=np.ones(3)
+        )
+
+    def motions(self) -> dict[str, Motion]:
+        """What the skeleton does with the body of each link, by its path."""
+        found = {}
+        for k, link in enumerate(self._links):
+            worlds = np.array([world[link.joint] for world in self._worlds])
+            sides = worlds[:, :3, :3] * np.sign(np.linalg.det(worlds[:, :3, :3]))[:, None, None]
+            u, _, vt = np.linalg.svd(sides / np.linalg.norm(sides, axis=1, keepdims=True))
+            found[self.body(k)] = u @ vt, self._units.length(worlds[:, :3, 3])
+        return found
+
+    def marks(self, joints: Sequence[int]) -> list[tuple[str, Array]]:
+        """The body that each of some joints moves with, and where the skeleton has it [m], shape [n, 3]."""
+        return [(self.body(self._link_of(joint)), self._positions(joint)) for joint in joints]
+
+    def _link_of(self, joint: int) -> int:
+        of = {link.joint: k for k, link in enumerate(self._links)}
+        while joint not in of:
+            joint = self._skeleton.parent(joint)
+        return of[joint]
+
+    def _positions(self, joint: int) -> Array:
+        return self._units.length(np.array([world[joint, :3, 3] for world in self._worlds]))
+
+    def stretched(self, joints: Sequence[int]) -> tuple[str, ...]:
+        """A note on the joint that the animation moves farthest on the link that carries it."""
+        motions, worst = self.motions(), (GAP_TOLERANCE, "")
+        for joint in joints:
+            if (above := self._skeleton.parent(joint)) >= 0:
+                R, p = motions[self.body(self._link_of(above))]
+                local = np.einsum("nji,nj->ni", R, self._positions(joint) - p)
+                moved = np.linalg.norm(local - local[0], axis=1)
+                n = int(np.argmax(moved))
+                where = f"{self._skeleton.joints[joint]} by {1e3 * moved[n]:.3g} mm at time code {self._codes[n]:g}"
+                worst = max(worst, (float(moved[n]), where))
+        path = self._skeleton.prim.GetPath()
+        return (
+            (
+                f"{path}: its animation moves joints on the links that carry them, which the robot does not follow "
+                f"(most of all {worst[1]}); remove translations and scales from the animation where this matters",
+            )
+            if worst[1]
+            else ()
+        )
 
     def author(self, servo_share: float, flexible: Sequence[str], targets: Sequence[int]) -> None:
         """Author the robot.

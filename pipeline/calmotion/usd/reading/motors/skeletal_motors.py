@@ -191,8 +191,14 @@ def skeletal_tracks(stack: HingeStack, clock: Clock, reading: Reading) -> dict[s
 
 def _warn_of_translation(stack: HingeStack, codes: Array, reading: Reading) -> None:
     """Warn where the animation moves a joint of the skeleton away from the one above it."""
-    places = np.array([stack.skeleton.locals_at(float(code))[stack.joint, :3, 3] for code in codes])
-    scale = np.linalg.det(stack.skeleton.placement(reading.start)[:3, :3]) ** (1.0 / 3.0)
+    above, path = stack.skeleton.parent(stack.joint), str(stack.skeleton.prim.GetPath())
+    spaces = [stack.skeleton.spaces_at(float(code)) for code in codes]
+    places = np.array([space[stack.joint, :3, 3] for space in spaces])
+    if above >= 0:  # from the joint above it in its axes, with all scales
+        places -= [space[above, :3, 3] for space in spaces]
+        turns = np.array([pose_from_matrix(space[above], path).rotation for space in spaces])
+        places = np.einsum("nji,nj->ni", turns, places)
+    scale = np.abs(np.linalg.det(stack.skeleton.placement(reading.start)[:3, :3])) ** (1.0 / 3.0)
     moved = reading.units.length(scale * np.linalg.norm(places - places[0], axis=1))
     worst = int(np.argmax(moved))
     if moved[worst] > GAP_TOLERANCE:
