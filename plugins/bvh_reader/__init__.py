@@ -37,16 +37,19 @@ class ReadMotion(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         """The tracks."""
         from .bvh import read_bvh
-        from .mapping import mapped_tracks, read_mapping
+        from .mapping import mapped_tracks, notes_on, read_mapping
 
         path, values = context.get(Source).motion, context.properties
         assert path is not None  # poll
         motion = read_bvh(path)
-        tracks = mapped_tracks(motion, read_mapping(values.map, motion), unit=values.unit, start=values.start)
+        entries = read_mapping(values.map, motion)
+        tracks = mapped_tracks(motion, entries, unit=values.unit, start=values.start)
         context.report(
             "info",
             f"{path}: {len(tracks.values)} of {len(motion.channels)} channels drive motors, {tracks.times[-1]:.4g} s",
         )
+        for note in notes_on(motion, entries, values.unit):
+            context.report("info", f"{path}: {note}")
         return (tracks,)
 
 

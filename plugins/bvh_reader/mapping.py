@@ -14,6 +14,7 @@ from .bvh import BvhMotion
 _ENTRY = re.compile(
     r"(?P<channel>[^=]+)=(?P<motor>[^*+]+?)(\*(?P<factor>[-+.\deE]+?))?(\+(?P<offset>-?[.\d]+ ?[a-z]*))?"
 )
+_LEAST_TURN = 1.0  # that is told where no motor has it [deg]
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,25 @@ def _entry(text: str, motion: BvhMotion) -> Entry:
         written = " or ".join(f"{match['offset']}{unit}" for unit in units)
         raise _wrong("the offset has no unit", text, f"Write {written}, whichever it is")
     return Entry(channel, motor, factor, offset)
+
+
+def notes_on(motion: BvhMotion, entries: list[Entry], unit: float) -> list[str]:
+    """What a user should know of a mapping: turns of a joint that it leaves out, the order in which the channels of a
+    joint apply, and the unit of positions [m]."""
+    notes, used = [], [entry.channel for entry in entries]
+    for joint in dict.fromkeys(channel.rpartition(".")[0] for channel in used if channel.endswith("rotation")):
+        turns = [name for name in motion.channels if name.rpartition(".")[0] == joint and name.endswith("rotation")]
+        columns = {name: np.unwrap(motion.frames[:, motion.channels.index(name)], period=360.0) for name in turns}
+        left = {name: float(np.ptp(column)) for name, column in columns.items() if name not in used}
+        left = {name: turned for name, turned in left.items() if turned > _LEAST_TURN}
+        if left:
+            shown = " and ".join(f"{turned:.3g} deg of {name}" for name, turned in left.items())
+            notes.append(f"the mapping leaves out {shown}, so that {joint} does not point where the capture has it")
+        if len(order := [name.rpartition(".")[2] for name in turns if name in used]) > 1:
+            notes.append(f"{joint} turns by {', then '.join(order)}: its motors must follow each other in this order")
+    if any(not channel.endswith("rotation") for channel in used):
+        notes.append(f"positions are in units of {unit:g} m (bvh.read.unit)")
+    return notes
 
 
 def _wrong(problem: str, found: str | None, remedy: str) -> SettingError:

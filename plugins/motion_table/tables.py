@@ -1,4 +1,4 @@
-"""Tables of motions: CSV with a head, NPZ of NumPy."""
+"""Tables of motions: CSV with a head."""
 
 import csv
 import re
@@ -12,7 +12,6 @@ from calmotion.model import MotorTracks
 from calmotion.support import (
     TIME_UNITS,
     TimeColumn,
-    available_memory,
     counters,
     exact_times,
     instants,
@@ -25,19 +24,14 @@ from calmotion.support import (
     too_large,
 )
 
+from .npz import REMEDY, WITHOUT, read_npz, refuse_repeated
 from .units import TIME, are_units, named_unit, with_unit
 
 _OUTPUTS = (".error", ".rotation_error", ".input", ".output")  # beside paths of prims, in tables that --csv wrote
-_REMEDY = (
-    "Write a column time_s in seconds, and one for each joint, named after it, in rad (or with a comment "
-    "'# units: angle deg') or m"
-)
-_MATRIX = "Name the array of all joints `positions`, and write joint_names, and time_s or fps, beside it"
 _DEGREES = re.compile(r"(angle|units?)\W+deg", re.IGNORECASE)
 _LONGEST = 1e5  # of a motion [s]: a day
 _UNITS = {"ms": "milliseconds (0.001 s)", "us": "microseconds (1e-6 s)", "ns": "nanoseconds (1e-9 s)"}
 _EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
-_WITHOUT = "--set motion.read.rate=60Hz --set motion.read.joints=NAME,-,... with a name, or -, for each column"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,19 +61,21 @@ def read_motion(path: str, *, angles: str, times: str, rate: float, names: Seque
         if reason := too_large(path, _EXPANSION):
             raise OSError(0, f"it is too large for the memory: {reason}")
         is_csv = not path.lower().endswith(".npz")
-        columns, units, angle_unit = _csv(path, names, not rate > 0.0) if is_csv else _npz(path, names)
+        left: list[str] = []
+        columns, units, angle_unit = _csv(path, names, not rate > 0.0) if is_csv else read_npz(path, names, left)
     except (OSError, UnicodeDecodeError) as error:
         found = error.strerror if isinstance(error, OSError) else error
         remedy = "Name another file" if isinstance(error, OSError) else "Save the table as UTF-8"
         raise ShotError("the motion cannot be read", path=path, found=found, remedy=remedy) from error
-    own, notes = _times(columns), []
+    own = _times(columns)
+    notes = [f"{path}: leaves out the arrays {', '.join(left)}"] if left else []
     for name in counters(columns):
         if own is None or name not in own.names:
             notes.append(f"{path}: the column {name or 'without a name'} numbers rows, and is no joint")
             columns.pop(name)
     if own is None:
         if not rate > 0.0:
-            remedy = f"{_REMEDY}; or use {_WITHOUT}"
+            remedy = f"{REMEDY}; or use {WITHOUT}"
             raise ShotError("the motion has no times", path=path, attribute=TIME, remedy=remedy)
         own = TimeColumn((TIME,), np.arange(len(next(iter(columns.values()), np.zeros(0)))) / rate, "s", True)
     for name in own.names:
@@ -120,7 +116,7 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
     comments = [line for _, line in lines if line.startswith("#")]
     lines = [(n, line) for n, line in lines if not line.startswith("#")]
     if not lines:
-        raise ShotError("the motion is empty", path=path, remedy=_REMEDY)
+        raise ShotError("the motion is empty", path=path, remedy=REMEDY)
     between = separator_of(lines[0][1])
     if comments and _is_number(lines[0][1].split(between)[0]):
         if comments[-1].count(between) == lines[0][1].count(between) > 0:
@@ -128,7 +124,7 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
     try:
         rows = [_cells(line, between) for _, line in lines]
     except csv.Error as error:
-        raise ShotError("this is no table", path=path, found=error, remedy=_REMEDY) from None
+        raise ShotError("this is no table", path=path, found=error, remedy=REMEDY) from None
     head = [cell.strip() for cell in rows[0]]
     if _is_number(head[0]):
         if not names:
@@ -137,7 +133,7 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
                 path=path,
                 attribute="line 1",
                 found=",".join(head[:4]),
-                remedy=f"{_REMEDY}; or use {_WITHOUT}",
+                remedy=f"{REMEDY}; or use {WITHOUT}",
             )
         head = list(names)
     else:
@@ -159,16 +155,19 @@ def _csv(path: str, names: Sequence[str], timed: bool) -> tuple[dict[str, Array]
         )
     wrong = next((k for k, row in enumerate(rows) if len(row) != len(head)), None)
     if wrong is not None:
-        raise _wrong_row(path, lines[wrong], len(head), "Correct the row")
+        remedy = "Correct the row"
+        if head == list(names) and all(len(row) == len(rows[0]) for row in rows):
+            remedy = f"Name all {len(rows[0])} columns with motion.read.joints; - leaves one out"
+        raise _wrong_row(path, lines[wrong], len(head), remedy)
     if "" in head and not any(row[head.index("")].strip() for row in rows):  # a comma at the end of each line
         head[head.index("")] = "-"
-    _refuse_repeated(path, head)
+    refuse_repeated(path, head)
     columns: dict[str, Array] = {}
     units: dict[str, str] = {}
     for k, name in enumerate(head):
         if name != "-":
             own, unit = named_unit(name)
-            columns[own] = _column(path, lines, [row[k] for row in rows], name, head, between)
+            columns[own] = _column(path, lines, rows, k, head, between)
             units |= {own: unit} if unit else {}
     return columns, units, "deg" if degrees else "rad"
 
@@ -179,22 +178,31 @@ def _cells(line: str, between: str) -> list[str]:
 
 
 def _column(
-    path: str, lines: Sequence[tuple[int, str]], cells: Sequence[str], name: str, head: Sequence[str], between: str
-) -> Array:
+    path: str, lines: Sequence[tuple[int, str]], rows: Sequence[Sequence[str]], at: int, head: Sequence[str],
+    between: str,
+) -> Array:  # fmt: skip
     """The numbers of a column, or its times of a day or dates in seconds."""
-    values = np.zeros(len(cells))
-    for k, cell in enumerate(cells):
-        try:
-            values[k] = number_of(cell, between)
-        except ValueError:
-            found = instants(cells) if names_times(name) else None
+    values = np.zeros(len(rows))
+    for k, row in enumerate(rows):
+        number = _number(row[at], between)
+        if number is None:
+            found = instants([row[at] for row in rows]) if names_times(head[at]) else None
             if found is not None:
                 return found
-            left = ",".join("-" if other == name else other for other in head)
+            kept = [_number(cell, between) is not None or names_times(head[n]) for n, cell in enumerate(row)]
+            left = ",".join(name if kept[n] and n != at else "-" for n, name in enumerate(head))
             remedy = "Correct the row (write decimals with a point), or leave the column out with "
             remedy += f"--set motion.read.joints={left}"
-            raise _wrong_row(path, lines[k], len(head), remedy) from None
+            raise _wrong_row(path, lines[k], len(head), remedy)
+        values[k] = number
     return values
+
+
+def _number(cell: str, between: str) -> float | None:
+    try:
+        return number_of(cell, between)
+    except ValueError:
+        return None
 
 
 def _wrong_row(path: str, line: tuple[int, str], count: int, remedy: str) -> ShotError:
@@ -207,81 +215,10 @@ def _wrong_row(path: str, line: tuple[int, str], count: int, remedy: str) -> Sho
     )
 
 
-def _npz(path: str, names: Sequence[str]) -> tuple[dict[str, Array], dict[str, str], str]:
-    """The same of an NPZ file: an array for each joint, or `positions` with `joint_names`; `time_s` or `fps`."""
-    arrays = _arrays(path)
-    columns: dict[str, Array] = {}
-    unit = str(arrays.pop("units", ""))
-    rate = arrays.pop("fps", np.zeros(()))
-    fps = float(_numbers(path, "fps", rate.reshape(()) if rate.size == 1 else rate, 0))
-    if "positions" in arrays:
-        positions = _numbers(path, "positions", arrays["positions"], 2)
-        given = np.atleast_1d(arrays["joint_names"]) if "joint_names" in arrays else names
-        own = [name.decode() if isinstance(name, bytes) else str(name) for name in given]
-        if positions.shape[1] != len(own):
-            raise ShotError(
-                "positions must have a column for each name in joint_names",
-                path=path,
-                attribute="positions",
-                found=f"shape {positions.shape} and {len(own)} names",
-                remedy="Write both, or use " + _WITHOUT,
-            )
-        _refuse_repeated(path, own)
-        columns = {name: positions[:, k] for k, name in enumerate(own) if name != "-"}
-        columns |= {TIME: _numbers(path, TIME, arrays[TIME], 1)} if TIME in arrays else {}
-    else:
-        columns = {name: _numbers(path, name, array, 1) for name, array in arrays.items()}
-    if TIME not in columns and fps > 0.0 and columns:
-        columns[TIME] = np.arange(len(next(iter(columns.values())))) / fps
-    return columns, {}, "deg" if "deg" in unit.lower() else "rad"
-
-
-def _refuse_repeated(path: str, names: Sequence[str]) -> None:
-    repeated = next((name for k, name in enumerate(names) if name != "-" and name in names[:k]), None)
-    if repeated is not None:
-        raise ShotError("two columns have the same name", path=path, found=repeated, remedy="Rename one of them")
-
-
-def _arrays(path: str) -> dict[str, np.ndarray]:
-    """The arrays of an NPZ file by name, where they fit into the memory.
-
-    Raises:
-        ShotError: It is no such file, or too large.
-    """
-    import zipfile
-
-    try:
-        with np.load(path, allow_pickle=False) as content:
-            needed, free = float(sum(member.file_size for member in content.zip.infolist())), available_memory()
-            if needed > free:
-                raise ValueError(f"its arrays take {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free")
-            return {name: np.asarray(content[name]) for name in content.files}
-    except (ValueError, zipfile.BadZipFile, EOFError, KeyError, AttributeError, MemoryError) as error:
-        raise ShotError("this is not an NPZ file of plain arrays", path=path, found=error, remedy=_REMEDY) from error
-
-
-def _numbers(path: str, name: str, array: np.ndarray, axes: int) -> Array:
-    """An array as real numbers.
-
-    Raises:
-        ShotError: It has another number of axes, or holds anything else.
-    """
-    if array.ndim != axes or array.dtype.kind not in "iuf":
-        wanted = ("one number", "one number for each time", "a number for each time and joint")[axes]
-        raise ShotError(
-            f"must be {wanted}",
-            path=path,
-            attribute=name,
-            found=f"shape {array.shape} of {array.dtype}",
-            remedy=_MATRIX if array.ndim == 2 and axes == 1 else _REMEDY,
-        )
-    return np.asarray(array, np.float64)
-
-
 def _refuse_bad(path: str, own: TimeColumn, columns: dict[str, Array]) -> None:
     times, named = own.values, own.names[0]
     if not columns:
-        raise ShotError("the motion has no joints", path=path, remedy=_REMEDY)
+        raise ShotError("the motion has no joints", path=path, remedy=REMEDY)
     for name, values in ((named, times), *columns.items()):
         if len(values) != len(times):
             raise ShotError(
@@ -301,7 +238,7 @@ def _refuse_bad(path: str, own: TimeColumn, columns: dict[str, Array]) -> None:
                 remedy="Correct or remove the row",
             )
     if len(times) < 2:
-        raise ShotError("a motion needs two rows at least", path=path, found=f"{len(times)} rows", remedy=_REMEDY)
+        raise ShotError("a motion needs two rows at least", path=path, found=f"{len(times)} rows", remedy=REMEDY)
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if len(back):
         raise ShotError(

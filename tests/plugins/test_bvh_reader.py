@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import small_shots as shots  # noqa: E402
 from calmotion.errors import ShotError
-from calmotion.host import SettingError
+from calmotion.host import Host, SettingError
 from calmotion.model import MotorTracks
 from calmotion.model.run import Source
 from calmotion.testing import host_with, run_operator
@@ -82,6 +82,33 @@ def test_a_byte_order_mark_is_no_part_of_the_motion(read, tmp_path):
 def test_positions_are_lengths(read, tmp_path):
     found = read(bvh(tmp_path / "a.bvh"), map="Hips.Xposition=slide+20mm", unit="1cm")
     assert np.allclose(found.values["slide"], np.cos(TIMES) + 0.02, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("HIERARCHY", "\n\nHIERARCHY"), ("JOINT Arm\n  {", "JOINT Arm {"), ("rotation", "ROTATION"), ("\n", "\r\n"),
+     ("Frame Time: ", "Frame  Time:\t"), ("End Site", "End Site of the arm"), (" ", "\t"), ("HIERARCHY", "Hierarchy")],
+)  # fmt: skip
+def test_files_of_other_exporters_are_the_same_motion(read, tmp_path, old, new):
+    path = bvh(tmp_path / "a.bvh")
+    text = path.read_text().replace(old, new).replace("Frame\tTime", "Frame Time")
+    path.write_bytes(text.encode())
+    assert np.allclose(read(path, map="Arm.Xrotation=a, Arm.Zrotation=b").values["a"], np.radians(5.0))
+
+
+def test_what_a_mapping_loses_is_told(repository, tmp_path):
+    path = bvh(tmp_path / "a.bvh")
+    host = host_with(repository / "plugins" / "bvh_reader")
+
+    def told(mapping):
+        source = Source(path="robot.usda", command="optimize", motion=str(path))
+        run = Host.run(host, [source], (MotorTracks,), settings={"bvh.read": {"map": mapping}}).finish()
+        return " ".join(record.text for record in run.results[-1].records)
+
+    lost = f"leaves out {np.ptp(20.0 * np.sin(TIMES)):.3g} deg of Arm.Zrotation"
+    assert lost in told("Arm.Xrotation=a") and "leaves out" not in told("Arm.Zrotation=a")  # X and Y stand still
+    assert "Arm turns by Zrotation, then Yrotation" in told("Arm.Yrotation=a, Arm.Zrotation=b")
+    assert "0.01 m (bvh.read.unit)" in told("Hips.Xposition=a") and "bvh.read.unit" not in told("Arm.Zrotation=a")
 
 
 def test_angles_that_jump_by_a_turn_are_unwrapped(read, tmp_path):

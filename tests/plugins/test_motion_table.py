@@ -85,6 +85,10 @@ def table(head="time_s,pan,lift", times=TIMES, scale=1.0):
         ("a.npz", {"fps": 2.0, "joint_names": [b"pan", b"lift"], "positions": np.stack([PAN, LIFT], axis=1)}, {}),
         ("a.NPZ", {"fps": 2.0, "units": "deg", "pan": np.degrees(PAN), "lift": np.degrees(LIFT)}, {}),
         ("a.npz", {"time_s": TIMES, "positions": np.stack([PAN, LIFT], axis=1)}, {"joints": "pan,lift"}),
+        ("a.npz", {"fps": [2], "joint_pos": np.stack([PAN, LIFT], axis=1), "body_pos_w": np.zeros((3, 4, 3))},
+         {"joints": "pan,lift"}),
+        ("a.npz", {"fps": 2, "dof_positions": np.stack([LIFT, PAN], axis=1)[:, ::-1], "dof_names": ["pan", "lift"],
+                   "dof_velocities": np.zeros((3, 2))}, {}),
     ],
 )  # fmt: skip
 def test_forms_of_a_motion(read, tmp_path, name, content, settings):
@@ -151,7 +155,7 @@ def test_joints_whose_names_end_like_columns_of_results_are_joints(read):
 
 
 def test_a_column_of_texts_is_left_out_as_the_error_says(read):
-    content = "time_s,pan,state\n0,0,go\n.5,.1,go\n1,.3,on\n"
+    content = "time_s,frame,pan,state\n0,base,0,go\n.5,base,.1,go\n1,base,.3,on\n"
     with pytest.raises(ShotError, match="line 2") as refused:
         read("a.csv", content)
     joints = refused.value.remedy.partition("motion.read.joints=")[2]
@@ -175,8 +179,17 @@ def test_arrays_that_do_not_fit_are_refused(read, content):
 
 def test_a_matrix_of_all_joints_under_another_name_is_refused_with_its_name(read):
     with pytest.raises(ShotError) as refused:
-        read("a.npz", {"fps": 30, "dof_pos": np.zeros((3, 2))})
-    assert "`positions`" in refused.value.remedy and refused.value.attribute == "dof_pos"
+        read("a.npz", {"fps": 30, "trans": np.zeros((3, 2))})
+    assert "`positions`" in refused.value.remedy and refused.value.attribute == "trans"
+
+
+def test_names_that_a_matrix_or_a_table_lacks_are_asked_for(read):
+    with pytest.raises(ShotError, match="no names of joints") as refused:
+        read("a.npz", {"fps": 30, "joint_pos": np.zeros((3, 2))})
+    assert refused.value.found == "2 columns" and "motion.read.joints" in refused.value.remedy
+    with pytest.raises(ShotError, match="line 1") as refused:
+        read("a.csv", "0,0,1\n.5,.1,.5\n1,.3,.2\n", rate=2.0, joints="pan,lift")
+    assert "Name all 3 columns" in refused.value.remedy
 
 
 def test_a_file_that_is_no_npz_is_refused(read, tmp_path):
