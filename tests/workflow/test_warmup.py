@@ -34,15 +34,19 @@ def test_kernels_that_cannot_be_kept_are_an_error(tmp_path, monkeypatch):
     assert "CALMOTION_CACHE" in str(error.value)
 
 
+DIVIDED = {"newton.step", "so3.turn", "so3.turns_between", "so3.matrix_of", "regularized_statics.is_regularized"}
+
+
 @pytest.mark.long
-def test_a_search_compiles_nothing_after_it(calmotion_process, repository, tmp_path):
-    environment = {"CALMOTION_CACHE": str(tmp_path / "cache")}
-    made = json.loads(calmotion_process("warmup", "--json", env=os.environ | environment).stdout)
+def test_a_search_compiles_after_it_what_only_divided_steps_need(calmotion_process, repository, tmp_path):
+    cache = tmp_path / "cache"
+    environment = os.environ | {"CALMOTION_CACHE": str(cache)}
+    made = json.loads(calmotion_process("warmup", "--json", env=environment).stdout)
     assert made["compiled"] == made["kernels"] > 100
+    before = set(cache.rglob("*.nbc"))
     shot = repository / "samples" / "bartender" / "bartender.usda"
-    calmotion_process("optimize", shot, "-o", tmp_path / "calm.usda", env=os.environ | environment)
-    after = sum(1 for _ in (tmp_path / "cache").rglob("*.nbc"))
-    assert after == made["kernels"]
+    calmotion_process("optimize", shot, "-o", tmp_path / "calm.usda", env=environment)
+    assert {path.name.split("-")[0] for path in set(cache.rglob("*.nbc")) - before} <= DIVIDED
 
 
 @pytest.fixture

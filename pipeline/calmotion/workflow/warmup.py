@@ -44,8 +44,8 @@ class Warmup:
 def warmup(progress: Callable[[Progress], None] | None = None) -> Warmup:
     """Compile the kernels that `simulate` and `optimize` need, so that the first shot does not wait for them.
 
-    Shots with closed chains, cyclic shots, compliant motors, and searches that take long (`response_gram`) need a few
-    more, which their first run compiles.
+    Shots with closed chains, cyclic shots, compliant motors, steps that are divided, and searches that take long
+    (`response_gram`) need a few more, which their first run compiles.
 
     Args:
         progress: Called with a `Progress`.
