@@ -32,6 +32,7 @@ SHARES = (0.8, 0.6, 0.4)
 SLOWEST = 10.0  # largest stretch
 EXCEEDED = 1e-3  # of a limit
 FINE = 20_000  # samples of a curve
+INSTANTS = 480  # of TOPP-RA in a second
 NO_LIMIT = 1e6  # [1/s], of the rate of the tempo: TOPP-RA takes no infinite one
 LEAST = 1e-3  # of the largest limit of all motors, that one has at least
 
@@ -119,9 +120,8 @@ def measure(name: str, shot: CompiledShot, quantity: str, share: float, full: tu
     limited, options = limited_shot(shot, quantity, share), RunSettings(retime=TempoSettings(slowest=SLOWEST))
     given = tempo_input(limited, options, shot.animation.tracks)
     found = find_tempo(given, TempoSettings(slowest=SLOWEST), shot.character.path)
-    added = 0.0 if found.map is None else found.map.added
     toppra = toppra_added(limited) if quantity in ORDERS else np.nan
-    bounds = found.report.lower_bound, toppra, added, found.report.uniform_added
+    bounds = found.report.lower_bound, toppra, found.added, found.report.uniform_added
     row = Row(name, quantity, share, *bounds, tolerance_mm=1e3 * tolerance_of(shot.character, None))
     if full is None:
         return row
@@ -171,7 +171,7 @@ def toppra_added(shot: CompiledShot) -> float:
         return np.nan
     setup_logging("ERROR")
     end = float(shot.animation.frame_times[-1])
-    times = np.linspace(0.0, end, 120 * int(np.ceil(end)) + 1)
+    times = np.linspace(0.0, end, INSTANTS * int(np.ceil(end)) + 1)
     curves, motors = _as_animated(shot.character, shot), shot.character.motors
     # a joint that moves as the animation's time does keeps the tempo from exceeding it
     speeds = np.array([*(motor.max_velocity for motor in motors), 1.0])

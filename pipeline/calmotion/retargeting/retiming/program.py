@@ -18,9 +18,8 @@ from calmotion.retargeting.solver.elastic_program import elastic_minimum
 from calmotion.simulation.inputs.tempo import MotorEfforts, TempoLimits
 
 DEVIATION = 1e-2  # weight of int (sigma - 1)^2, over that of the time that is added
-BENDING, SMOOTH = 1e-3, 0.1  # weight of int (L^2 sigma'')^2, and the length L [s]
 EXCEEDED = 30.0  # what an excess of a limit by itself at one instant costs, or a pin by a second [s]
-WITHIN = 2e-3  # share of a limit by which the tempo stays within it
+WITHIN = 5e-4  # share of a limit by which the tempo stays within it
 NEAR = 0.4  # share of a limit from which on it may come to act in one step
 FIRST_RADIUS, LEAST_RADIUS = 0.3, 1e-6  # of the trust region: change of a coefficient
 CONVERGED = 1e-7  # decrease of the merit that ends the iteration [s]
@@ -69,6 +68,7 @@ class TempoProgram:
         basis: Of the stretch.
         path: What limits it, at the basis' instants.
         slowest, fastest: Largest and smallest stretch.
+        scale: Time L within which the tempo changes [s]: the cost has int (L^2 sigma'')^2.
         durations: Parts that take a given time.
         weights: Of each coefficient's deviation from 1, shape [n].
     """
@@ -77,6 +77,7 @@ class TempoProgram:
     path: Path
     slowest: float
     fastest: float
+    scale: float
     durations: tuple[Duration, ...] = ()
     weights: Array | None = None
 
@@ -198,7 +199,7 @@ class TempoProgram:
         middles = 0.5 * (self.basis.breaks[1:] + self.basis.breaks[:-1])
         bending = self.basis.matrices(middles)[2]
         width = np.diff(self.basis.breaks)
-        bent = bending.T @ diags(BENDING * SMOOTH**4 * width) @ bending
+        bent = bending.T @ diags(self.scale**4 * width) @ bending
         weights = np.ones(self.basis.count) if self.weights is None else self.weights
         return csr_matrix(diags(DEVIATION * weights * self._means) + bent)
 

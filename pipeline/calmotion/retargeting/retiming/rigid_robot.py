@@ -16,7 +16,7 @@ from calmotion.retargeting.retiming.tempo import TempoInput
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.preparation import failure_error, prepare
+from calmotion.simulation.preparation import failure_error, modes_of, prepare
 from calmotion.tolerance.motors.animation_limits import rigid_efforts, tempo_limits
 
 
@@ -47,5 +47,6 @@ def tempo_input(shot: CompiledShot, options: RunSettings, tracks: Sequence[Track
     motors = shot.character.motors
     return TempoInput(
         grid.times[grid.judged], curves, limits, efforts, float(frames[1] - frames[0]),
+        float(np.min(modes_of(prepared)[0], initial=np.inf)),
         tuple(motor.path for motor in motors), tuple(measure_of(motor).effort_unit for motor in motors),
     )  # fmt: skip

@@ -15,7 +15,7 @@ from calmotion.retargeting.retiming.splines import StretchBasis
 from calmotion.simulation.inputs.tempo import MotorEfforts, TempoLimits, needed_tempo
 from calmotion.simulation.inputs.time_grid import after_knots
 
-KNOTS = 1.0 / 60.0  # largest distance of the knots of the stretch [s]
+SHORTEST, LONGEST = 1.0 / 6.0, 1.0 / 24.0  # time within which the tempo changes, in frames and in seconds
 STRETCHED = 1e-3  # deviation from 1 that counts as another tempo
 NEARLY = 0.01  # share of a limit within which it is reached
 SPREAD = 1e-5  # stretch that weighs as much as none when the time to a whole frame is spread: most goes where more is
@@ -31,6 +31,7 @@ class TempoInput:
         limits: Of the motors.
         efforts: Of the rigid robot at these times; None where none is limited.
         frame: Length of a frame [s].
+        lowest_frequency: What the tempo may excite [Hz]; infinite of a rigid robot.
         names, units: Paths of the motors and units of their efforts, for errors.
     """
 
@@ -39,6 +40,7 @@ class TempoInput:
     limits: TempoLimits
     efforts: MotorEfforts | None
     frame: float
+    lowest_frequency: float = np.inf
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
 
@@ -52,12 +54,14 @@ class FoundTempo:
         frames: Of the performance, which ends on one: their number.
         report: What it costs.
         excess: By how much limits are still exceeded, as a share of them, since nothing may be slower.
+        added: Time [s], before the last frame was completed.
     """
 
     map: TimeMap | None
     frames: int
     report: TempoReport
     excess: float
+    added: float
 
 
 def find_tempo(given: TempoInput, settings: TempoSettings, path: str) -> FoundTempo:
@@ -85,14 +89,17 @@ def find_tempo(given: TempoInput, settings: TempoSettings, path: str) -> FoundTe
     end = float(given.times[-1])
     if needed.uniform == 1.0:
         unmoved = tuple((time, 0.0) for time in settings.pinned)
-        return FoundTempo(None, round(end / given.frame) + 1, TempoReport(0.0, 0.0, (), unmoved), 0.0)
-    basis = StretchBasis.over(end, KNOTS)
+        return FoundTempo(None, round(end / given.frame) + 1, TempoReport(0.0, 0.0, (), unmoved), 0.0, 0.0)
+    # what changes within a radian of its slowest vibration hardly makes a robot vibrate
+    scale = float(np.clip(1.0 / (2.0 * np.pi * given.lowest_frequency), SHORTEST * given.frame, LONGEST))
+    basis = StretchBasis.over(end, given.frame / np.ceil(given.frame / scale - 1e-9))  # curves have knots at frames
     pins = tuple(Duration(a, b, b - a) for a, b in zip(settings.pinned[:-1], settings.pinned[1:], strict=True))
-    program = TempoProgram(basis, _path(given, basis), settings.slowest, settings.fastest, pins)
+    program = TempoProgram(basis, _path(given, basis), settings.slowest, settings.fastest, scale, pins)
     c = program.solve(np.interp(basis.centres, needed.times, needed.stretch))
     if pins:
         _refuse_contradiction(given, settings, path, program, c)
-    frames = int(np.ceil(float(basis.integral(0.0, end) @ c) / given.frame - 1e-6))
+    takes = float(basis.integral(0.0, end) @ c)
+    frames = int(np.ceil(takes / given.frame - 1e-6))
     whole = replace(
         program,
         durations=(*pins, Duration(0.0, end, frames * given.frame)),
@@ -105,7 +112,7 @@ def find_tempo(given: TempoInput, settings: TempoSettings, path: str) -> FoundTe
     excess = whole.excess(found)
     if excess > NOTICED:
         report = replace(report, lacking=float(np.max(needed.stretch)))
-    return FoundTempo(basis.time_map(found), frames + 1, report, excess)
+    return FoundTempo(basis.time_map(found), frames + 1, report, excess, takes - end)
 
 
 def _path(given: TempoInput, basis: StretchBasis) -> Path:

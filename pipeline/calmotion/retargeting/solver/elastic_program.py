@@ -9,7 +9,7 @@ constraints hold exactly where that is possible (Fletcher, Practical Methods of 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import bmat, csc_matrix, csr_matrix, diags
+from scipy.sparse import csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import splu
 
 from calmotion.arrays import Array, BoolArray
@@ -77,13 +77,17 @@ def elastic_minimum(H: csr_matrix, c: Array, G: csr_matrix, b: Array, rho: float
 
 
 def _step(H: csr_matrix, G: csr_matrix, weight: Array, full: BoolArray, right: Array) -> Array:
-    """The solution of (H + G^T W G) x = right, with a multiplier for each full row."""
-    sparse, rows = G[~full], G[full]
-    matrix = H + sparse.T @ diags(weight[~full]) @ sparse
-    if np.any(full):
-        matrix = bmat([[matrix, rows.T], [rows, -diags(1.0 / weight[full])]])
-    solved = splu(csc_matrix(matrix)).solve(np.concatenate([right, np.zeros(int(full.sum()))]))
-    return np.asarray(solved[: len(right)])
+    """The solution of (H + G^T W G) x = right; full rows are eliminated, since they would fill the matrix."""
+    sparse, rows = G[~full], G[full].toarray()
+    matrix = csc_matrix(H + sparse.T @ diags(weight[~full]) @ sparse)
+    factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    solved = np.asarray(factors.solve(right))
+    if len(rows) == 0:
+        return solved
+    responses = np.asarray(factors.solve(rows.T))
+    # a row and its opposite, both at their bounds, have only the difference of their forces
+    forces = np.linalg.lstsq(rows @ responses + np.diag(1.0 / weight[full]), rows @ solved)[0]
+    return np.asarray(solved - responses @ forces)
 
 
 def _longest(values: Array, change: Array) -> float:

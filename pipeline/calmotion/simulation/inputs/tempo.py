@@ -13,7 +13,7 @@ from scipy import sparse
 from scipy.interpolate import CubicSpline
 from scipy.optimize import linprog
 
-from calmotion.arrays import Array
+from calmotion.arrays import Array, IntArray
 from calmotion.model.outputs import Tempo, TooWeak
 
 
@@ -47,7 +47,7 @@ class TempoLimits:
 
 
 TEMPO_LIMITS = ("velocity", "acceleration", "jerk", "effort")  # that a slower tempo helps to keep
-MOST_INSTANTS = 400  # of the linear programme
+INSTANTS, DISTANCE = 400, 1.0 / 120.0  # number of instants that is enough, or their distance [s] where it is longer
 FINEST = 1e-9  # of a limit, by which it may be exceeded through rounding
 
 
@@ -65,8 +65,7 @@ def needed_tempo(
     curve = CubicSpline(times, values)
     uniform = _uniform([curve(times, order) for order in range(4)], limits, efforts)
     length = float(times[-1] - times[0])
-    stride = max(1, -(-len(times) // MOST_INSTANTS))
-    few = times[::stride] if (len(times) - 1) % stride == 0 else np.append(times[::stride], times[-1])
+    few = times[few_instants(times)]
     if uniform <= 1.0 + FINEST and fastest == 1.0:
         return Tempo(1.0, 0.0, 0.0, few, np.ones(len(few)))
     if not np.isfinite(uniform):
@@ -76,6 +75,12 @@ def needed_tempo(
     root = np.sqrt(square)
     added = float(np.sum(np.diff(few) * (2.0 / (root[:-1] + root[1:]) - 1.0)))
     return Tempo(uniform, (uniform - 1.0) * length, added, few, 1.0 / root)
+
+
+def few_instants(times: Array) -> IntArray:
+    """Indices of as many of some instants at equal distances [s] as a tempo follows from, the last one among them."""
+    stride = max(1, min(-(-len(times) // INSTANTS), int(DISTANCE / (times[1] - times[0]))))
+    return np.unique(np.append(np.arange(0, len(times), stride), len(times) - 1))
 
 
 def _uniform(derivatives: list[Array], limits: TempoLimits, efforts: MotorEfforts | None) -> float:

@@ -25,7 +25,7 @@ from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import ForwardRun, limited_values, run_forward
 from calmotion.simulation.inputs.curves import Curves, sample_curves
-from calmotion.simulation.inputs.tempo import MOST_INSTANTS, TEMPO_LIMITS, MotorEfforts, TempoLimits, needed_tempo
+from calmotion.simulation.inputs.tempo import TEMPO_LIMITS, MotorEfforts, TempoLimits, few_instants, needed_tempo
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.preparation import prepare
 from calmotion.simulation.report import limit_uses
@@ -103,7 +103,7 @@ def rigid_efforts(model: Model, grid: TimeGrid, world: Array, curves: Curves, ru
         model.motor_efforts(reactions(model.system, one.trajectory, one.joint_angles, one.joint_rates).efforts)
         for one in (run, rest)
     )
-    few = np.unique(np.linspace(0, len(grid.times) - 1, MOST_INSTANTS).round().astype(int))
+    few = few_instants(grid.times)
     motors = np.arange(curves.angles.shape[1], dtype=np.int32)
     _, inertia = motor_responses(
         model, states.c[few], states.q[few], run.joint_angles[few], motors, world[few], grid.times[few]
