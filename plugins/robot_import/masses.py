@@ -19,7 +19,7 @@ _FRAME_MASS, _FRAME_INERTIA = 1e-6, 1e-10  # of links without mass [kg], [kg m^2
 _SMALLEST_MOMENT, _RAISED = 1e-6, 1e-2  # of the largest moment of inertia of a link
 _WEIGHTLESS = 1e-9  # of a geom of mass 0 [kg]: UsdPhysics reads 0 as not authored
 MUJOCO_DENSITY = 1000.0  # which the converter writes where the file states none [kg/m^3]
-_LIGHTEST = 1e-9  # mass of what is no frame [kg]
+_LIGHTEST = 1e-9  # mass of what is fixed and no frame [kg]; what moves has any mass that MuJoCo takes
 _FIXED = "PhysicsFixedJoint"
 
 
@@ -86,7 +86,7 @@ def _author_values(
     for prim, body in zip(bodies, values["bodies"], strict=True):
         if keeps(prim):
             pass
-        elif body["mass"] <= _LIGHTEST:
+        elif body["mass"] <= (values["least"] if body["joints"] else _LIGHTEST):
             weightless.append(prim)
         else:
             _author_mass(prim, body, units)

@@ -19,8 +19,8 @@ _ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
 LEAST = 1e-12  # of masses and inertias of frames that move, which a flexible link or a fixed one may still have
 
 
-def compiled(path: str) -> tuple[Any, Any]:
-    """The model of a file, without pictures, and its specification."""
+def compiled(path: str) -> tuple[Any, Any, float]:
+    """The model of a file, without pictures, its specification, and the mass that bodies without one get in it."""
     for least in (0.0, LEAST):
         spec = mujoco.MjSpec.from_file(path)
         for made in (*spec.geoms, *spec.sites, *spec.tendons):
@@ -34,7 +34,7 @@ def compiled(path: str) -> tuple[Any, Any]:
         spec.compiler.boundmass = max(least, spec.compiler.boundmass)
         spec.compiler.boundinertia = max(least, spec.compiler.boundinertia)
         try:
-            return spec.compile(), spec
+            return spec.compile(), spec, least
         except ValueError as error:
             if least or "mass and inertia" not in str(error):
                 raise
@@ -44,7 +44,7 @@ def compiled(path: str) -> tuple[Any, Any]:
 def values(path: str) -> dict[str, Any]:
     """Bodies in the order of the file, each with its joints; actuators by name, and the names of those that are off;
     ellipsoids, which the converter leaves out."""
-    model, spec = compiled(path)
+    model, spec, least = compiled(path)
     bodies = []
     for body in range(1, model.nbody):
         start = model.body_jntadr[body]
@@ -71,7 +71,9 @@ def values(path: str) -> dict[str, Any]:
     actuators = {name: _actuator(model, index) for index, name in enumerate(names)}
     totalled = spec.compiler.settotalmass > 0.0
     shapes = [_ellipsoid(model, geom) for geom in spec.geoms if model.geom_type[geom.id] == _ELLIPSOID]
-    return {"bodies": bodies, "actuators": actuators, "off": off, "totalled": totalled, "ellipsoids": shapes}
+    return {
+        "bodies": bodies, "actuators": actuators, "off": off, "totalled": totalled, "ellipsoids": shapes, "least": least
+    }  # fmt: skip
 
 
 def _ellipsoid(model: Any, geom: Any) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from .repairs import (
     has_volume,
     joint_frames,
     leader,
+    msh_names,
     parsed,
     repaired_copy,
     root_joints,
@@ -95,11 +96,12 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
         unread = judged(MJCF, listed)
         refuse_missing_meshes(files)
         refuse_other_compilers(files)
-        several = several_joints(files)
-        told = (
-            (f"joints of one body are those of bodies one inside the other: {', '.join(several)}",) if several else ()
-        )
-        return Description(path, MJCF, unread=unread, locks=locks(listed), faults=told)
+        told = {
+            "joints of one body are those of bodies one inside the other": several_joints(files),
+            "meshes in MuJoCo's own format become OBJ": msh_names(part.root for part in files),
+        }
+        changes = tuple(f"{what}: {', '.join(names)}" for what, names in told.items() if names)
+        return Description(path, MJCF, unread=unread, locks=locks(listed), faults=changes)
     if root.tag != "robot":
         raise ShotError(
             "this is neither a URDF nor an MJCF robot",

@@ -13,7 +13,7 @@ from .repairs import with_joined_meshes
 
 _JOINTS = ("joint", "freejoint")
 _PLACES = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
-_LIGHT, _LIGHT_INERTIA = "1e-6", "1e-9"  # of a body between two joints [kg], [kg m^2]
+_LIGHT, _LIGHT_INERTIA = "1e-9", "1e-13"  # of a body between two joints [kg], [kg m^2]
 _INNER = ("body", "frame", "replicate")  # what contains bodies
 _FOLDERS = ("meshdir", "texturedir", "assetdir")
 _ANGLES = {"angle": "degree", "eulerseq": "xyz"}  # what a compiler says of angles, and takes where it says nothing

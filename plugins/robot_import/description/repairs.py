@@ -1,7 +1,8 @@
 """Repairs of robots that others read and the converters refuse: a copy of a URDF, and of meshes, is converted instead.
 
 Repaired are prefixes that nothing declares, a robot without a name, joints that follow (mimic) a later one or none, and
-OBJ meshes with points, normals or texture coordinates that no face, or not every face, refers to. A root that floats,
+OBJ meshes with points, normals or texture coordinates that no face, or not every face, refers to. MuJoCo's own meshes
+(MSH) become OBJ. A root that floats,
 or slides on a plane, becomes fixed: a shot moves a root by its transform. Capsules, which newer URDFs have, become
 meshes.
 """
@@ -11,9 +12,12 @@ import os
 import re
 import shutil
 import xml.etree.ElementTree as xml
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
+from calmotion.errors import ShotError
 
 from .packages import MODEL, PACKAGE, in_package
 
@@ -223,7 +227,8 @@ def _leaders_first(root: xml.Element) -> Iterator[xml.Element]:
 
 
 def with_joined_meshes(root: xml.Element, home: str, names: Sequence[str], folder: str) -> None:
-    """Let an MJCF name clean copies of OBJ meshes, each in one part: of several, a converter takes the first.
+    """Let an MJCF name clean copies of OBJ meshes, each in one part: of several, a converter takes the first. MSH
+    meshes, which it does not read, become OBJ.
 
     Args:
         root: Of the robot; it is changed.
@@ -238,8 +243,9 @@ def with_joined_meshes(root: xml.Element, home: str, names: Sequence[str], folde
         return os.path.join(home, *given[:1], name)
 
     with_clean_meshes(
-        root, [file(name) for name in found if os.path.basename(name) in meant], folder, file, "file", ("usemtl",)
-    )
+        root, [file(name) for name in found if os.path.basename(name) in meant or is_msh(name)], folder, file, "file",
+        ("usemtl",),
+    )  # fmt: skip
 
 
 def with_clean_meshes(
@@ -266,6 +272,11 @@ def with_clean_meshes(
             # a folder for each: names repeat, and materials are found beside the mesh
             place = os.path.join(folder, f"mesh_{len(copies)}")
             os.makedirs(place)
+            if is_msh(source):
+                copies[source] = os.path.join(place, f"{Path(source).stem}.obj")
+                Path(copies[source]).write_text(obj_of_msh(source), encoding="utf-8")
+                node.set(attribute, copies[source])
+                continue
             copies[source] = os.path.join(place, os.path.basename(source))
             text = Path(source).read_text(encoding="utf-8", errors="replace")
             Path(copies[source]).write_text(clean_obj(text, kept), encoding="utf-8")
@@ -274,6 +285,42 @@ def with_clean_meshes(
                 if os.path.isfile(materials):
                     shutil.copy(materials, os.path.join(place, os.path.basename(library)))
         node.set(attribute, copies[source])
+
+
+def is_msh(name: str) -> bool:
+    """Whether a mesh of an MJCF is in MuJoCo's own format."""
+    return name.lower().endswith(".msh")
+
+
+def msh_names(roots: Iterable[xml.Element]) -> list[str]:
+    """Names of the meshes of an MJCF's files that are in MuJoCo's own format."""
+    names = (node.get("file", "") for root in roots for node in root.iter("mesh"))
+    return [os.path.basename(name) for name in names if is_msh(name)]
+
+
+def obj_of_msh(path: str) -> str:
+    """The points and faces of a mesh in MuJoCo's own format, as an OBJ.
+
+    Source: MuJoCo, XML reference, mesh: numbers of points, normals, texture coordinates and faces (int32); then these.
+
+    Raises:
+        ShotError: It is none.
+    """
+    data = Path(path).read_bytes()
+    counts = np.frombuffer(data[:16], "<i4") if len(data) >= 16 else np.zeros(4, np.int32)
+    points, normals, textures, faces = (int(count) for count in counts)
+    expected = 16 + 4 * (3 * points + 3 * normals + 2 * textures + 3 * faces)
+    if counts.min() < 0 or points == 0 or faces == 0 or len(data) != expected:
+        raise ShotError(
+            "this is no mesh with faces in MuJoCo's own format (MSH)",
+            path=path,
+            found=f"{len(data)} bytes for {points} points and {faces} faces",
+            remedy="Write it as .stl or .obj, and name that in the robot",
+        )
+    corners = np.frombuffer(data, "<f4", 3 * points, 16).reshape(-1, 3)
+    triangles = np.frombuffer(data[-12 * faces :], "<i4").reshape(-1, 3) + 1
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in corners.tolist()]
+    return clean_obj("\n".join([*lines, *(f"f {a} {b} {c}" for a, b, c in triangles.tolist())]))
 
 
 def clean_obj(text: str, kept: Sequence[str] = _KEPT) -> str:

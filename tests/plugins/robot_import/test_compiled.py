@@ -356,3 +356,40 @@ def test_a_damper_of_a_joint_without_a_motor_is_a_drive_that_pulls_nowhere(tmp_p
 def test_what_mujoco_does_not_load_is_refused_in_its_words(tmp_path):
     with pytest.raises(ShotError, match="A \\+ B >= C"):
         imported(tmp_path, robot(INERTIAL.format('diaginertia="0.001 0.002 0.01"')))
+
+
+def msh(points, triangles, normals=0, textures=0):
+    """A mesh in MuJoCo's own format."""
+    counts = np.array([len(points), normals, textures, len(triangles)], "<i4").tobytes()
+    return (
+        counts + np.asarray(points, "<f4").tobytes() + bytes(12 * normals + 8 * textures)
+        + np.asarray(triangles, "<i4").tobytes()
+    )  # fmt: skip
+
+
+TETRAHEDRON = (np.eye(4, 3) * 0.3, [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)])
+
+
+@pytest.mark.parametrize("sizes", [(0, 0), (4, 4)])
+def test_meshes_in_mujocos_own_format_are_those_of_mujoco(tmp_path, sizes):
+    (tmp_path / "part.msh").write_bytes(msh(*TETRAHEDRON, *sizes))
+    text = robot(head='<asset><mesh file="part.msh" scale="1 1 -1"/></asset>')
+    text = text.replace("</body>", '<geom type="mesh" mesh="part"/></body>', 1)
+    made, model = imported(tmp_path, text)
+    masses = sorted(body.mass.mass for body in made.character.bodies)
+    assert masses == pytest.approx(sorted(model.body_mass[1:]), rel=1e-5)
+    assert any("become OBJ: part.msh" in note for note in made.notes)
+    (tmp_path / "part.msh").write_bytes(msh(*TETRAHEDRON)[:-4])
+    with pytest.raises(ShotError, match="no mesh with faces in MuJoCo's own format"):
+        imported(tmp_path, text)
+
+
+def test_a_moving_body_has_any_mass_that_mujoco_takes(tmp_path):
+    """As the wrist of an arm of Kinova, whose gripper is to be attached."""
+    inertial = '<inertial mass="1e-9" pos="0 0 0" diaginertia="1e-12 1e-12 1e-12"/>'
+    text = robot(
+        arm=f'{BOX.format("")}<body name="wrist">{inertial}<joint name="turn" axis="0 0 1" armature="1"/></body>'
+    )
+    made, _ = imported(tmp_path, text)
+    (wrist,) = (body for body in made.character.bodies if body.path.endswith("wrist"))
+    assert wrist.mass.mass == pytest.approx(1e-9, rel=1e-6)
