@@ -38,7 +38,7 @@ BUILT_IN = {
     "simulate": BuiltIn("simulate", "simulate the shot as animated"),
     "watch": BuiltIn("watch", "simulate or optimise a shot again whenever it is saved"),
     "optimize": BuiltIn("optimize", "change the motor curves so that the robot does not shake"),
-    "rig": BuiltIn("rig", "make a robot from a skinned character: bodies, joints, motors, targets"),
+    "rig": BuiltIn("rig", "make a robot from a skinned character, or from parts that are animated one by one"),
     "motors": BuiltIn("motors", "list real motors that a joint can name, with their sources"),
     "materials": BuiltIn("materials", "list materials for flexible links, with their sources"),
     "plugins": BuiltIn("plugins", "list, check, disable and create plugins"),
