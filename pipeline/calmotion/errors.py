@@ -1,9 +1,10 @@
 """The one kind of error that a user sees: what is wrong, where, and what to do."""
 
+import contextlib
 import errno
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 
@@ -63,6 +64,19 @@ def _restored(cls: type[ShotError], args: tuple[object, ...], fields: dict[str, 
     error = cls.__new__(cls, *args)
     error.__dict__.update(fields)
     return error
+
+
+@contextlib.contextmanager
+def file_access(problem: str, path: object, remedy: str) -> Iterator[None]:
+    """A block that reads or writes a file; arguments as of `ShotError`.
+
+    Raises:
+        ShotError: The system refuses, with its reason.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise ShotError(problem, path=str(path), found=error.strerror or error, remedy=remedy) from error
 
 
 # Parts of messages with which libraries say that memory or threads ran out, under exceptions of other kinds.

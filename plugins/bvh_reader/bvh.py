@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.errors import ShotError
+from calmotion.errors import ShotError, file_access
 from calmotion.support import exact_step, refuse_lfs_pointers, refuse_special, too_large
 
 _EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
@@ -37,17 +37,13 @@ def read_bvh(path: str) -> BvhMotion:
     Raises:
         ShotError: It cannot be read, or is not BVH; with the line.
     """
-    try:
+    with file_access("the motion cannot be read", path, "Check the file"):
         refuse_special(path)
         refuse_lfs_pointers([path])
         if reason := too_large(path, _EXPANSION):
             raise OSError(0, f"it is too large for the memory: {reason}")
         with open(path, encoding="utf-8-sig", errors="replace") as stream:
             lines = stream.read().splitlines()
-    except OSError as error:
-        raise ShotError(
-            "the motion cannot be read", path=path, found=error.strerror, remedy="Check the file"
-        ) from error
     head = next((n for n, line in enumerate(lines) if line.strip()), 0)
     if not lines or lines[head].strip().upper() != "HIERARCHY":
         raise _wrong(path, head + 1, "a BVH file begins with HIERARCHY", lines[head][:60] if lines else "nothing")

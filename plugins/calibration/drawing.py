@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from calmotion.errors import ShotError
+from calmotion.errors import file_access
 from calmotion.views import AFTER, BEFORE, INTENDED, LIMIT, SMALL, new_figure, save, short, tidy
 from matplotlib.figure import Figure
 
@@ -29,13 +29,9 @@ def draw_calibration(folder: str, calibration: Calibration, dpi: int = 150) -> l
         ShotError: When the folder cannot be written.
     """
     target = Path(folder)
-    try:
+    with file_access("the figures cannot be written", folder, "Choose another folder"):
         target.mkdir(parents=True, exist_ok=True)
         written = [save(figure, target / f"{name}.png", dpi) for name, _, figure in plots_of(calibration)]
-    except OSError as error:
-        raise ShotError(
-            "the figures cannot be written", path=folder, found=error.strerror, remedy="Choose another folder"
-        ) from error
     return written
 
 

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from calmotion.errors import ShotError
+from calmotion.errors import file_access
 from calmotion.host import NotAsked, Operator, PluginError, PropertyValues, RunContext
 
 from .commands import HIGHEST_RATE, Commands, ExportRequest, MotorCurves, WrittenCommands
@@ -39,12 +39,8 @@ class CommandFormat(Operator, ABC):
         """Sample, write and read back."""
         curves, request, properties = context.get(MotorCurves), context.get(ExportRequest), context.properties
         commands = self._checked("sampled", self.sampled(curves, request.rate, properties), curves)
-        try:
+        with file_access("the commands cannot be written", request.file, "Choose another file"):
             files = self.write(request.file, commands, curves, request.rate, properties)
-        except OSError as error:
-            raise ShotError(
-                "the commands cannot be written", path=request.file, found=error.strerror, remedy="Choose another file"
-            ) from error
         if not isinstance(files, tuple) or not all(isinstance(file, str) for file in files):
             raise self._fault("write", "returns no tuple of paths", files)
         read = self._checked("read", self.read(files, curves, properties), curves)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from calmotion.arrays import Array
-from calmotion.errors import ShotError
+from calmotion.errors import file_access
 from calmotion.recordings import ANGLE
 from calmotion.views import AFTER, BEFORE, INTENDED, LIMIT, SMALL, new_figure, save, short, tidy
 from matplotlib.figure import Figure
@@ -23,13 +23,9 @@ def draw_diagnosis(folder: str, diagnosis: Diagnosis, dpi: int = 150) -> list[st
         ShotError: When the folder cannot be written.
     """
     target = Path(folder)
-    try:
+    with file_access("the figures cannot be written", folder, "Choose another folder"):
         target.mkdir(parents=True, exist_ok=True)
         return [save(figure, target / f"{name}.png", dpi) for name, _, figure in plots_of(diagnosis)]
-    except OSError as error:
-        raise ShotError(
-            "the figures cannot be written", path=folder, found=error.strerror, remedy="Choose another folder"
-        ) from error
 
 
 def plots_of(diagnosis: Diagnosis) -> Iterator[tuple[str, str, Figure]]:

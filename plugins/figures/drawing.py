@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from calmotion.errors import ShotError
+from calmotion.errors import file_access
 from calmotion.model import Animation, Character, Result, SystemModes
 from calmotion.views import save
 from matplotlib.figure import Figure
@@ -72,15 +72,11 @@ def draw_figures(
     """
     target = Path(folder)
     written: list[str] = []
-    try:
+    with file_access("the figures cannot be written", folder, "Choose another --figures."):
         target.mkdir(parents=True, exist_ok=True)
         for number, (name, heading, figure) in enumerate(plots_of(character, result, modes)):
             progress(min(0.1 * number, 0.45), heading)
             written.append(save(figure, target / f"{name}.png", dpi))
         progress(0.5, "filmstrip")
         written.append(save(draw_filmstrip(character, animation, result, instants), target / "filmstrip.png", dpi))
-    except OSError as error:
-        raise ShotError(
-            f"the figures cannot be written: {error}", path=folder, remedy="Choose another --figures."
-        ) from error
     return written

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from calmotion.errors import ShotError
+from calmotion.errors import file_access
 from calmotion.model import Character, ExceededLimits, Retimed
 from calmotion.views import AFTER, BEFORE, LIMIT, SMALL, new_figure, pace_of, save, tidy, titles
 from matplotlib.axes import Axes
@@ -56,13 +56,9 @@ def write_needed_tempo(folder: str, character: Character, exceeded: ExceededLimi
         ShotError: The folder cannot be written.
     """
     target = Path(folder)
-    try:
+    with file_access("the figure of the tempo cannot be written", folder, "Choose another --figures."):
         target.mkdir(parents=True, exist_ok=True)
         return save(plot_needed_tempo(character, exceeded), target / "tempo.png", dpi)
-    except OSError as error:
-        raise ShotError(
-            f"the figure of the tempo cannot be written: {error}", path=folder, remedy="Choose another --figures."
-        ) from error
 
 
 def _empty() -> tuple[Figure, Axes]:

@@ -10,7 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from calmotion.errors import ShotError
+from calmotion.errors import ShotError, file_access
 from calmotion.model import PageContent, Section, TextTable
 from calmotion.support import write_text
 from matplotlib.figure import Figure
@@ -35,12 +35,8 @@ def write_page(
         ShotError: The file cannot be written.
     """
     text = page_of(content, plots, scene)
-    try:
+    with file_access("the page cannot be written", path, "Choose another --html."):
         write_text(Path(path), text)
-    except OSError as error:
-        raise ShotError(
-            "the page cannot be written", path=path, found=error.strerror, remedy="Choose another --html."
-        ) from error
     return path
 
 

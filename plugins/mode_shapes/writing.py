@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from calmotion.arrays import box_diagonal
-from calmotion.errors import ShotError
+from calmotion.errors import file_access
 from calmotion.model import Body
 from calmotion.reduction import LinearModes, inertia_integrals, modal_damping
 from calmotion.support import replaced, write_text
@@ -46,7 +46,7 @@ def write_modes(
     written: list[str] = []
     rows: list[tuple[object, ...]] = []
     used: set[str] = set()
-    try:
+    with file_access("the mode shapes cannot be written", folder, "Choose another --modes."):
         target.mkdir(parents=True, exist_ok=True)
         for k, (body, linear) in enumerate(modes):
             progress(k / total, body.path)
@@ -66,10 +66,6 @@ def write_modes(
         csv.writer(text).writerows([COLUMNS, *rows])
         write_text(table, text.getvalue())
         written.append(str(table))
-    except OSError as error:
-        raise ShotError(
-            f"the mode shapes cannot be written: {error}", path=folder, remedy="Choose another --modes."
-        ) from error
     return written
 
 

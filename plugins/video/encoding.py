@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from calmotion.errors import ShotError
+from calmotion.errors import ShotError, file_access
 from calmotion.support import replaced
 from PIL import Image, ImageChops
 
@@ -55,11 +55,9 @@ def encode(path: str, frames: Frames, count: int, rate: float, quality: int) -> 
     """
     refuse_unknown_kind(path)
     write = _write_webp if Path(path).suffix.lower() == WEBP else _write_mp4
-    try:
+    with file_access("the video cannot be written", path, "Choose another --video."):
         with replaced(path) as temporary:
             write(temporary, frames, count, rate, quality)
-    except OSError as error:
-        raise ShotError(f"the video cannot be written: {error}", path=path, remedy="Choose another --video.") from error
 
 
 class _Following:

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from calmotion.errors import ShotError, raise_all
+from calmotion.errors import ShotError, file_access, raise_all
 from calmotion.host import Host, NotAsked, Operator, PropertyValues, RunContext, SettingError, Settings
 from calmotion.model import Character
 from calmotion.recordings.recording import ANGLE, EFFORT, RecordingRequest, SensorRecording, turned_on
@@ -42,14 +42,10 @@ class RecordingReader(Operator, ABC):
     def execute(self, context: RunContext) -> Sequence[object]:
         """Read the file."""
         request = context.get(RecordingRequest)
-        try:
+        with file_access("the recording cannot be read", request.file, "Name another file"):
             refuse_special(request.file)
             refuse_lfs_pointers([request.file])
             recording = self.read(request, context.properties)
-        except OSError as error:
-            raise ShotError(
-                "the recording cannot be read", path=request.file, found=error.strerror, remedy="Name another file"
-            ) from error
         for note in recording.notes:
             context.report("info", note)
         return (recording,)

@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from calmotion.errors import ShotError
+from calmotion.errors import ShotError, file_access
 from calmotion.model import Character, Provenance
 from calmotion.model.outputs import ERROR, CsvFile, Figures, Recording, Video, WrittenLayer
 from calmotion.model.run import OutputPaths, Source
@@ -160,12 +160,8 @@ def write_manifest(result: SimulationResult, path: str | os.PathLike[str]) -> st
     no_input(result.outcome, path)
     refuse_overwriting({}, {role: file for file, role in _outputs(result)} | {"manifest": os.fspath(path)})
     content = json.dumps(manifest_of(result, Path(path).parent), indent=2, allow_nan=False) + "\n"
-    try:
+    with file_access("the manifest cannot be written", str(path), "Choose another file"):
         write_text(Path(path), content)
-    except OSError as error:
-        raise ShotError(
-            "the manifest cannot be written", path=str(path), found=error.strerror, remedy="Choose another file"
-        ) from error
     return os.fspath(path)
 
 

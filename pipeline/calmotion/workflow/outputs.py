@@ -4,7 +4,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from calmotion.errors import ShotError
+from calmotion.errors import file_access
 from calmotion.host import Host, SettingError
 from calmotion.model import Character, Provenance
 from calmotion.model.outputs import CsvFile, Figures, HtmlPage, PageContent, Recording, Video, WrittenLayer
@@ -185,9 +185,5 @@ def write_page(host: Host, page: str, content: PageContent) -> str:
 
 def refuse_unwritable(file: str) -> None:
     """Refuse a file that cannot be written."""
-    try:
+    with file_access("the file cannot be written", file, "Choose another file."):
         try_writing(file)
-    except OSError as error:
-        raise ShotError(
-            "the file cannot be written", path=file, found=error.strerror, remedy="Choose another file."
-        ) from error

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from calmotion.errors import ShotError
+from calmotion.errors import ShotError, file_access
 from calmotion.host import SettingError
 from calmotion.support import write_text
 
@@ -79,12 +79,8 @@ def write_template(path: str | os.PathLike[str], jobs: Sequence[Job]) -> dict[st
 
     _refuse_other_files(os.fspath(path), jobs)
     template = openjd_template(jobs, os.path.dirname(os.path.abspath(path)))
-    try:
+    with file_access("the template cannot be written", os.fspath(path), "Choose another file"):
         write_text(Path(path), yaml.safe_dump(template, sort_keys=False, width=1000))
-    except OSError as error:
-        raise ShotError(
-            "the template cannot be written", path=os.fspath(path), found=error.strerror, remedy="Choose another file"
-        ) from error
     return template
 
 

@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 from calmotion.cli import Output, report_options
-from calmotion.errors import ShotError
+from calmotion.errors import file_access
 
 EXAMPLES = (("calmotion demo", "after an installation"),)
 SHOT = "bartender.usda"
@@ -32,16 +32,9 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
     folder = Path(args.output)
     shot = folder / SHOT
-    try:
+    with file_access("the folder of the demo cannot be written", str(folder), "Name another with -o."):
         folder.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(_sample(), shot)
-    except OSError as error:
-        raise ShotError(
-            "the folder of the demo cannot be written",
-            path=str(folder),
-            found=str(error.strerror),
-            remedy="Name another with -o.",
-        ) from None
     arguments = ["optimize", str(shot), "-o", str(folder / "bartender_calm.usda")]
     arguments += ["--csv", str(folder / "bartender.csv")]
     for option, name, plugin in OPTIONAL:
