@@ -1,5 +1,7 @@
 """External meshes: every kind of element and of file that comes from CAD and finite-element programs."""
 
+import sys
+
 import meshio
 import numpy as np
 import pytest
@@ -193,6 +195,73 @@ def test_a_mesh_file_that_cannot_be_read_is_refused(host, tmp_path, name, text):
         run(host, link(mesh_file=str(tmp_path / name)))
     assert caught.value.path == "/Arm/link" and caught.value.attribute == "calm:flexible:meshFile"
     assert name in str(caught.value)
+
+
+def read(path):
+    return mesh_file_module.read_mesh_file(str(path), 1.0, "/Arm/link")
+
+
+@pytest.mark.parametrize(
+    "form", [("gmsh22", False), ("gmsh22", True), ("gmsh", False), ("gmsh", True), ("ansys", True)]
+)
+def test_meshes_of_all_versions_of_gmsh_and_of_ansys_are_the_same(tmp_path, form):
+    points, cells = bricks()
+    meshio.write(tmp_path / "link.msh", meshio.Mesh(points, [("hexahedron", cells)]), form[0], binary=form[1])
+    geometry, _ = read(tmp_path / "link.msh")
+    assert np.abs(tet_volumes(geometry.points, geometry.tets)).sum() == pytest.approx(30.0 * 20.0 * 20.0)
+
+
+def test_elements_of_two_groups_count_once(tmp_path):
+    """Gmsh 2.2 writes an element once for each of its physical groups."""
+    points, cells = bricks((1, 1, 1))
+    meshio.Mesh(points, [("hexahedron", cells), ("hexahedron", cells)]).write(tmp_path / "link.vtu")
+    geometry, told = read(tmp_path / "link.vtu")
+    assert len(geometry.tets) == 6 and any("counted 6 elements" in text for text in told)
+
+
+TET = "*NODE\n1, 0,0,0\n2, 1,0,0\n3, 0,1,0\n4, 0,0,1\n*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n"
+GRIDS = [f"GRID,{k + 1},{{}},{x},{y},{z}\n" for k, (x, y, z) in enumerate(([0.0, 0.0, 0.0], *np.eye(3).tolist()))]
+BULK = "BEGIN BULK\n" + "".join(GRIDS) + "CTETRA,1,1,1,2,3,4\nENDDATA\n"
+PASSED_OVER = {
+    "two parts": (".inp", f"*PART, NAME=A\n{TET}*END PART\n*PART, NAME=B\n{TET}*END PART\n", "several parts"),
+    "a part that is moved": (".inp", f"*PART, NAME=A\n{TET}*END PART\n*INSTANCE, PART=A\n 5., 0., 0.\n*END INSTANCE\n",
+                             "moves its part"),
+    "generated nodes": (".inp", TET + "*NGEN\n1, 4, 1\n", "generates"),
+    "cylindrical coordinates": (".inp", TET.replace("*NODE", "*NODE, SYSTEM=C"), "transforms"),
+    "coordinate systems": (".bdf", BULK.format(*"2222"), "coordinate systems"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", PASSED_OVER)
+def test_decks_of_which_meshio_passes_something_over_are_refused(tmp_path, case):
+    suffix, text, problem = PASSED_OVER[case]
+    (tmp_path / f"link{suffix}").write_text(text)
+    with pytest.raises(ShotError, match=problem) as caught:
+        read(tmp_path / f"link{suffix}")
+    assert "Export the part alone" in caught.value.remedy
+
+
+def test_decks_of_one_part_in_its_place_are_read(tmp_path):
+    (tmp_path / "a.inp").write_text(f"*PART, NAME=A\n{TET}*END PART\n*INSTANCE, PART=A\n*END INSTANCE\n")
+    (tmp_path / "b.bdf").write_text(BULK.format("", "0", "", "0"))
+    for name in ("a.inp", "b.bdf"):
+        geometry, _ = read(tmp_path / name)
+        assert tet_volumes(geometry.points, geometry.tets) == pytest.approx([1.0 / 6.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "remedy"),
+    [("a.step", "ISO-10303-21;", "mesh a CAD file"), ("a.msh", "hello", "cut off, damaged"),
+     ("a", "", "without a suffix"), ("a.msh", "$MeshFormat\n3.0 0 8\n$EndMeshFormat\n", "export it again"),
+     ("a.med", "x", "h5py")],
+)  # fmt: skip
+def test_the_remedy_for_a_mesh_says_what_it_lacks(tmp_path, capfd, monkeypatch, name, text, remedy):
+    monkeypatch.setitem(sys.modules, "h5py", None)  # as where it is not installed
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ShotError, match="cannot be read") as caught:
+        read(tmp_path / name)
+    assert remedy in caught.value.remedy
+    assert capfd.readouterr().out == ""  # stdout is for JSON alone
 
 
 @pytest.mark.parametrize("name", ["link.stl", "link.obj", "link.msh", "link.vtu", "link.ply"])
