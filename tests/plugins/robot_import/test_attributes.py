@@ -92,7 +92,7 @@ NOTHING = {
     "unused_class": robot(extra='<default><default class="other"><joint ref="1"/></default></default>'),
     "pictures": robot(extra='<visual><global fovy="3"/></visual><asset><texture name="t" builtin="flat"/></asset>'),
     "contacts": robot(geom='condim="4" friction="1 1 1" solref="0.1 1" margin="0.1"'),
-    "sensors": robot(extra='<sensor><jointpos joint="hip" noise="1"/></sensor><keyframe><key qpos="1"/></keyframe>'),
+    "sensors": robot(extra='<sensor><jointpos joint="hip" noise="1"/></sensor>'),
     "servo": robot(
         extra='<actuator><general joint="hip" gaintype="fixed" biastype="affine" dyntype="none"/></actuator>'
     ),
@@ -116,6 +116,7 @@ NOTED = {
         robot(extra='<tendon><fixed name="grip"><joint joint="hip" coef="1"/></fixed></tendon>'),
         "couples their joints: grip",
     ),
+    "key frame": (robot(extra='<keyframe><key name="home" qpos="1 0"/></keyframe>'), "key frames are not taken"),
     "ref": (robot(joint='ref="30"'), "that counts as MuJoCo does: hip"),
     "class_ref": (robot(extra='<default><joint ref="30"/></default>'), "that counts as MuJoCo does: hip"),
     "inner_class_ref": (
