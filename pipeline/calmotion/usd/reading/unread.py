@@ -83,7 +83,7 @@ _ALL_WEIGH = "gravity acts on the body"
 _NOTHING_BRAKES = "nothing but joints brakes the body"
 _NO_BREAK = "joints do not break; the table of --csv has their reactions"
 _EXACT = "limits are exact"
-_CURVE = "the velocity of a motor is that of its curve"
+_CURVE = "a motor follows its targetPosition; animate that where a speed is meant, as of wheels"
 # attribute, `{drive}` being that of the joint; values that change nothing, from and to; why it is not used
 OF_BODIES = (
     ("physics:velocity", 0.0, 0.0, _AT_REST),
