@@ -85,7 +85,8 @@ def written(seed: int, folder: Path) -> tuple[str, list[str]]:
                 f"{name}: written curves err {off:.3g} m otherwise than {target.max_error:.3g}, before {largest:.3g}"
             )
     limited = any(
-        row["exceeded"] or row["after"] is None or abs(row["after"]) > 0.98 * abs(row["limit"])
+        row["exceeded"]
+        or any(row[when] is None or abs(row[when]) > 0.98 * abs(row["limit"]) for when in ("before", "after"))
         for row in result.report()["limits"]
     )
     if not limited and not result.improved or not limited and result.max_error > 1.02 * largest + 1e-6:
