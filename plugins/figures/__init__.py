@@ -84,7 +84,7 @@ class PlotNeededTempo(Operator):
         if not (paths and paths.figures):
             return "no figures are requested (--figures)"
         if exceeded is not None and exceeded.tempo is None:
-            return "the animation keeps the limits of the motors"
+            return "the animation exceeds no limit that a slower tempo would keep"
         if exceeded is not None and exceeded.tempo is not None and exceeded.tempo.too_weak is not None:
             return "no tempo helps"
         return None

@@ -78,7 +78,7 @@ def test_the_tempo_that_a_robot_needs_is_drawn_where_limits_are_exceeded(tmp_pat
     assert axes.get_lines()[0].get_ydata() == pytest.approx(100.0 / stretch)
     (told,) = (text.get_text() for text in axes.texts)
     assert told.startswith("velocity of") and told.endswith("+25%")
-    with pytest.raises(PluginError, match="keeps the limits"):
+    with pytest.raises(PluginError, match="exceeds no limit"):
         kept = dataclasses.replace(exceeded, tempo=None)
         run_operator(host_with(PLUGIN), "figures.tempo", [values[0], kept, values[2]])
 

@@ -216,6 +216,7 @@ def _is_file() -> bool:
 
 def _tell(robot: Live, source: Source) -> None:
     """What happened, in a few words on standard error."""
+    from ..lines import Samples
     from ..stream import BEYOND, RESTARTED
 
     report = robot.report()
@@ -231,7 +232,8 @@ def _tell(robot: Live, source: Source) -> None:
     elif rate and (rate < 0.8 * (asked or robot.settings.rate) or (asked and rate > 1.25 * asked)):
         notice(f"the sender gave {rate:.3g} samples a second; --sender-rate {rate:.3g} follows them smoothly")
     if BEYOND in report["events"]:
-        notice("samples beyond the limits of joints were held at the limits: angles have to be in radians")
+        unit = "" if isinstance(source, Samples) else ": angles have to be in radians"  # those of a shot are
+        notice(f"samples beyond the limits of joints were held at the limits{unit}")
     for path, count in report["unknown_joints"].items():
         notice(f"samples with {path}: {count}; the robot has no such motor, it has {', '.join(robot.joints)}")
     for path, count in report["limited"].items():

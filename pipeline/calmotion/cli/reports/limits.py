@@ -82,7 +82,7 @@ def print_retiming(console: Console, retime: dict[str, Any] | None) -> None:
         return
     added, parts = retime["added_s"], retime["stretches"]
     if not parts:
-        say(console, "The tempo stays as it is: the animation keeps the limits of the motors.")
+        say(console, "The tempo stays as it is: the animation exceeds no limit that a slower one would keep.")
         return
     longer = f"{added:.2f} s more" if added >= 0.005 else "no more time"
     say(console, f"The performance takes {longer} than the animation.")
