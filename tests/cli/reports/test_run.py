@@ -168,6 +168,14 @@ def test_each_target_has_its_own_error_before_and_after_and_the_main_one_is_firs
     assert alone.startswith("As animated, the largest error is 60 mm (at /Cup).")
 
 
+def test_the_largest_error_that_remains_is_named_where_no_sentence_has_it():
+    rows = [{"path": f"/T{k}", "max_error_before_m": 0.06 - 0.01 * k, "max_error_after_m": 1e-3 * k} for k in range(5)]
+    told = report(targets=rows, objective_after=1.0, main_target="/T0")
+    assert "The table has 2 more targets, with up to 4 mm (at /T4)." in printed(told).splitlines()
+    rows[1]["max_error_after_m"] = 5e-3
+    assert "The table has 2 more targets." in printed(told).splitlines()
+
+
 def test_how_far_motors_move_and_why_errors_remain_are_told():
     cause = {"motors": 5, "directions": 9}
     remaining = [cause | {"path": "/Cup", "max_error_m": 1.4e-3, "causes": ["motors"]}]

@@ -72,7 +72,11 @@ def print_verdict(console: Console, report: dict[str, Any]) -> None:
             late, without = f"{report['shaper_delay_s']:.3f} s", length(report["delayed_max_error_m"])
             say(console, f"It delays the motion by {late}; without this delay the largest error is {without}.")
     if len(rows) > HEADLINES and not is_still(report):
-        say(console, f"The table has {counted(len(rows) - HEADLINES, 'more target')}.")
+        after = f"max_error{is_optimized(report)}_m"
+        worst = max(rows[HEADLINES:], key=lambda row: float(row[after]))
+        largest = worst[after] > max(row[after] for row in rows[:HEADLINES])
+        more = f", with up to {length(worst[after])} (at {worst['path']})" if largest else ""
+        say(console, f"The table has {counted(len(rows) - HEADLINES, 'more target')}{more}.")
     if is_optimized(report):
         print_reason(console, report)
         _print_goal(console, report)
