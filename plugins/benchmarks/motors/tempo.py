@@ -108,10 +108,13 @@ def without_limits(character: Character) -> Character:
     return replace(character, motors=motors, retarget=replace(character.retarget, cyclic=False))
 
 
-def measure(name: str, shot: CompiledShot, quantity: str, share: float, full: tuple[float, float] | None) -> Row:
+def measure(
+    name: str, shot: CompiledShot, quantity: str, share: float, full: tuple[float, float] | None, rigid: bool = False
+) -> Row:
     """One row.
 
     Args:
+        rigid: Whether the tempo is that of rigid links, which nothing makes vibrate.
         full: Error [m] and processor time [s] at full tempo without limits; None: nothing is searched.
 
     Raises:
@@ -119,6 +122,7 @@ def measure(name: str, shot: CompiledShot, quantity: str, share: float, full: tu
     """
     limited, options = limited_shot(shot, quantity, share), RunSettings(retime=TempoSettings(slowest=SLOWEST))
     given = tempo_input(limited, options, shot.animation.tracks)
+    given = replace(given, lowest_frequency=np.inf) if rigid else given
     found = find_tempo(given, TempoSettings(slowest=SLOWEST), shot.character.path)
     toppra = toppra_added(limited) if quantity in ORDERS else np.nan
     bounds = found.report.lower_bound, toppra, found.added, found.report.uniform_added
@@ -211,14 +215,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--shares", metavar="SHARE", type=float, nargs="+", default=SHARES)
     parser.add_argument("--limits", metavar="QUANTITY", nargs="+", choices=QUANTITIES, default=QUANTITIES)
     parser.add_argument("--tempo-only", action="store_true", help="find the tempo of the rigid robot, and no curves")
+    parser.add_argument("--rigid", action="store_true", help="the same as if all links were rigid")
     options = parser.parse_args(arguments)
     rows, failed = [], False
     for path in options.shots:
         name, shot = Path(path).stem, load(path)
-        full = None if options.tempo_only else _at_full_tempo(shot)
+        full = None if options.tempo_only or options.rigid else _at_full_tempo(shot)
         for quantity, share in product(options.limits, options.shares):
             try:
-                rows.append(measure(name, shot, quantity, share, full))
+                rows.append(measure(name, shot, quantity, share, full, options.rigid))
             except ShotError as error:
                 failed = True
                 say(f"{name}, {quantity} {share:g}: {error}")

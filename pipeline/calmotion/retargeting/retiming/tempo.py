@@ -15,7 +15,7 @@ from calmotion.retargeting.retiming.splines import StretchBasis
 from calmotion.simulation.inputs.tempo import MotorEfforts, TempoLimits, needed_tempo
 from calmotion.simulation.inputs.time_grid import after_knots
 
-SHORTEST, LONGEST = 1.0 / 6.0, 1.0 / 24.0  # time within which the tempo changes, in frames and in seconds
+SHORTEST, LONGEST = 1.0 / 8.0, 1.0 / 24.0  # time within which the tempo changes, in frames and in seconds
 STRETCHED = 1e-3  # deviation from 1 that counts as another tempo
 NEARLY = 0.01  # share of a limit within which it is reached
 SPREAD = 1e-5  # stretch that weighs as much as none when the time to a whole frame is spread: most goes where more is
