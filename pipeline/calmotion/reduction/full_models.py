@@ -19,7 +19,8 @@ from calmotion.reduction.cache import cache_key
 from calmotion.reduction.reduce import FullBody
 from calmotion.support.operating_system import return_freed_memory
 
-_KEPT = 60_000_000  # numbers in factors of full models, half a gigabyte
+_KEPT = 90_000_000  # numbers in factors of full models, 0.7 GB
+_MEANWHILE = 60_000_000  # of those while another one is made
 _HANDED_ON = 20_000_000  # of those from a mesher to the reduction, while it makes others
 _AT_ONCE = 40_000  # nodes of full models that are worked on at the same time: some gigabyte
 
@@ -59,8 +60,13 @@ class _HandedOn:
     def put(self, key: str, model: FullBody) -> None:
         """Keep a model where there is room for it."""
         with self._lock:
-            if model.entries + sum(own.entries for own in self._models.values()) <= _HANDED_ON:
+            if model.entries + _entries(self._models) <= _KEPT:
                 self._models[key] = model
+
+    def make_room(self) -> None:
+        """Free the largest ones, before another one is made."""
+        with self._lock:
+            _without_largest(self._models, _HANDED_ON)
 
     def take(self, key: str) -> FullBody | None:
         """The model of a key, which is kept no longer."""
@@ -71,6 +77,18 @@ class _HandedOn:
         """Free those that nobody took."""
         with self._lock:
             self._models.clear()
+
+
+def _entries(models: dict[str, FullBody]) -> int:
+    return sum(model.entries for model in models.values())
+
+
+def _without_largest(models: dict[str, FullBody], most: int) -> None:
+    """Free the largest models until the others have no more numbers in their factors than that."""
+    for key in sorted(models, key=lambda own: models[own].entries, reverse=True):
+        if _entries(models) <= most:
+            return
+        del models[key]
 
 
 handed_on = _HandedOn()
@@ -134,6 +152,8 @@ class FullModels:
         with making:  # others that need it wait for it
             found = self._models.get(key) or handed_on.take(key)
             if found is None:
+                with self._lock:
+                    _without_largest(self._models, _MEANWHILE)
                 quality = replace(member.mesh.quality, stiffness_factor=1.0)
                 mesh = replace(member.mesh, quality=quality)
                 found = full_body(mesh, member.body, member.attachments, member.root)

@@ -19,6 +19,7 @@ import numpy as np
 from calmotion.arrays import Array, Indices, box_diagonal
 from calmotion.linear_algebra.multifrontal import FactorsTooLarge
 from calmotion.mesh.bisection import bisected
+from calmotion.mesh.parts import error_of_core
 from calmotion.mesh.patches.interface_patches import AttachmentFrame
 from calmotion.mesh.quadratic import quadratic_nodes
 from calmotion.mesh.tetrahedra import min_dihedral_deg
@@ -29,7 +30,7 @@ from calmotion.reduction.basis.natural_modes import clamped_modes
 from calmotion.reduction.cache import cached_reduction
 from calmotion.reduction.discretization_error import element_errors
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.full_models import FullModels, Member, room
+from calmotion.reduction.full_models import FullModels, Member, handed_on, room
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
 from calmotion.reduction.reduce import FullBody
 
@@ -114,6 +115,7 @@ class MeshController:
     ) -> FEMesh:  # fmt: skip
         if models is not None or root is None:
             return self._of_two(mesh, body, attachments, root, loads, models)
+        handed_on.make_room()
         models = FullModels(keeps=True)
         result = self._of_two(mesh, body, attachments, root, loads, models)
         models.hand_on(Member(result, body, attachments, root))
@@ -127,26 +129,26 @@ class MeshController:
         nodes = self._nodes_of_finer(coarse)
         unrefined = self.safety * self.recovered * coarse.error
         if nodes < self.fewest * coarse.nodes:
-            return _with_errors(mesh, 1.0, unrefined, unrefined)
+            return _with_errors(mesh, body, 1.0, unrefined, unrefined)
         finer = bisected_to(mesh, coarse.indicators, nodes, self.marked, self.max_nodes)
         try:
             with room.of(nodes):
                 fine = response(finer, body, attachments, root, loads, self.modes, models, judged=False)
         except FactorsTooLarge as error:
-            raise _NotFiner(_with_errors(mesh, 1.0, unrefined, unrefined)) from error
+            raise _NotFiner(_with_errors(mesh, body, 1.0, unrefined, unrefined)) from error
         change, left = self.extrapolated(coarse, fine)
         whole = fine.compliances / coarse.compliances * (1.0 + change) - 1.0
         every = np.ones_like(coarse.shares)
         if self.keeps == "given":
             errors = (_largest_of(left, share) + _largest_of(np.abs(whole), share) for share in (every, coarse.shares))
-            return _with_errors(mesh, 1.0, *errors)
+            return _with_errors(mesh, body, 1.0, *errors)
         counted = every if loads is None else coarse.shares
         if self.keeps != "finer" and _deviation(whole, coarse.weights, counted) <= self.parted * self.wanted:
             finer, change = mesh, whole
         errors = (
             _largest_of(left, share) + _deviation(change, coarse.weights, share) for share in (every, coarse.shares)
         )
-        return _with_errors(finer, 1.0 / (1.0 + float(coarse.weights @ change)), *errors)
+        return _with_errors(finer, body, 1.0 / (1.0 + float(coarse.weights @ change)), *errors)
 
     def _nodes_of_finer(self, coarse: Response) -> int:
         """Nodes with which the error of a finer mesh is expected to be as wanted, as far as they are allowed."""
@@ -288,20 +290,21 @@ def _deviation(changes: Array, weights: Array, shares: Array) -> float:
     return _largest_of(np.abs(changes - weights @ changes), shares)
 
 
-def _with_errors(mesh: FEMesh, factor: float, error: float, of_deflection: float) -> FEMesh:
-    """The mesh with a factor of its stiffness and the errors of its compliances, to which that of its volume is added.
+def _with_errors(mesh: FEMesh, body: Body, factor: float, error: float, of_deflection: float) -> FEMesh:
+    """The mesh with a factor of its stiffness and the errors of its compliances, with those of its volume and core.
 
     Args:
-        mesh: The mesh.
+        mesh: Of the body.
         factor: Of its stiffness.
         error: Relative, the largest.
         of_deflection: The same, each by its share.
     """
-    by_volume = mesh.quality.error_of_solid
+    assert body.flexible is not None
+    known = mesh.quality.error_of_solid + error_of_core(mesh.points, mesh.tets, body.flexible.material.core)
     quality = replace(
         mesh.quality,
-        frequency_error=0.5 * (error + by_volume),
-        deflection_error=of_deflection + by_volume,
+        frequency_error=0.5 * (error + known),
+        deflection_error=of_deflection + known,
         stiffness_factor=factor,
         min_dihedral_deg=min_dihedral_deg(mesh.points, mesh.tets),
     )

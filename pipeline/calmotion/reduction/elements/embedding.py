@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from calmotion.arrays import Array, Indices, IntArray
@@ -34,7 +35,7 @@ class Embedding:
 
     def displacements(self, modes: Array) -> Array:
         """Displacement of the points for nodal displacements `modes`, shape [n, 3, r] -> [k, 3, r]."""
-        moved = np.einsum("ka,kair->kir", self.values, modes[self.nodes], optimize=True)
+        moved = self._sum(self.values, modes, np.arange(len(self.nodes)))
         outside = np.flatnonzero(np.abs(self.arms).max(axis=1, initial=0.0) > 0.0)
         if len(outside):
             rotation = self._curl(modes, outside)
@@ -46,11 +47,25 @@ class Embedding:
         return self._curl(modes, np.arange(len(self.nodes)))
 
     def _curl(self, modes: Array, rows: Indices) -> Array:
-        # gradient[k, j, i, r] = d_j u_i
-        gradient = np.einsum("kaj,kair->kjir", self.gradients[rows], modes[self.nodes[rows]], optimize=True)
-        return 0.5 * np.stack(
-            [gradient[:, (i + 1) % 3, (i + 2) % 3] - gradient[:, (i + 2) % 3, (i + 1) % 3] for i in range(3)], axis=1
-        )
+        curl = np.zeros((len(rows), *modes.shape[1:]))
+        for j in range(3):
+            derivative, i, k = self._sum(self.gradients[rows, :, j], modes, rows), (j + 1) % 3, (j + 2) % 3
+            curl[:, k] += derivative[:, i]
+            curl[:, i] -= derivative[:, k]
+        return 0.5 * curl
+
+    def _sum(self, weights: Array, modes: Array, rows: Indices) -> Array:
+        """Sums over the nodes of some points' elements; no array holds the modes of all of these nodes, ten a point.
+
+        Args:
+            weights: Shape [k, 10].
+            modes: Shape [n, 3, r].
+            rows: Shape [k].
+        """
+        k, n = len(rows), len(modes)
+        begins = np.arange(0, weights.size + 1, weights.shape[1])
+        S = csr_matrix((weights.ravel(), self.nodes[rows].ravel(), begins), shape=(k, n))
+        return np.asarray(S @ modes.reshape(n, -1)).reshape(k, *modes.shape[1:])
 
 
 def embed(mesh: QuadraticMesh, points: Array) -> Embedding:

@@ -40,7 +40,8 @@ def accurate(
         carrier: Frame of the joint to the parent, body frame.
     """
     time = ProcessorTime(options.time_limit)
-    longer = _LONGER if len(volume.solid.triangles) > SIMPLE else 1.0
+    printed = body.flexible is not None and body.flexible.material.core is not None
+    longer = _LONGER if len(volume.solid.triangles) > SIMPLE and not printed else 1.0
     mesh = filled(index, body, volume.solid, volume.shape, size, time, options.cache, longer)
     mesh = judged(shaped_to(volume, size, mesh, body, attachments), body, carrier, attachments)
     return replace(mesh, quality=replace(mesh.quality, repairs=(*mesh.quality.repairs, *remark(mesh.quality))))

@@ -189,7 +189,9 @@ def _meshed(
         mesh = filled(index, body, geometry.solid, geometry.shape, geometry.size, time, options.cache)
         mesh = _judged(shaped_to(geometry, geometry.size, mesh, body, attachments), body, carrier, attachments)
     else:
-        mesh = accurate(index, body, geometry, element_size(geometry.shape), options, carrier, attachments)
+        assert body.flexible is not None
+        size = element_size(geometry.shape, core=body.flexible.material.core)
+        mesh = accurate(index, body, geometry, size, options, carrier, attachments)
     quality = mesh.quality
     source = geometry.solid.source if isinstance(geometry, Volume) else quality.source
     notes = (*volume_note(quality), *mass_note(body, mesh), *spread_note(body, mesh), *makeup_note(body, mesh))
