@@ -129,7 +129,6 @@ _FINE, _FEWEST, _MOST, _SAMPLES = 1.0, 4, 20, 3_000_000
 _CHUNK = 500_000  # samples at a time
 _REGULAR = 0.118  # volume of a regular tetrahedron of edge 1
 
-
 # Relative error of frequencies by elements of a length that is that of the skin: 0.02 to 0.29% for the first three of
 # five printed bars, 3:1 to 15:1, with elements of 4 to 8 times the skin, and up to 0.4% with larger ones
 _CORE_ERROR = 3e-3
@@ -177,11 +176,12 @@ def skin_share(points: Array, tets: IntArray, core: Core) -> SkinShare:
     edge = float(np.cbrt(np.quantile(volumes, 0.9) / _REGULAR))
     most = min(_MOST, int(np.cbrt(_SAMPLES / len(tets))))
     parts = max(min(int(np.ceil(_FINE * edge / core.skin)), most), _FEWEST)
-    places, lattice, cells = lattice_of(parts)
+    places, ends = parts_of(parts)
+    away = ends - places[:, None]
     size = float(np.linalg.norm(corners[:, 1:] - corners[:, :1], axis=2).max()) / parts
     boundary = NearbyTriangles(points, boundary_triangles(tets), core.skin + 2.0 * size)
-    shares = np.zeros((len(tets), len(cells)))
-    step = max(_CHUNK // len(cells), 1)
+    shares = np.zeros((len(tets), len(places)))
+    step = max(_CHUNK // len(places), 1)
     for start in range(0, len(tets), step):
         part = corners[start : start + step]
         at = np.einsum("pc,eci->epi", places, part)
@@ -189,7 +189,7 @@ def skin_share(points: Array, tets: IntArray, core: Core) -> SkinShare:
         depth = np.linalg.norm(inward, axis=2)
         # the nearest side goes on as a plane within a part
         slopes = np.einsum("epi,eci->epc", inward / depth[:, :, None], part)
-        heights = np.einsum("epc,pkc->epk", slopes, lattice[cells] - places[:, None])
+        heights = np.einsum("epc,pkc->epk", slopes, away)
         heights += depth[:, :, None] - core.skin
         heights = np.sort(np.nan_to_num(heights, nan=np.inf).reshape(-1, 4), axis=1)
         _shares_below(heights, shares[start : start + step].ravel())
@@ -225,32 +225,28 @@ def _to_zero(one: float, other: float) -> float:
     return one / (one - other)
 
 
-def lattice_of(parts: int) -> tuple[Array, Array, Indices]:
-    """A tetrahedron in equal parts: barycentric coordinates of their centers, shape [p, 4], of all of their corners,
-    shape [n, 4], and which these are of each, shape [p, 4].
+def parts_of(parts: int) -> tuple[Array, Array]:
+    """Barycentric coordinates of the centers of the equal parts of a tetrahedron, shape [parts^3, 4], and of their
+    corners, shape [parts^3, 4, 4].
 
     The tetrahedron 1 >= x >= y >= z >= 0 consists of all of its like in the cells of a grid that are within it.
     """
-    ends = np.stack(np.meshgrid(*(np.arange(parts + 1),) * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    ends = ends[(ends[:, 0] >= ends[:, 1]) & (ends[:, 1] >= ends[:, 2])]
-    number = np.full((parts + 1,) * 3, -1)
-    number[tuple(ends.T)] = np.arange(len(ends))
-    cells = []
-    for order in permutations(np.eye(3, dtype=int)):
-        way = ends[:, None] + np.cumsum([np.zeros(3, dtype=int), *order], axis=0)
-        whole = number[tuple(np.minimum(way, parts).transpose(2, 0, 1))]
-        cells.append(whole[((way <= parts).all(axis=2) & (whole >= 0)).all(axis=1)])
-    corners = np.concatenate(cells)
-    centers, lattice = (
-        np.stack([1.0 - x, x - y, y - z, z], axis=1)
-        for x, y, z in ((ends[corners].sum(axis=1) / (4 * parts)).T, (ends / parts).T)
-    )
-    return centers, lattice, corners
+    cells = np.stack(np.meshgrid(*(np.arange(parts),) * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    ways = (np.cumsum([np.zeros(3, dtype=int), *order], axis=0) for order in permutations(np.eye(3, dtype=int)))
+    corners = np.concatenate([cells + way for way in ways])
+    corners = corners[(np.diff(corners, axis=2) <= 0).all(axis=(1, 2))]
+    # sums of whole numbers are exact, so that centers in the plane between two parts lie in it
+    return _barycentric(corners.sum(axis=1) / (4 * parts)), _barycentric(corners / parts)
+
+
+def _barycentric(places: Array) -> Array:
+    x, y, z = np.moveaxis(places, -1, 0)
+    return np.stack([1.0 - x, x - y, y - z, z], axis=-1)
 
 
 def places_of(parts: int) -> Array:
     """Barycentric coordinates of the centers of the equal parts of a tetrahedron, shape [parts^3, 4]."""
-    return lattice_of(parts)[0]
+    return parts_of(parts)[0]
 
 
 @dataclass(frozen=True, eq=False)

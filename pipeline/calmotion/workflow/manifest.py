@@ -160,7 +160,7 @@ def write_manifest(result: SimulationResult, path: str | os.PathLike[str]) -> st
     no_input(result.outcome, path)
     refuse_overwriting({}, {role: file for file, role in _outputs(result)} | {"manifest": os.fspath(path)})
     content = json.dumps(manifest_of(result, Path(path).parent), indent=2, allow_nan=False) + "\n"
-    with file_access("the manifest cannot be written", str(path), "Choose another file"):
+    with file_access("the manifest cannot be written", path, "Choose another file"):
         write_text(Path(path), content)
     return os.fspath(path)
 

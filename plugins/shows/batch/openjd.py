@@ -79,7 +79,7 @@ def write_template(path: str | os.PathLike[str], jobs: Sequence[Job]) -> dict[st
 
     _refuse_other_files(os.fspath(path), jobs)
     template = openjd_template(jobs, os.path.dirname(os.path.abspath(path)))
-    with file_access("the template cannot be written", os.fspath(path), "Choose another file"):
+    with file_access("the template cannot be written", path, "Choose another file"):
         write_text(Path(path), yaml.safe_dump(template, sort_keys=False, width=1000))
     return template
 

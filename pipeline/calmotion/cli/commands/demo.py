@@ -32,7 +32,7 @@ def run(args: argparse.Namespace, output: Output) -> int:
 
     folder = Path(args.output)
     shot = folder / SHOT
-    with file_access("the folder of the demo cannot be written", str(folder), "Name another with -o."):
+    with file_access("the folder of the demo cannot be written", folder, "Name another with -o."):
         folder.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(_sample(), shot)
     arguments = ["optimize", str(shot), "-o", str(folder / "bartender_calm.usda")]

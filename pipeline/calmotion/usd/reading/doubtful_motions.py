@@ -6,11 +6,11 @@ import numpy as np
 
 from calmotion.arrays import Array
 from calmotion.model import Character, Joint, Motor, Track
+from calmotion.usd.reading.motors.driven_motors import BODIES, SKELETON
 
 _RADIANS = ((np.pi / 180.0, "degrees taken for radians"),)
-_POSES = "poses have no unit of angles; correct timeCodesPerSecond of the stage, the poses, or the limit"
 _METRES = ((1e-2, "centimetres taken for metres"), (1e-3, "millimetres taken for metres"))
-_POSED = ("bodies", "skeleton")  # sources of motors that have rotations in place of angles
+_POSED = (BODIES, SKELETON)  # sources of motors that have rotations in place of angles
 _FASTEST = 100.0  # mean speed of a joint without a limit of its speed [rad/s or m/s]: 955 turns a minute
 _OVER_LIMIT = 10.0  # mean speed of a joint, of its limit, at which the animation cannot be meant
 _SLOWEST = 0.01  # peak speed of the fastest motor of a robot that moves [rad/s or m/s]
@@ -31,19 +31,15 @@ def motion_doubts(character: Character, tracks: Sequence[Track]) -> tuple[str, .
         tracks: One for each motor [rad or m].
     """
     led = [(m, t) for m, t in zip(character.motors, tracks, strict=True) if m.follows is None and len(t.times) > 1]
-    found: dict[tuple[float, str], list[str]] = {}
+    found: dict[str, list[str]] = {}
     for motor, track in led:
-        for unit, text in _far_beyond(motor, character.joints[motor.joint], track):
-            found.setdefault(unit, []).append(text)
+        joint = character.joints[motor.joint]
+        if text := _far_beyond(motor, joint, track):
+            found.setdefault(_cause(motor, joint, track), []).append(text)
     notes = []
-    for (factor, name), texts in found.items():
+    for cause, texts in found.items():
         more = f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""
-        if not name:
-            notes.append(f"{texts[0]}{more}: in no usual unit would that be within; is it a track of another joint?")
-        elif name == _POSES:
-            notes.append(f"{texts[0]}{more}; {name}")
-        else:
-            notes.append(f"{texts[0]}{more}; {factor:.4g} times that would be within ({name}?). {_remedy(name)}")
+        notes.append(f"{texts[0]}{more}{cause}")
     still = _almost_still(led)
     return (*notes, *still, *(_in_radians(character, led) if not still else ()))
 
@@ -86,36 +82,47 @@ def _remedy(name: str) -> str:
     )
 
 
-def _far_beyond(motor: Motor, joint: Joint, track: Track) -> list[tuple[tuple[float, str], str]]:
-    """The unit in which an animation would fit the limits that it is far beyond, without a name where none is known,
-    and by what it is; nothing of one that is not far beyond."""
-    low, high = float(track.values.min()), float(track.values.max())
-    span = joint.upper - joint.lower
-    beyond = max(joint.lower - low, high - joint.upper)
-    # more than half a turn, and than half the range
-    far = np.isfinite(span) and beyond > (5.0 * span if motor.linear else max(0.5 * span, np.pi))
-    speed = float(np.abs(np.diff(track.values)).sum() / (track.times[-1] - track.times[0]))
+def _speed(track: Track) -> float:
+    """The mean speed of an animation."""
+    return float(np.abs(np.diff(track.values)).sum() / (track.times[-1] - track.times[0]))
+
+
+def _is_fast(motor: Motor, speed: float) -> bool:
     limit = motor.max_velocity
-    fast = speed > (_OVER_LIMIT * limit if np.isfinite(limit) else _FASTEST)
-    if not far and not fast:
-        return []
+    return speed > (_OVER_LIMIT * limit if np.isfinite(limit) else _FASTEST)
+
+
+def _far_beyond(motor: Motor, joint: Joint, track: Track) -> str:
+    """By what an animation is far beyond the limits; empty where it is not."""
+    low, high = float(track.values.min()), float(track.values.max())
+    span, speed = joint.upper - joint.lower, _speed(track)
+    beyond = max(joint.lower - low, high - joint.upper)
     shown, unit = (1.0, "m") if motor.linear else (180.0 / np.pi, "deg")
-    if far:
+    # more than half a turn, and than half the range
+    if np.isfinite(span) and beyond > (5.0 * span if motor.linear else max(0.5 * span, np.pi)):
         value, bound = (high, joint.upper) if high - joint.upper == beyond else (low, joint.lower)
-        text = (
+        return (
             f"{motor.path}: its animation goes to {value * shown:.4g} {unit}, its limit is {bound * shown:.4g} {unit}"
         )
-    else:
-        kept = limit if np.isfinite(limit) else _FASTEST
-        text = f"{motor.path}: its animation has a mean speed of {speed * shown:.4g} {unit}/s, where at most "
-        text += f"{kept * shown:.4g} {unit}/s can be"
+    if _is_fast(motor, speed):
+        kept = motor.max_velocity if np.isfinite(motor.max_velocity) else _FASTEST
+        return (
+            f"{motor.path}: its animation has a mean speed of {speed * shown:.4g} {unit}/s, where at most "
+            f"{kept * shown:.4g} {unit}/s can be"
+        )
+    return ""
+
+
+def _cause(motor: Motor, joint: Joint, track: Track) -> str:
+    """The rest of the sentence: the unit in which an animation far beyond its limits would fit, and what to do."""
     if motor.source in _POSED and not motor.linear:
-        return [((1.0, _POSES), text)]
+        return "; poses have no unit of angles; correct timeCodesPerSecond of the stage, the poses, or the limit"
+    low, high, speed = float(track.values.min()), float(track.values.max()), _speed(track)
     for factor, name in _METRES if motor.linear else _RADIANS:
         fits = joint.lower <= factor * low + 1e-3 and factor * high <= joint.upper + 1e-3
-        if fits and not (fast and factor * speed > min(limit, _FASTEST)):
-            return [((factor, name), text)]
-    return [((1.0, ""), text)]
+        if fits and not (_is_fast(motor, speed) and factor * speed > min(motor.max_velocity, _FASTEST)):
+            return f"; {factor:.4g} times that would be within ({name}?). {_remedy(name)}"
+    return ": in no usual unit would that be within; is it a track of another joint?"
 
 
 def _in_radians(character: Character, led: Sequence[tuple[Motor, Track]]) -> list[str]:

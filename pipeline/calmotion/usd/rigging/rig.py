@@ -117,7 +117,7 @@ def _rig_skinned(stage: Usd.Stage, path: str, output: str, options: RigOptions) 
     bending = tuple(layer.body(k) for k, name in enumerate(names) if name in flexible)
     return Rig(
         output, layer.robot, joints, layer.body_count, layer.mass, tuple(layer.targets), bending, off[0],
-        layer.stretched(moved),
+        layer.stretched(moved, given),
     )  # fmt: skip
 
 

@@ -1,6 +1,6 @@
 """The robot of a skinned character: bodies of their own, cut from the skin, that stand as its skeleton does."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -79,9 +79,9 @@ class SkinnedRobot(RobotLayer):
     def _positions(self, joint: int) -> Array:
         return self._units.length(np.array([world[joint, :3, 3] for world in self._worlds]))
 
-    def stretched(self, joints: Sequence[int]) -> tuple[str, ...]:
+    def stretched(self, joints: Sequence[int], motions: Mapping[str, Motion]) -> tuple[str, ...]:
         """A note on the joint that the animation moves farthest on the link that carries it."""
-        motions, worst = self.motions(), (GAP_TOLERANCE, "")
+        worst = (GAP_TOLERANCE, "")
         for joint in joints:
             if (above := self._skeleton.parent(joint)) >= 0:
                 R, p = motions[self.body(self._link_of(above))]
@@ -90,14 +90,12 @@ class SkinnedRobot(RobotLayer):
                 n = int(np.argmax(moved))
                 where = f"{self._skeleton.joints[joint]} by {1e3 * moved[n]:.3g} mm at time code {self._codes[n]:g}"
                 worst = max(worst, (float(moved[n]), where))
-        path = self._skeleton.prim.GetPath()
+        if not worst[1]:
+            return ()
         return (
-            (
-                f"{path}: its animation moves joints on the links that carry them, which the robot does not follow "
-                f"(most of all {worst[1]}); remove translations and scales from the animation where this matters",
-            )
-            if worst[1]
-            else ()
+            f"{self._skeleton.prim.GetPath()}: its animation moves joints on the links that carry them, which the "
+            f"robot does not follow (most of all {worst[1]}); remove translations and scales from the animation where "
+            "this matters",
         )
 
     def author(self, servo_share: float, flexible: Sequence[str], targets: Sequence[int]) -> None:

@@ -295,10 +295,9 @@ def _drive(
     if ours or joint.path in actuated:
         what = "an actuator drives it" if joint.path in actuated else "it is a motor"
         return Drive(joint, CONSTANT, note=f"{what}, nothing animates it, and it holds the pose of its bodies")
-    damped = prim.GetAttribute(f"drive:{drive}:physics:damping").Get()
-    lost = ", without its damping; a targetPosition makes it a motor, with a stiffness one that gives way" * bool(
-        damped
-    )
+    lost = ""
+    if prim.GetAttribute(f"drive:{drive}:physics:damping").Get():
+        lost = ", without its damping; a targetPosition makes it a motor, with a stiffness one that gives way"
     reading.note(
         f"{joint.path}: its drive has neither a target position nor a stiffness, so the joint moves freely{lost}"
     )
